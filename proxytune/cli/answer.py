@@ -1,0 +1,19 @@
+"""What every command gives back: one JSON document, and the same for people."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from rich.console import RenderableType
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The result of a command.
+
+    Attributes:
+        document: What `--json` prints: plain numbers, texts, lists and dicts, None where undefined.
+        shown: What a person sees on standard output.
+    """
+
+    document: dict[str, Any]
+    shown: RenderableType

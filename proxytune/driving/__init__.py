@@ -1,0 +1,1 @@
+"""Differential-drive robots on a road: plants, cameras, lanes, agents and the lane-following task."""

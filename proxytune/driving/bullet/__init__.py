@@ -1,0 +1,1 @@
+"""All that runs on PyBullet: the reference plant and the reference camera."""

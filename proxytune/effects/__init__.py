@@ -1,0 +1,24 @@
+"""Effects: what bends commands, motion and pictures on their way, as causal filters with a neutral value."""
+
+from proxytune.effects.catalogue import CATALOGUE, DECLARED, PARAMETERS, effects_from, theta_names
+from proxytune.effects.chain import Chain, stage_chain
+from proxytune.effects.effect import CHANNELS, Effect, Setting, Signal, Stage
+from proxytune.effects.model import Model, read_effects, read_model
+
+__all__ = [
+    "CATALOGUE",
+    "CHANNELS",
+    "DECLARED",
+    "PARAMETERS",
+    "Chain",
+    "Effect",
+    "Model",
+    "Setting",
+    "Signal",
+    "Stage",
+    "effects_from",
+    "read_effects",
+    "read_model",
+    "stage_chain",
+    "theta_names",
+]

@@ -1,0 +1,136 @@
+"""Effects between a command that has arrived and the speed that a wheel turns at, as a fraction of full speed."""
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.space import Parameter
+
+
+@dataclass(frozen=True)
+class DriverMap:
+    """The motor driver jumps to a smallest output as soon as the duty leaves zero.
+
+    |output| = offset + (1 − offset)·|duty| from a duty of 0.01 on, nothing below it.
+    """
+
+    offset: float
+    name: ClassVar[str] = "driver_map"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            "offset",
+            "duty",
+            0.0,
+            0.4,
+            0.0,
+            (0.02, 0.04, 0.08, 0.15, 0.3),
+            "Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01",
+        ),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Map each sample on its own."""
+        size = np.abs(signal)
+        jumped = np.sign(signal) * (self.offset + (1.0 - self.offset) * size)
+        return (signal if self.offset == 0.0 else np.where(size < 0.01, 0.0, jumped)), None
+
+
+@dataclass(frozen=True)
+class Trim:
+    """The right wheel runs faster than the left: left · (1 − trim), right · (1 + trim)."""
+
+    trim: float
+    name: ClassVar[str] = "trim"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            "trim",
+            "",
+            -0.5,
+            0.5,
+            0.0,
+            (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
+            "31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3",
+        ),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Scale the two wheels apart."""
+        return signal * np.array((1.0 - self.trim, 1.0 + self.trim)), None
+
+
+@dataclass(frozen=True)
+class WheelGain:
+    """Each wheel turns faster or slower than nominal by a factor of its own."""
+
+    left: float
+    right: float
+    name: ClassVar[str] = "wheel_gain"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = tuple(
+        Parameter(side, "", 0.3, 1.7, 1.0, (0.7, 0.85, 0.95, 1.05, 1.15, 1.3), "31 calibrated Duckiebots: 1.01 ± 0.14")
+        for side in ("left", "right")
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Scale each wheel."""
+        return signal * np.array((self.left, self.right)), None
+
+
+class Spin(NamedTuple):
+    """Wheel speed at the end of the last sample, and how much of a step is left after one sample and on average."""
+
+    speed: Signal
+    remainder: float
+    mean_remainder: float
+
+
+@dataclass(frozen=True)
+class MotorLag:
+    """Wheels follow the speed asked of them with a first-order lag, τ dω/dt = ω* − ω."""
+
+    time_constant: float
+    name: ClassVar[str] = "motor_lag"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            "time_constant",
+            "s",
+            0.0,
+            1.0,
+            "motor_time_constant",
+            (0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+            "gym-duckietown's dynamics fit: 0.20 s",
+        ),
+    )
+
+    def begin(self, setting: Setting) -> Spin:
+        """Wheels turn at the speed asked of them before time zero."""
+        rest = np.asarray(setting.rest, dtype=float)
+        samples = self.time_constant * setting.rate_hz
+        if samples == 0.0:
+            return Spin(rest, 0.0, 0.0)
+        remainder = float(np.exp(-1.0 / samples))
+        return Spin(rest, remainder, samples * (1.0 - remainder))
+
+    def apply(self, signal: Signal, memory: Spin) -> tuple[Signal, Spin]:
+        """The mean speed over each sample, exact for a command that holds over it."""
+        kept = memory.remainder
+        start = memory.speed[..., None, :]
+        ends, _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-2, zi=kept * start)
+        starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)
+        mean = signal + memory.mean_remainder * (starts - signal)
+        return mean, memory._replace(speed=ends[..., -1, :])

@@ -1,0 +1,77 @@
+"""Every effect there is, in the order in which the signal meets them, and effects from named values."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from proxytune.effects.actuation import DriverMap, MotorLag, Trim, WheelGain
+from proxytune.effects.camera import CameraHeight, CameraPitch, CameraRoll, CameraYaw, FieldOfView, LensDistortion
+from proxytune.effects.command import Delay
+from proxytune.effects.effect import Effect
+from proxytune.effects.image import Blur
+from proxytune.errors import SettingsError
+from proxytune.settings import nearest
+from proxytune.space import Parameter, Theta
+
+_ALL: tuple[type[Effect], ...] = (
+    Delay,
+    DriverMap,
+    Trim,
+    WheelGain,
+    MotorLag,
+    CameraPitch,
+    CameraRoll,
+    CameraYaw,
+    CameraHeight,
+    FieldOfView,
+    LensDistortion,
+    Blur,
+)
+
+CATALOGUE: Mapping[str, type[Effect]] = MappingProxyType({effect.name: effect for effect in _ALL})
+
+DECLARED: tuple[str, ...] = ("trim", "delay", "blur", "camera_pitch")
+"""The effects that a domain family has before anything is found to be missing: θ of the paper."""
+
+
+def theta_names(effect: type[Effect]) -> tuple[str, ...]:
+    """The names of an effect's parameters in θ: its own where it has one, `effect.parameter` where it has more."""
+    if len(effect.parameters) == 1:
+        return (effect.name,)
+    return tuple(f"{effect.name}.{parameter.name}" for parameter in effect.parameters)
+
+
+PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
+    {
+        name: parameter
+        for effect in _ALL
+        for name, parameter in zip(theta_names(effect), effect.parameters, strict=True)
+    }
+)
+"""Every effect's parameters by their names in θ."""
+
+
+def effects_from(theta: Theta, nominal: Mapping[str, float]) -> tuple[Effect, ...]:
+    """The effects that θ names, in the catalogue's order; parameters of theirs that it leaves out are neutral.
+
+    Raises:
+        SettingsError: If a name is not a parameter of the catalogue or its value is out of bounds.
+    """
+    for name, value in theta.items():
+        _check(name, value)
+    chosen = []
+    for effect in _ALL:
+        names = theta_names(effect)
+        if any(name in theta for name in names):
+            pairs = zip(names, effect.parameters, strict=True)
+            chosen.append(effect(*(float(theta.get(n, p.neutral_value(nominal))) for n, p in pairs)))
+    return tuple(chosen)
+
+
+def _check(name: str, value: float) -> None:
+    if name not in PARAMETERS:
+        raise SettingsError(f"{name}: no effect has this parameter; {nearest(name, PARAMETERS)}")
+    parameter = PARAMETERS[name]
+    if not parameter.low <= value <= parameter.high:
+        raise SettingsError(
+            f"{name}: must be between {parameter.low:g} and {parameter.high:g} {parameter.unit}, got {value}"
+        )

@@ -1,0 +1,35 @@
+"""Effects in a row: what one stage of a domain instance does to its signal."""
+
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from proxytune.effects.effect import Effect, Memory, Setting, Signal, Stage
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The effects of one stage, applied in order; itself a causal filter."""
+
+    effects: tuple[Effect, ...]
+
+    def begin(self, setting: Setting) -> tuple[Memory, ...]:
+        """Every effect's memory, each with a seed of its own."""
+        memories = []
+        for effect in self.effects:
+            own = replace(setting, seed=zlib.crc32(effect.name.encode(), setting.seed))
+            memories.append(effect.begin(own))
+        return tuple(memories)
+
+    def apply(self, signal: Signal, memories: tuple[Memory, ...]) -> tuple[Signal, tuple[Memory, ...]]:
+        """Filter the next chunk through every effect."""
+        after = []
+        for effect, memory in zip(self.effects, memories, strict=True):
+            signal, kept = effect.apply(signal, memory)
+            after.append(kept)
+        return signal, tuple(after)
+
+
+def stage_chain(effects: Iterable[Effect], stage: Stage) -> Chain:
+    """The effects of one stage, in the order given."""
+    return Chain(tuple(effect for effect in effects if effect.stage is stage))

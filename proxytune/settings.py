@@ -1,0 +1,125 @@
+"""Strict reading of TOML settings: every complaint is one line with file, key and what to do."""
+
+import difflib
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from proxytune.errors import SettingsError
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint that ends an error line: the nearest known name, or all of them."""
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    return f"did you mean '{close[0]}'?" if close else f"known are: {', '.join(names)}"
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table of a settings file, which answers for its keys' types and names.
+
+    Every method raises SettingsError with file, key and remedy.
+    """
+
+    path: Path
+    name: str
+    values: Mapping[str, Any]
+
+    def error(self, key: str, problem: str) -> SettingsError:
+        """The one-line complaint about a key of this section."""
+        return SettingsError(f"{self.path}: {self.name}{key}: {problem}")
+
+    def only(self, known: Iterable[str]) -> None:
+        """Refuse keys that are not known."""
+        names = list(known)
+        for key in self.values:
+            if key not in names:
+                raise self.error(key, f"unknown key; {nearest(key, names)}")
+
+    def number(
+        self, key: str, default: float | None = None, *, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        """A finite number within bounds."""
+        value = self._get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.error(key, f"must be a number, got {value!r}")
+        if not math.isfinite(value):
+            raise self.error(key, f"must be finite, got {value}")
+        if not low <= value <= high:
+            raise self.error(key, f"must be between {low:g} and {high:g}, got {value}")
+        return float(value)
+
+    def whole(self, key: str, default: int | None = None, *, low: int = 0, high: int = 2**53) -> int:
+        """A whole number within bounds."""
+        value = self._get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise self.error(key, f"must be a whole number, got {value!r}")
+        if not low <= value <= high:
+            raise self.error(key, f"must be between {low} and {high}, got {value}")
+        return value
+
+    def text(self, key: str, default: str | None = None, *, choices: Iterable[str] = ()) -> str:
+        """A piece of text, one of the choices where there are any."""
+        value = self._get(key, default)
+        if not isinstance(value, str):
+            raise self.error(key, f"must be text in quotes, got {value!r}")
+        names = list(choices)
+        if names and value not in names:
+            raise self.error(key, f"unknown value '{value}'; {nearest(value, names)}")
+        return value
+
+    def texts(self, key: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
+        """A list of distinct texts."""
+        value = self._get(key, None if default is None else list(default))
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise self.error(key, f"must be a list of texts in quotes, got {value!r}")
+        if len(set(value)) < len(value):
+            raise self.error(key, "names something twice")
+        return tuple(value)
+
+    def bounds(self, key: str) -> tuple[float, float]:
+        """A pair of finite numbers, the lower one first."""
+        value = self._get(key, None)
+        pair = value if isinstance(value, list) and len(value) == 2 else None
+        if pair is None or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in pair):
+            raise self.error(key, f"must be [low, high], got {value!r}")
+        low, high = float(pair[0]), float(pair[1])
+        if not (math.isfinite(low) and math.isfinite(high)):
+            raise self.error(key, f"bounds must be finite, got {value!r}")
+        if low >= high:
+            raise self.error(key, f"the lower bound must be below the upper one, got {value!r}")
+        return low, high
+
+    def section(self, key: str) -> "Section":
+        """The table under this key, empty where it is missing."""
+        value = self.values.get(key, {})
+        if not isinstance(value, dict):
+            raise self.error(key, f"must be a table, written [{self.name}{key}], got {value!r}")
+        return Section(self.path, f"{self.name}{key}.", value)
+
+    def _get(self, key: str, default: Any) -> Any:
+        if key in self.values:
+            return self.values[key]
+        if default is None:
+            raise self.error(key, "is missing; add it")
+        return default
+
+
+def read_settings(path: Path) -> Section:
+    """Read a TOML file.
+
+    Raises:
+        SettingsError: If the file is missing, unreadable or not TOML.
+    """
+    try:
+        return Section(path, "", tomllib.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise SettingsError(f"{path}: no such file; check the path") from None
+    except (OSError, UnicodeDecodeError) as problem:
+        raise SettingsError(f"{path}: cannot be read ({problem})") from None
+    except tomllib.TOMLDecodeError as problem:
+        raise SettingsError(f"{path}: is not valid TOML: {problem}") from None

@@ -1,0 +1,41 @@
+"""Agents by name: those that travel with the package, and a user's own as `module:attribute`."""
+
+import importlib
+import sys
+from pathlib import Path
+
+from proxytune.driving.agents import AGENTS, Agent
+from proxytune.errors import SettingsError
+from proxytune.settings import nearest
+
+
+def load_agent(name: str, folder: Path) -> Agent:
+    """The agent of this name.
+
+    Args:
+        name: A key of AGENTS, or `module:attribute`: an agent, or what makes one when called.
+        folder: Where a user's modules may lie besides the installed ones.
+
+    Raises:
+        SettingsError: If there is no such agent.
+    """
+    if name in AGENTS:
+        return AGENTS[name]
+    if ":" not in name:
+        raise SettingsError(f"agent '{name}' is unknown; {nearest(name, AGENTS)}, or write module:attribute")
+    found = _import(name, folder)
+    made = found if hasattr(found, "act") and not isinstance(found, type) else found()  # type: ignore[operator]
+    if not (hasattr(made, "begin") and hasattr(made, "act")):
+        raise SettingsError(f"agent '{name}' has no begin and act; see proxytune.driving.agents.Agent")
+    return made  # type: ignore[return-value]
+
+
+def _import(name: str, folder: Path) -> object:
+    module, _, attribute = name.partition(":")
+    sys.path.insert(0, str(folder))
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, SyntaxError) as problem:
+        raise SettingsError(f"agent '{name}' cannot be loaded: {problem}; looked in {folder} too") from None
+    finally:
+        sys.path.remove(str(folder))

@@ -1,0 +1,143 @@
+"""One episode: an agent drives a plant through the effects of a domain instance until time or luck runs out."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.driving.agents import Agent, Command, Picture
+from proxytune.driving.cameras import Camera
+from proxytune.driving.drivetrain import Drivetrain
+from proxytune.driving.plant import Plant
+from proxytune.driving.robot import Robot
+from proxytune.effects import Chain, Setting, Signal
+from proxytune.errors import EpisodeError
+
+TICK_HZ = 60
+"""How often plant, effects and sub-frames of the camera go on; control and camera rates divide it."""
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A domain instance S_θ, ready to drive.
+
+    Attributes:
+        robot: Whose figures the agents know.
+        drivetrain: Command, actuation and motion effects.
+        camera: Mounted as the camera effects have it.
+        image: The image effects.
+    """
+
+    robot: Robot
+    drivetrain: Drivetrain
+    camera: Camera
+    image: Chain
+
+
+class Drive(NamedTuple):
+    """What an episode leaves behind.
+
+    Attributes:
+        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
+        commands: What the agent issued, (control steps, 2).
+        crashed: Whether it ended by hitting something or falling over.
+    """
+
+    poses: Signal
+    commands: Signal
+    crashed: bool
+
+
+@dataclass(frozen=True)
+class Course:
+    """What an episode starts from and how it ends.
+
+    Attributes:
+        start: Starting pose (3,): x [m], y [m], heading [rad].
+        seconds: When time is over [s].
+        seed: Seed of everything random in the effects.
+        ended: Whether a robot at x, y [m] has left the course.
+    """
+
+    start: Signal
+    seconds: float
+    seed: int
+    ended: Callable[[float, float], bool]
+
+
+class _View:
+    """The camera with its image effects: the newest picture at the camera's rate."""
+
+    def __init__(self, instance: Instance, start: Signal, seed: int) -> None:
+        self._camera, self._chain = instance.camera, instance.image
+        self._every = round(TICK_HZ / instance.robot.figures["camera_rate"])
+        first = self._camera.render(start[None])
+        self._shape = first.shape[1:]
+        setting = Setting(TICK_HZ, first.reshape(-1), instance.robot.figures, seed)
+        self._memory = self._chain.begin(setting)
+        self._ticks = 0
+        self.picture: Picture = self._develop(first)
+
+    def pass_by(self, poses: Signal) -> None:
+        """Let the shutter see the poses of the next ticks."""
+        due = self._every - self._ticks % self._every
+        for begin, end in ((0, min(due, len(poses))), (due, len(poses))):
+            if begin < end:
+                self._ticks += end - begin
+                picture = self._develop(self._camera.render(poses[begin:end]))
+                if self._ticks % self._every == 0:
+                    self.picture = picture
+
+    def _develop(self, pictures: NDArray[np.uint8]) -> Picture:
+        signal = pictures.reshape(len(pictures), -1)
+        if self._chain.effects:
+            developed, self._memory = self._chain.apply(signal.astype(np.float32), self._memory)
+            signal = np.clip(np.rint(developed[-1:]), 0, 255).astype(np.uint8)
+        return signal[-1].reshape(self._shape)
+
+
+def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Drive:
+    """Drive until the time is over, the robot crashes or the course ends.
+
+    Raises:
+        EpisodeError: If the agent raises, or its answer is not two finite duties.
+    """
+    figures = instance.robot.figures
+    hold = round(TICK_HZ / figures["control_rate"])
+    memory = instance.drivetrain.begin(Setting(TICK_HZ, np.zeros(2), figures, course.seed))
+    view = _View(instance, course.start, course.seed)
+    driver = _begin(agent, instance.robot)
+    poses, commands, crashed = [course.start[None]], [], False
+    for step in range(round(course.seconds * figures["control_rate"])):
+        command, driver = _ask(agent, view.picture, driver, step / figures["control_rate"])
+        twists, memory = instance.drivetrain.apply(np.repeat(command[None], hold, axis=0), memory)
+        moved, crashed = plant.move(twists)
+        view.pass_by(moved)
+        poses.append(moved)
+        commands.append(command)
+        if crashed or course.ended(float(moved[-1, 0]), float(moved[-1, 1])):
+            break
+    return Drive(np.concatenate(poses), np.array(commands), crashed)
+
+
+def _begin(agent: Agent, robot: Robot) -> Any:
+    try:
+        return agent.begin(robot)
+    except Exception as problem:
+        raise EpisodeError(f"raised {type(problem).__name__} before the first picture: {problem}") from problem
+
+
+def _ask(agent: Agent, picture: Picture, memory: Any, time_s: float) -> tuple[Command, Any]:
+    try:
+        answer, memory = agent.act(picture, memory)
+        command = np.asarray(answer, dtype=float)
+    except Exception as problem:
+        raise EpisodeError(f"raised {type(problem).__name__} at {time_s:.2f} s: {problem}") from problem
+    if command.shape != (2,):
+        raise EpisodeError(f"answered with shape {command.shape} at {time_s:.2f} s; a command is two duties, left and right")
+    if not (math.isfinite(command[0]) and math.isfinite(command[1])):
+        raise EpisodeError(f"answered {command.tolist()} at {time_s:.2f} s; duties must be finite")
+    return command, memory

@@ -1,0 +1,180 @@
+"""The lane-following domain family: a robot on a map, its plant, camera and effects, as `study` takes it."""
+
+import functools
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from proxytune.domain import Episode
+from proxytune.driving import task
+from proxytune.driving.agents.loading import load_agent
+from proxytune.driving.bullet.plant import BulletPlant
+from proxytune.driving.bullet.renderer import BulletCamera
+from proxytune.driving.cameras import Camera, CameraFigures, GroundPlaneCamera
+from proxytune.driving.drivetrain import drivetrain
+from proxytune.driving.episode import TICK_HZ, Course, Drive, Instance, drive
+from proxytune.driving.lane import off_map
+from proxytune.driving.maps import MAPS
+from proxytune.driving.planar import PlanarPlant
+from proxytune.driving.plant import Plant
+from proxytune.driving.robot import Robot, read_robot
+from proxytune.effects import PARAMETERS, Signal, Stage, effects_from, read_effects, read_model, stage_chain
+from proxytune.errors import EpisodeError
+from proxytune.settings import Section, nearest
+from proxytune.space import Parameter, Theta
+
+PLANTS = ("bullet", "planar")
+CAMERAS = ("ground_plane", "renderer")
+
+
+@dataclass(frozen=True)
+class LaneFollowing:
+    """S_Θ of a robot that follows a lane.
+
+    Attributes:
+        robot: Name of the robot.
+        plant: One of PLANTS.
+        camera: One of CAMERAS.
+        map: One of MAPS.
+        seconds: Longest time an episode takes [s].
+        position_noise_m: Standard deviation of where the robot is put down [m].
+        heading_noise_deg: Standard deviation of how it is turned [deg].
+        effects: Values of effects besides the robot's nominal ones, sorted by name.
+        folder: Where a user's own agents lie.
+    """
+
+    robot: str
+    plant: str
+    camera: str
+    map: str
+    seconds: float
+    position_noise_m: float
+    heading_noise_deg: float
+    effects: tuple[tuple[str, float], ...]
+    folder: Path
+
+    @property
+    def identity(self) -> str:
+        """A digest of settings, robot, code and the user's modules."""
+        settings = repr(tuple(getattr(self, name) for name in self.__dataclass_fields__ if name != "folder"))
+        own = b"".join(path.read_bytes() for path in sorted(self.folder.glob("*.py")))
+        parts = settings.encode() + own + _code_digest(self.robot)
+        return hashlib.sha256(parts).hexdigest()[:16]
+
+    @property
+    def metrics(self) -> Mapping[str, str]:
+        """The task's metrics with their units."""
+        return task.METRICS
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Every parameter of the catalogue of effects."""
+        return PARAMETERS
+
+    @property
+    def starts(self) -> int:
+        """How many starting poses the map has."""
+        return len(MAPS[self.map].starts)
+
+    def check_agent(self, name: str) -> None:
+        """Load the agent once.
+
+        Raises:
+            SettingsError: If there is no such agent.
+        """
+        load_agent(name, self.folder)
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        """Drive one episode and score it.
+
+        Raises:
+            EpisodeError: With the agent's name and the time at which it failed.
+        """
+        return task.score_trajectory(MAPS[self.map], self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+
+    def drive(self, episode: Episode) -> Drive:
+        """Drive one episode.
+
+        Raises:
+            EpisodeError: With the agent's name and the time at which it failed.
+        """
+        road = MAPS[self.map]
+        noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
+        start = task.start_pose(road, episode.start, seed=episode.seed, **noise)
+        course = Course(np.asarray(start), self.seconds, episode.seed, functools.partial(off_map, road))
+        instance = self.instance(dict(episode.theta))
+        agent = load_agent(episode.agent, self.folder)
+        try:
+            with self._plant(instance.robot, course.start) as plant:
+                return drive(instance, plant, agent, course)
+        except EpisodeError as problem:
+            raise EpisodeError(f"agent '{episode.agent}' {problem}") from problem.__cause__
+
+    def instance(self, theta: Theta) -> Instance:
+        """The domain instance S_θ: nominal effects, then the family's, then θ."""
+        return _instance(self, tuple(sorted(theta.items())))
+
+    def _plant(self, robot: Robot, start: Signal) -> Plant:
+        return BulletPlant(robot, start, 1.0 / TICK_HZ) if self.plant == "bullet" else PlanarPlant(start, 1.0 / TICK_HZ)
+
+
+@functools.lru_cache(maxsize=4)
+def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
+    robot = read_robot(family.robot)
+    effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures)
+    mounted = stage_chain(effects, Stage.CAMERA)
+    nominal = np.array([robot.camera_channels()])
+    return Instance(robot, drivetrain(robot, effects), None, stage_chain(effects, Stage.IMAGE))
+
+
+@functools.lru_cache
+def _code_digest(robot: str) -> bytes:
+    package = Path(__file__).resolve().parent.parent
+    sources = [*(package / "effects").rglob("*.py"), *(package / "driving").rglob("*.py")]
+    figures = sorted(read_robot(robot).urdf.parent.iterdir())
+    digest = hashlib.sha256()
+    for path in [*sorted(sources), *figures]:
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.digest()
+
+
+def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
+    """The family that a study's `[domain]` table describes.
+
+    Args:
+        section: Keys robot, plant, camera, map, seconds, position_noise_m, heading_noise_deg, and effects.
+        model: A model.toml whose effects every instance has, besides those of the section.
+
+    Raises:
+        SettingsError: With file, key and remedy.
+    """
+    section.only(("robot", "plant", "camera", "map", "seconds", "position_noise_m", "heading_noise_deg", "effects"))
+    given = read_model(model) if model else None
+    robot = _agreed(section, "robot", given.robot if given else None, "duckiebot")
+    plant = _agreed(section, "plant", given.plant if given else None, "bullet")
+    theta, _ = read_effects(section.section("effects"))
+    effects = {**(given.theta if given else {}), **theta}
+    family = LaneFollowing(
+        robot=read_robot(robot).name,
+        plant=plant,
+        camera=section.text("camera", "ground_plane", choices=CAMERAS),
+        map=section.text("map", "small_loop", choices=MAPS),
+        seconds=section.number("seconds", 60.0, low=1.0, high=3600.0),
+        position_noise_m=section.number("position_noise_m", 0.01, low=0.0, high=0.1),
+        heading_noise_deg=section.number("heading_noise_deg", 2.0, low=0.0, high=30.0),
+        effects=tuple(sorted(effects.items())),
+        folder=section.path.resolve().parent,
+    )
+    if plant not in PLANTS:
+        raise section.error("plant", f"unknown value '{plant}'; {nearest(plant, PLANTS)}")
+    return family
+
+
+def _agreed(section: Section, key: str, of_model: str | None, default: str) -> str:
+    if key in section.values and of_model is not None and section.text(key) != of_model:
+        raise section.error(key, f"is '{section.text(key)}' but the model says '{of_model}'; take one of them out")
+    return of_model or section.text(key, default)

@@ -1,0 +1,73 @@
+"""Bayesian optimisation: expected improvement over a Gaussian process of the finished trials."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from skopt.acquisition import gaussian_ei
+from threadpoolctl import threadpool_limits
+
+from proxytune.search.design import design_point, from_unit, unit_points
+from proxytune.search.proposer import Trial, Values
+from proxytune.search.surrogate import Array, Surrogate, fit_surrogate, unit_array
+from proxytune.space import Space
+
+CLOUD = 2048
+REFINED = 8
+WIDTHS = (0.05, 0.015, 0.005)
+SAME = 0.1
+"""Points closer than this, divided by the number of trials, in every parameter (in widths of the box) are the same
+point: a deterministic score has nothing new to say there."""
+
+
+@dataclass(frozen=True)
+class GaussianProcess:
+    """Proposes where the score is expected to improve most.
+
+    The improvement is measured from the best posterior mean among the visited points: the lowest score itself is
+    partly luck. A failed trial counts as the worst score seen, so that the search moves away from it.
+
+    Attributes:
+        initial: How many trials come from the quasi-random design before the surrogate is asked.
+    """
+
+    initial: int = 8
+
+    def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
+        """The next point, a function of the set of trials and the seed alone; never a point visited before."""
+        scored = [trial.score for trial in trials if trial.score is not None]
+        if len(trials) < self.initial or not scored:
+            return design_point(space, len(trials), seed)
+        worst = max(scored)
+        filled = [Trial(trial.values, worst if trial.score is None else trial.score) for trial in trials]
+        number = [seed, len(trials)]
+        with threadpool_limits(limits=1):
+            surrogate = fit_surrogate(space, filled, _derived(number, 0))
+            return from_unit(space, _most_promising(surrogate, _derived(number, 1)))
+
+
+def _derived(number: list[int], purpose: int) -> int:
+    return int(np.random.SeedSequence([*number, purpose]).generate_state(1)[0])
+
+
+def _most_promising(surrogate: Surrogate, seed: int) -> Array:
+    """The point of the unit cube with the highest expected improvement: a Sobol cloud, then ever closer looks."""
+    visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
+    _, incumbent = surrogate.incumbent()
+    dimensions = visited.shape[1]
+    points = _new(unit_points(dimensions, CLOUD, seed), visited)
+    gains = gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0)
+    offsets = 2.0 * unit_points(dimensions, CLOUD // 16, seed + 1) - 1.0
+    for width in WIDTHS:
+        leaders = points[np.argsort(-gains, kind="stable")[:REFINED]]
+        around = np.clip(leaders[:, None, :] + width * offsets, 0.0, 1.0).reshape(-1, dimensions)
+        points = np.concatenate([leaders, _new(around, visited)])
+        gains = gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0)
+    best: Array = points[int(np.argmax(gains))]
+    return best
+
+
+def _new(points: Array, visited: Array) -> Array:
+    """The points that are not the same as a visited one."""
+    distances = np.abs(points[:, None, :] - visited[None, :, :]).max(axis=2)
+    return points[distances.min(axis=1) > SAME / len(visited)]

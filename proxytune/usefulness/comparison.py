@@ -1,0 +1,74 @@
+"""The two sides of every usefulness measure, checked and put in the same order."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from proxytune.errors import ScoresError
+from proxytune.scores import Array, Metric, ScoreTable
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The same agents scored in a proxy and on the target, in the same order and metrics.
+
+    Attributes:
+        proxy: Scores in the proxy.
+        target: Scores on the target.
+        metrics: How agents are compared, in the order of both tables' columns.
+    """
+
+    proxy: ScoreTable
+    target: ScoreTable
+    metrics: tuple[Metric, ...]
+
+    @property
+    def agents(self) -> tuple[str, ...]:
+        """Names in the order of both tables' rows."""
+        return self.target.agents
+
+    @property
+    def paired(self) -> bool:
+        """Whether both domains have the same episodes of every agent, so that starts are paired across domains."""
+        return self.proxy.complete and self.target.complete and self.proxy.episodes == self.target.episodes
+
+    @property
+    def means(self) -> tuple[Array, Array]:
+        """Mean scores in the proxy and on the target, each of shape (agents, metrics)."""
+        return self.proxy.means, self.target.means
+
+    @property
+    def proxy_episodes(self) -> tuple[int, int]:
+        """Fewest and most episodes of an agent in the proxy."""
+        return int(self.proxy.counts.min()), int(self.proxy.counts.max())
+
+    @property
+    def target_episodes(self) -> tuple[int, int]:
+        """Fewest and most episodes of an agent on the target."""
+        return int(self.target.counts.min()), int(self.target.counts.max())
+
+
+def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Comparison:
+    """Put two tables in the same order.
+
+    Raises:
+        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown or twice.
+    """
+    names = [metric.name for metric in metrics]
+    if not names:
+        raise ScoresError("no metric is given; name at least one")
+    if len(set(names)) < len(names):
+        raise ScoresError(f"a metric is given twice: {', '.join(names)}")
+    _check_agents(proxy, "the proxy", target, "the target")
+    _check_agents(target, "the target", proxy, "the proxy")
+    if len(target.agents) < 2:
+        raise ScoresError(f"only one agent ('{target.agents[0]}') is scored; comparing takes at least two")
+    target = target.select(names)
+    same = set(proxy.episodes) == set(target.episodes)
+    proxy = proxy.select(names).arrange(agents=target.agents, episodes=target.episodes if same else None)
+    return Comparison(proxy, target, tuple(metrics))
+
+
+def _check_agents(present: ScoreTable, where: str, absent: ScoreTable, other: str) -> None:
+    missing = [name for name in present.agents if name not in absent.agents]
+    if missing:
+        raise ScoresError(f"{other} lacks scores of {', '.join(missing)}, which {where} has; add or remove them")

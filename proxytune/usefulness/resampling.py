@@ -1,0 +1,125 @@
+"""Bootstrap over episodes: what the measures would be, had the same agents driven other episodes."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.scores import Array, Metric, ScoreTable
+from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.prpv import prpv_of_means
+
+CONFIDENCE = 0.95
+BLOCK = 4_000_000
+"""Most numbers held at once by a measure over many resamples."""
+
+
+@dataclass(frozen=True)
+class PrpvInterval:
+    """A bootstrap interval of the expected PRPV.
+
+    What it covers is the mean PRPV of many repeats of the whole experiment with as many episodes as this one had.
+    Noise flips pairs, so this lies above the PRPV of endlessly many episodes; compare it with the noise floor.
+
+    Attributes:
+        value: PRPV of the episodes as they are.
+        expected: Mean over resamples, a smooth companion to the integer; None if there is no interval.
+        low: Lower end, at most the value; None if there is no interval.
+        high: Upper end, at least the value; None if there is no interval.
+        resamples: How many were drawn.
+        inputs: What was compared, with its sample sizes.
+        reason: Why there is no interval, empty if there is one.
+        confidence: How often such an interval is meant to hold what it covers.
+    """
+
+    value: int
+    expected: float | None
+    low: float | None
+    high: float | None
+    resamples: int
+    inputs: Comparison
+    reason: str = ""
+    confidence: float = CONFIDENCE
+
+
+def why_not_repeated(inputs: Comparison) -> str:
+    """Why these tables bear no bootstrap, empty if they do."""
+    for name, table in (("the proxy", inputs.proxy), ("the target", inputs.target)):
+        reason = too_few(table, name)
+        if reason:
+            return reason
+    return ""
+
+
+def too_few(table: ScoreTable, name: str) -> str:
+    """Why a table has no noise to be seen, empty if every agent has at least two episodes."""
+    single = [agent for agent, count in zip(table.agents, table.counts, strict=True) if count < 2]
+    if not single:
+        return ""
+    who = "each agent" if len(single) == len(table.agents) else f"agent '{single[0]}'"
+    return f"{who} has one episode on {name}, which says nothing about noise; score at least two"
+
+
+def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> tuple[Array, Array]:
+    """Mean scores of resampled episodes, in the proxy and on the target.
+
+    Where all agents drove the same episodes, all get the same resample of them; where both domains have the same
+    episodes, both do.
+
+    Returns:
+        Two arrays of shape (resamples, agents, metrics).
+    """
+    rng = np.random.default_rng(seed)
+    target_counts = draw_counts(inputs.target, rng, resamples)
+    proxy_counts = target_counts if inputs.paired else draw_counts(inputs.proxy, rng, resamples)
+    return counted_means(inputs.proxy, proxy_counts), counted_means(inputs.target, target_counts)
+
+
+def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> NDArray[np.int64]:
+    """How often each episode is drawn: shape (agents, or 1 if all share the draw; resamples, episodes)."""
+    if table.complete:
+        episodes = len(table.episodes)
+        return rng.multinomial(episodes, np.full(episodes, 1 / episodes), size=(1, resamples))
+    chances = table.driven / table.counts[:, None]
+    return rng.multinomial(table.counts[:, None], chances[:, None, :], size=(len(table.agents), resamples))
+
+
+def counted_means(table: ScoreTable, counts: NDArray[np.int64]) -> Array:
+    """Mean scores when episodes count as often as drawn: shape (resamples, agents, metrics)."""
+    sums = counts.astype(np.float64) @ np.nan_to_num(table.values)
+    return np.asarray(np.swapaxes(sums / counts.sum(axis=-1)[..., None], 0, 1), dtype=np.float64)
+
+
+def in_blocks(measure: Callable[[Array, Array], Array], proxy: Array, target: Array) -> Array:
+    """Apply a measure of pairs of agents to many tables without holding all pairs of all tables at once."""
+    agents = proxy.shape[-2]
+    size = max(1, BLOCK // agents**2)
+    starts = range(0, len(proxy), size)
+    return np.concatenate([measure(proxy[start : start + size], target[start : start + size]) for start in starts])
+
+
+def interval(values: Array, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """The central interval that holds this share of the values."""
+    tail = (1 - confidence) / 2
+    low, high = np.quantile(values, [tail, 1 - tail])
+    return float(low), float(high)
+
+
+def bootstrap_prpv(
+    *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], resamples: int = 1000, seed: int = 0
+) -> PrpvInterval:
+    """Resample episodes to tell how far PRPV would be off in a repeat of the experiment.
+
+    Raises:
+        ScoresError: As in prpv.
+    """
+    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    value = round(float(prpv_of_means(*inputs.means, inputs.metrics)))
+    reason = why_not_repeated(inputs)
+    if reason:
+        return PrpvInterval(value, None, None, None, 0, inputs, reason)
+    means = bootstrap_means(inputs, resamples=resamples, seed=seed)
+    values = in_blocks(lambda p, t: prpv_of_means(p, t, inputs.metrics), *means)
+    low, high = interval(values)
+    return PrpvInterval(value, float(values.mean()), min(low, value), max(high, value), resamples, inputs)

@@ -1,5 +1,6 @@
 """Score tables: how well each agent did, episode by episode, and the metrics that judge it."""
 
+import contextlib
 import csv
 import io
 import math
@@ -21,6 +22,8 @@ Array = NDArray[np.float64]
 LABELS = ("agent", "episode", "domain")
 ROUNDING = 1e-12
 """Differences below this fraction of a column's largest value are rounding, hence ties."""
+LARGEST = 1e100
+"""A score beyond this is no measurement, and its square would overflow."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,12 @@ class Metric:
         return merits, np.full_like(largest, max(self.tolerance / 100, ROUNDING))
 
 
+def varies(columns: Array) -> NDArray[np.bool_]:
+    """Whether agents differ in a metric by more than rounding: one value per agent on the last axis but one."""
+    largest = np.abs(columns).max(axis=-2)
+    return np.asarray(np.ptp(columns, axis=-2) > ROUNDING * largest, dtype=np.bool_)
+
+
 @dataclass(frozen=True, eq=False)
 class ScoreTable:
     """What every agent scored in every episode of one domain.
@@ -123,7 +132,7 @@ class ScoreTable:
         values = np.full((len(agents), len(episodes), len(metrics)), np.nan)
         for (agent, episode), scores in scored.items():
             cells = [scores.get(name, math.nan) for name in metrics]
-            if not all(map(math.isfinite, cells)):
+            if not all(abs(cell) < LARGEST for cell in cells):
                 raise ScoresError(f"agent '{agent}', episode {episode}: not a finite score in each of {list(metrics)}")
             values[rows[agent], columns[str(episode)]] = cells
         values.setflags(write=False)
@@ -137,7 +146,7 @@ class ScoreTable:
     @cached_property
     def counts(self) -> NDArray[np.int64]:
         """Episodes per agent."""
-        return self.driven.sum(axis=1)
+        return np.asarray(self.driven.sum(axis=1), dtype=np.int64)
 
     @cached_property
     def means(self) -> Array:
@@ -148,6 +157,14 @@ class ScoreTable:
     def complete(self) -> bool:
         """Whether every agent drove every episode, so that episodes are paired across agents."""
         return bool(self.driven.all())
+
+    def unpaired(self) -> "ScoreTable":
+        """The same scores with a label of its own for each agent's every episode, so that no start is shared."""
+        rows, columns = np.nonzero(self.driven)
+        labels = tuple(f"{self.agents[row]}/{self.episodes[column]}" for row, column in zip(rows, columns, strict=True))
+        values = np.full((len(self.agents), len(labels), len(self.metrics)), np.nan)
+        values[rows, np.arange(len(labels))] = self.values[rows, columns]
+        return ScoreTable(self.agents, labels, self.metrics, values)
 
     def select(self, metrics: Iterable[str]) -> "ScoreTable":
         """The same table with these metrics only, in this order.
@@ -188,15 +205,13 @@ def read_scores(path: Path, metrics: Iterable[str], domain: str | None = None) -
     tables = read_domains(path, metrics)
     if domain is None:
         if len(tables) > 1:
-            raise ScoresError(f"{path}: has the domains {', '.join(tables)}; choose one, as in {path}:{next(iter(tables))}")
+            example = next(iter(tables))
+            raise ScoresError(f"{path}: has the domains {', '.join(tables)}; choose one, as in {path}:{example}")
         return next(iter(tables.values()))
+    if "" in tables:
+        raise ScoresError(f"{path}: has no column 'domain'; drop ':{domain}'")
     if domain not in tables:
-        has_none = list(tables) == [""]
-        raise ScoresError(
-            f"{path}: has no column 'domain'; drop ':{domain}'"
-            if has_none
-            else f"{path}: no domain '{domain}'; {nearest(domain, tables)}"
-        )
+        raise ScoresError(f"{path}: no domain '{domain}'; {nearest(domain, tables)}")
     return tables[domain]
 
 
@@ -239,7 +254,8 @@ def write_scores(table: ScoreTable, path: Path) -> None:
         draft.write_text(text.getvalue(), encoding="utf-8", newline="")
         draft.replace(path)
     except OSError as problem:
-        draft.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            draft.unlink()
         raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None
 
 
@@ -260,20 +276,24 @@ def _rows(path: Path, metrics: Sequence[str]) -> list[tuple[int, dict[str, str]]
     _check_header(path, header, metrics)
     for line, cells in lines[1:]:
         if len(cells) != len(header):
-            raise ScoresError(f"{path}: line {line}: has {len(cells)} cells where the first line names {len(header)} columns")
+            raise ScoresError(
+                f"{path}: line {line}: has {len(cells)} cells, but the first line names {len(header)} columns"
+            )
     return [(line, dict(zip(header, cells, strict=True))) for line, cells in lines[1:]]
 
 
 def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> None:
-    for name in ("agent", *metrics):
+    if "agent" not in header:
+        raise ScoresError(
+            f"{path}: no column 'agent'; the first line reads '{','.join(header)[:60]}', not columns,by,comma"
+        )
+    for name in metrics:
         if name not in header:
-            hint = nearest(name, [column for column in header if column not in LABELS]) if name != "agent" else (
-                f"the first line names {', '.join(header)[:80]!r}, separated by commas"
-            )
-            raise ScoresError(f"{path}: no column '{name}'; {hint}")
-    twice = [name for name in (*LABELS, *metrics) if header.count(name) > 1]
-    if twice:
-        raise ScoresError(f"{path}: the first line names the column '{twice[0]}' twice")
+            others = [column for column in header if column not in LABELS]
+            raise ScoresError(f"{path}: no column '{name}'; {nearest(name, others)}")
+    for name in (*LABELS, *metrics):
+        if header.count(name) > 1:
+            raise ScoresError(f"{path}: the first line names the column '{name}' twice; rename one")
 
 
 def _number(path: Path, line: int, column: str, cell: str) -> float:
@@ -281,7 +301,7 @@ def _number(path: Path, line: int, column: str, cell: str) -> float:
         value = float(cell)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) < LARGEST:
         raise ScoresError(f"{path}: line {line}, column '{column}': must be a finite number, got {cell!r}")
     return value
 

@@ -14,7 +14,7 @@ from proxytune.driving import task
 from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.bullet.renderer import BulletCamera
-from proxytune.driving.cameras import Camera, CameraFigures, GroundPlaneCamera
+from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import TICK_HZ, Course, Drive, Instance, drive
 from proxytune.driving.lane import off_map
@@ -22,7 +22,18 @@ from proxytune.driving.maps import MAPS
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
 from proxytune.driving.robot import Robot, read_robot
-from proxytune.effects import PARAMETERS, Signal, Stage, effects_from, read_effects, read_model, stage_chain
+from proxytune.driving.texture import Floor, draw_floor
+from proxytune.effects import (
+    PARAMETERS,
+    Effect,
+    Setting,
+    Signal,
+    Stage,
+    effects_from,
+    read_effects,
+    read_model,
+    stage_chain,
+)
 from proxytune.errors import EpisodeError
 from proxytune.settings import Section, nearest
 from proxytune.space import Parameter, Theta
@@ -126,9 +137,22 @@ class LaneFollowing:
 def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
     robot = read_robot(family.robot)
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures)
-    mounted = stage_chain(effects, Stage.CAMERA)
-    nominal = np.array([robot.camera_channels()])
-    return Instance(robot, drivetrain(robot, effects), None, stage_chain(effects, Stage.IMAGE))
+    return Instance(robot, drivetrain(robot, effects), _camera(family, robot, effects), stage_chain(effects, Stage.IMAGE))
+
+
+def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) -> Camera:
+    figures = robot.camera_figures()
+    mounting = stage_chain(effects, Stage.CAMERA)
+    nominal = figures.channels()
+    memory = mounting.begin(Setting(TICK_HZ, nominal, robot.figures))
+    mounted = figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
+    floor = _floor(family.map)
+    return GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)
+
+
+@functools.lru_cache
+def _floor(name: str) -> Floor:
+    return draw_floor(MAPS[name])
 
 
 @functools.lru_cache

@@ -15,8 +15,11 @@ class LoopMap:
         lane_width: Width of a lane [m].
         white_width: Width of the solid white edge lines [m].
         yellow_width: Width of the dashed yellow centre line [m].
-        dash: Length of a yellow dash [m].
-        gap: Length of the gap between dashes [m].
+        corner_radius: Radius of the yellow line's bend in a corner tile [m], half a tile at most; the white lines'
+            bends have the same centre. The lane as it is scored is `lane_offset` from arcs of half a tile.
+        straight_dashes: Yellow dashes on a straight tile; every tile begins and ends with a gap.
+        corner_dashes: Yellow dashes on a corner tile.
+        dash_per_gap: Length of a dash over the length of a gap.
         starts: Starting poses (x [m], y [m], heading [deg]).
     """
 
@@ -27,8 +30,10 @@ class LoopMap:
     lane_width: float
     white_width: float
     yellow_width: float
-    dash: float
-    gap: float
+    corner_radius: float
+    straight_dashes: int
+    corner_dashes: int
+    dash_per_gap: float
     starts: tuple[tuple[float, float, float], ...]
 
     @property
@@ -45,8 +50,10 @@ SMALL_LOOP = LoopMap(
     lane_width=0.22,
     white_width=0.048,
     yellow_width=0.024,
-    dash=0.05,
-    gap=0.025,
+    corner_radius=0.17,
+    straight_dashes=9,
+    corner_dashes=6,
+    dash_per_gap=2.0,
     # Courchesne, Censi, Paull (2021): the ten starts of their evaluation
     starts=(
         (0.4237, 0.702, 104.3),

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from proxytune.effects import CHANNELS, Stage, read_effects
+from proxytune.driving.cameras import CameraFigures
+from proxytune.effects import read_effects
 from proxytune.errors import SettingsError
 from proxytune.settings import Section, nearest, read_settings
 from proxytune.shipped import shipped
@@ -54,14 +55,20 @@ class Robot:
     theta: Mapping[str, float]
     urdf: Path
 
-    def camera_channels(self) -> tuple[float, ...]:
-        """The nominal camera's figures in the order of the camera stage's channels."""
-        nominal = {
-            "pitch_deg": self.figures["camera_pitch"],
-            "height_m": self.figures["camera_height"],
-            "field_of_view_deg": self.figures["field_of_view"],
-        }
-        return tuple(nominal.get(channel, 0.0) for channel in CHANNELS[Stage.CAMERA])
+    def camera_figures(self) -> CameraFigures:
+        """The nominal camera: level, straight ahead, without distortion."""
+        figures = self.figures
+        return CameraFigures(
+            columns=int(figures["camera_columns"]),
+            rows=int(figures["camera_rows"]),
+            forward_m=figures["camera_forward"],
+            pitch_deg=figures["camera_pitch"],
+            roll_deg=0.0,
+            yaw_deg=0.0,
+            height_m=figures["camera_height"],
+            field_of_view_deg=figures["field_of_view"],
+            k1=0.0,
+        )
 
 
 def robot_names() -> tuple[str, ...]:

@@ -1,0 +1,1 @@
+"""What proposes the next θ; it never calls a simulator."""

@@ -70,4 +70,4 @@ def _most_promising(surrogate: Surrogate, seed: int) -> Array:
 def _new(points: Array, visited: Array) -> Array:
     """The points that are not the same as a visited one."""
     distances = np.abs(points[:, None, :] - visited[None, :, :]).max(axis=2)
-    return points[distances.min(axis=1) > SAME / len(visited)]
+    return np.asarray(points[distances.min(axis=1) > SAME / len(visited)])

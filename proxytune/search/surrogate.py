@@ -18,7 +18,7 @@ from proxytune.space import Space
 
 Array = NDArray[np.float64]
 
-LENGTH_SCALES = (0.1, 10.0)
+LENGTH_SCALES = (0.2, 10.0)
 """Bounds in widths of the box: below, a plateau of the step-like score would be taken for structure; above, the
 parameter does nothing."""
 

@@ -1,18 +1,43 @@
 """How useful a proxy is as a predictor: measures on score tables and trajectories, with their uncertainty."""
 
+from proxytune.usefulness.assessment import Assessment, Intervals, assess
+from proxytune.usefulness.chance import Chance, chance
+from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.correlation import Correlation, kendall_tau, srcc
+from proxytune.usefulness.mmrv import Mmrv, mmrv
 from proxytune.usefulness.noise import NoiseFloor, noise_floor
+from proxytune.usefulness.pod import Pod, pod_of_images, pod_of_poses
 from proxytune.usefulness.ppv import Ppv, ppv
 from proxytune.usefulness.prpv import FlippedPair, Prpv, prpv
 from proxytune.usefulness.resampling import PrpvInterval, bootstrap_prpv
+from proxytune.usefulness.selection import Difference, Selection, select_proxy
 
 __all__ = [
+    "Assessment",
+    "Chance",
+    "Comparison",
+    "Correlation",
+    "Difference",
     "FlippedPair",
+    "Intervals",
+    "Mmrv",
     "NoiseFloor",
+    "Pod",
     "Ppv",
     "Prpv",
     "PrpvInterval",
+    "Selection",
+    "assess",
     "bootstrap_prpv",
+    "chance",
+    "compare",
+    "kendall_tau",
+    "mmrv",
     "noise_floor",
+    "pod_of_images",
+    "pod_of_poses",
     "ppv",
     "prpv",
+    "select_proxy",
+    "srcc",
 ]

@@ -38,9 +38,7 @@ class NoiseFloor:
     reason: str = ""
 
 
-def noise_floor(
-    *, target: ScoreTable, metrics: Sequence[Metric], splits: int = 200, seed: int = 0
-) -> NoiseFloor:
+def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 200, seed: int = 0) -> NoiseFloor:
     """Compare random halves of the target's episodes: no proxy can be told to do better.
 
     Where all agents drove the same episodes, all are split alike.
@@ -49,7 +47,7 @@ def noise_floor(
         ScoresError: If there are fewer than two agents or a metric is unknown.
     """
     chosen = compare(proxy=target, target=target, metrics=metrics).target
-    reason = too_few(chosen, "the target")
+    reason = too_few(chosen, "on the target")
     if reason:
         return NoiseFloor(None, None, None, 0, chosen, tuple(metrics), reason)
     first = split_halves(chosen, np.random.default_rng(seed), splits)

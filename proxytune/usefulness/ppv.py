@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from proxytune.errors import InputError
-from proxytune.scores import Array, Metric, ScoreTable
+from proxytune.scores import Array, Metric, ScoreTable, varies
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, compare
 
@@ -52,13 +52,6 @@ def ppv_of_means(proxy: Array, target: Array, weights: Array) -> Array:
     return np.asarray((np.abs(proxy - target) @ weights).mean(axis=-1), dtype=np.float64)
 
 
-def spread(target: ScoreTable) -> Array:
-    """Standard deviation of the agents' mean scores in each metric, zero where they differ by rounding only."""
-    scale = np.abs(target.means).max(axis=0)
-    deviation = target.means.std(axis=0, ddof=1)
-    return np.where(deviation > 1e-12 * scale, deviation, 0.0)
-
-
 def ppv(
     *,
     proxy: ScoreTable,
@@ -89,8 +82,9 @@ def ppv(
 
 
 def _from_spread(inputs: Comparison) -> Array:
-    spreads = spread(inputs.target)
-    return np.divide(1.0, spreads, out=np.zeros_like(spreads), where=spreads > 0)
+    spreads = inputs.target.means.std(axis=0, ddof=1)
+    varied = varies(inputs.target.means)
+    return np.where(varied, 1.0 / np.where(varied, spreads, 1.0), 0.0)
 
 
 def _given(inputs: Comparison, beta: Mapping[str, float]) -> Array:

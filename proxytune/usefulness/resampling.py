@@ -45,7 +45,7 @@ class PrpvInterval:
 
 def why_not_repeated(inputs: Comparison) -> str:
     """Why these tables bear no bootstrap, empty if they do."""
-    for name, table in (("the proxy", inputs.proxy), ("the target", inputs.target)):
+    for name, table in (("in the proxy", inputs.proxy), ("on the target", inputs.target)):
         reason = too_few(table, name)
         if reason:
             return reason
@@ -58,7 +58,7 @@ def too_few(table: ScoreTable, name: str) -> str:
     if not single:
         return ""
     who = "each agent" if len(single) == len(table.agents) else f"agent '{single[0]}'"
-    return f"{who} has one episode on {name}, which says nothing about noise; score at least two"
+    return f"{who} has one episode {name}, which says nothing about noise; score at least two"
 
 
 def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> tuple[Array, Array]:

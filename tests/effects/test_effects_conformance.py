@@ -22,7 +22,7 @@ def a_signal(stage: Stage, seed: int, length: int = 90) -> np.ndarray:
     """Something a stage could meet: held commands, camera figures, or a changing picture."""
     random = np.random.default_rng(seed)
     if stage is Stage.CAMERA:
-        return np.repeat(np.array([ROBOT.camera_channels()]), length, axis=0)
+        return np.repeat(ROBOT.camera_figures().channels()[None], length, axis=0)
     if stage is Stage.IMAGE:
         return random.uniform(0.0, 255.0, (length, 12)).astype(np.float32)
     return np.repeat(random.uniform(-1.0, 1.0, (length // 3, len(CHANNELS[stage]))), 3, axis=0)

@@ -3,6 +3,7 @@
 import importlib
 import sys
 from pathlib import Path
+from typing import cast
 
 from proxytune.driving.agents import AGENTS, Agent
 from proxytune.errors import SettingsError
@@ -24,10 +25,10 @@ def load_agent(name: str, folder: Path) -> Agent:
     if ":" not in name:
         raise SettingsError(f"agent '{name}' is unknown; {nearest(name, AGENTS)}, or write module:attribute")
     found = _import(name, folder)
-    made = found if hasattr(found, "act") and not isinstance(found, type) else found()  # type: ignore[operator]
+    made = found() if callable(found) else found
     if not (hasattr(made, "begin") and hasattr(made, "act")):
         raise SettingsError(f"agent '{name}' has no begin and act; see proxytune.driving.agents.Agent")
-    return made  # type: ignore[return-value]
+    return cast(Agent, made)
 
 
 def _import(name: str, folder: Path) -> object:

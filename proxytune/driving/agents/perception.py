@@ -54,9 +54,7 @@ def _eye(figures: CameraFigures, reach_m: float) -> Eye:
 
 def open_eye(robot: Robot, *, reach_m: float = 0.7) -> Eye:
     """The eye of an agent on this robot, looking no further ahead than `reach_m`."""
-    figures = robot.figures
-    size = int(figures["camera_columns"]), int(figures["camera_rows"])
-    return _eye(CameraFigures.from_channels(robot.camera_channels(), *size, figures["camera_forward"]), reach_m)
+    return _eye(robot.camera_figures(), reach_m)
 
 
 def yellow_pixels(picture: Picture, eye: Eye, *, contrast: float = 60.0) -> Pixels:

@@ -1,0 +1,124 @@
+"""`score`: how useful proxies are as predictors, from tables of scores."""
+
+import argparse
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from proxytune.cli.answer import Answer
+from proxytune.errors import InputError
+from proxytune.report.score_document import document_of, document_of_ranking
+from proxytune.report.score_figures import flipped_pairs, save, scatter
+from proxytune.report.score_table import measures, ranking
+from proxytune.scores import Metric, ScoreTable, read_domains, read_scores
+from proxytune.usefulness import Assessment, assess, select_proxy
+
+FEWEST_RESAMPLES = 100
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the tables, the metrics and what is done with them."""
+    parser.add_argument(
+        "--proxy",
+        action="append",
+        required=True,
+        metavar="CSV[:DOMAIN]",
+        help="scores in the proxy; repeat it, or give a file of several domains, to rank proxies",
+    )
+    parser.add_argument("--target", required=True, metavar="CSV[:DOMAIN]", help="scores on the target")
+    parser.add_argument(
+        "--metric",
+        action="append",
+        required=True,
+        metavar="NAME:max|min[:TOLERANCE]",
+        help="a column to compare agents by, its better direction, and what difference is still a tie (0.5 or 5%%)",
+    )
+    parser.add_argument(
+        "--beta", action="append", default=[], metavar="NAME:WEIGHT", help="weight of a metric in PPV [1/its spread]"
+    )
+    parser.add_argument(
+        "--unpaired", action="store_true", help="episodes of the same label have nothing in common (default: the start)"
+    )
+    parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="draw the figures into this folder")
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Score one proxy, or rank several."""
+    if arguments.resamples < FEWEST_RESAMPLES or arguments.seed < 0:
+        raise InputError(f"--resamples must be at least {FEWEST_RESAMPLES} and --seed at least 0")
+    metrics = [Metric.parse(text) for text in arguments.metric]
+    target_name, target = _read_target(arguments.target, metrics)
+    proxies = _read_proxies(arguments.proxy, arguments.target, metrics)
+    if arguments.unpaired:
+        target = target.unpaired()
+        proxies = {name: table.unpaired() for name, table in proxies.items()}
+    beta = _weights(arguments.beta)
+    sampling = {"resamples": arguments.resamples, "seed": arguments.seed}
+    found = {
+        name: assess(proxy=proxy, target=target, metrics=metrics, beta=beta, **sampling)
+        for name, proxy in proxies.items()
+    }
+    figures = _draw(found, arguments.output) if arguments.output else []
+    head = {"target": target_name, "figures": figures}
+    if len(found) == 1:
+        name, assessment = next(iter(found.items()))
+        shown = measures(assessment, proxy=name, target=target_name)
+        return Answer({"proxy": name, **head, **document_of(assessment)}, shown)
+    selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
+    return Answer(head | document_of_ranking(found, selection), ranking(found, selection, target=target_name))
+
+
+def split_source(source: str) -> tuple[Path, str | None]:
+    """Take FILE or FILE:DOMAIN apart."""
+    path, colon, domain = source.rpartition(":")
+    if not colon or Path(source).exists() or not path:
+        return Path(source), None
+    return Path(path), domain
+
+
+def _read_target(source: str, metrics: Sequence[Metric]) -> tuple[str, ScoreTable]:
+    path, domain = split_source(source)
+    return domain or path.stem, read_scores(path, [metric.name for metric in metrics], domain)
+
+
+def _read_proxies(sources: Sequence[str], target: str, metrics: Sequence[Metric]) -> dict[str, ScoreTable]:
+    """Every proxy by name: its domain, or its file's name, or what was typed where those are not unique."""
+    names = [metric.name for metric in metrics]
+    target_path, target_domain = split_source(target)
+    found: dict[str, ScoreTable] = {}
+    for source in sources:
+        path, domain = split_source(source)
+        tables = {domain: read_scores(path, names, domain)} if domain else read_domains(path, names)
+        if not domain and len(tables) > 1 and path == target_path and target_domain:
+            tables.pop(target_domain, None)
+        for label, table in tables.items():
+            name = label or path.stem
+            name = name if name not in found else f"{path}:{label}" if label else str(path)
+            if name in found:
+                raise InputError(f"--proxy {source}: is given twice; give each proxy once")
+            found[name] = table
+    return found
+
+
+def _weights(texts: Sequence[str]) -> dict[str, float] | None:
+    weights: dict[str, float] = {}
+    for text in texts:
+        name, _, weight = text.rpartition(":")
+        try:
+            weights[name] = float(weight)
+        except ValueError:
+            raise InputError(f"--beta {text}: write NAME:WEIGHT, as in distance:0.5") from None
+    return weights or None
+
+
+def _draw(found: dict[str, Assessment], folder: Path) -> list[str]:
+    written = []
+    for name, assessment in found.items():
+        suffix = "" if len(found) == 1 else "_" + re.sub(r"[^\w.-]+", "_", name)
+        for kind, figure in (("scatter", scatter(assessment)), ("flipped_pairs", flipped_pairs(assessment.prpv))):
+            path = folder / f"{kind}{suffix}.png"
+            save(figure, path)
+            written.append(str(path))
+    return written

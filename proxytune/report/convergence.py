@@ -1,0 +1,63 @@
+"""The convergence figure: how PRPV fell over a study's trials."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from proxytune.study.result import StudyResult
+from proxytune.study.store import TrialRecord
+
+BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"  # Okabe and Ito, safe for the colour-blind
+
+
+def convergence(result: StudyResult) -> Figure:
+    """Draw the observed PRPV of every trial and the lowest so far, with the target's noise floor and chance level.
+
+    Filled points were proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that
+    failed; the ring is the best θ, which is the surrogate's and need not be the lowest point.
+    """
+    figure = Figure(figsize=(5.2, 3.2), layout="constrained")
+    axes = figure.subplots()
+    _levels(axes, result)
+    _trials(axes, result)
+    axes.set_xlabel("trial", fontsize=8)
+    axes.set_ylabel("PRPV [ordered pairs of agents]", fontsize=8)
+    axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.tick_params(labelsize=7)
+    axes.spines[["top", "right"]].set_visible(False)
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=7, frameon=False)
+    return figure
+
+
+def _levels(axes: Axes, result: StudyResult) -> None:
+    """What a proxy that knows nothing would get, and what no proxy can be told to beat."""
+    chance, floor = result.best.assessment.chance, result.best.assessment.noise_floor
+    axes.axhline(chance.mean, color="0.45", linewidth=1.0, linestyle=":", label=f"chance {chance.mean:.1f}")
+    if floor.value is not None and floor.low is not None and floor.high is not None:
+        axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
+        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=f"noise floor {floor.value:.1f}")
+
+
+def _trials(axes: Axes, result: StudyResult) -> None:
+    scored = [trial for trial in result.trials if trial.prpv is not None]
+    failed = [trial.number for trial in result.trials if trial.prpv is None]
+    initial = result.study.settings.initial
+    _points(axes, [trial for trial in scored if trial.number <= initial], "white", "design")
+    _points(axes, [trial for trial in scored if trial.number > initial], BLUE, "proposed")
+    if failed:
+        axes.plot(failed, np.zeros(len(failed)), "x", color=VERMILLION, markersize=4, label="failed")
+    numbers = [trial.number for trial in scored]
+    lowest = np.minimum.accumulate([trial.prpv for trial in scored if trial.prpv is not None])
+    last = result.trials[-1].number
+    axes.step([*numbers, last], [*lowest, lowest[-1]], where="post", color=ORANGE, linewidth=1.5, label="lowest so far")
+    best = result.best.trial
+    axes.plot(best.number, best.prpv, "o", color=VERMILLION, fillstyle="none", markersize=9, label="best θ")
+
+
+def _points(axes: Axes, trials: list[TrialRecord], face: str, label: str) -> None:
+    if trials:
+        numbers, scores = [trial.number for trial in trials], [trial.prpv for trial in trials]
+        axes.plot(numbers, scores, "o", color=BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)

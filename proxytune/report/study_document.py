@@ -1,0 +1,50 @@
+"""What `study --json` prints; its keys are promises."""
+
+from typing import Any
+
+from proxytune.report.score_document import document_of
+from proxytune.study.result import StudyResult
+from proxytune.study.settings import as_document
+from proxytune.study.store import TrialRecord
+
+
+def study_document(result: StudyResult) -> dict[str, Any]:
+    """A study's result as plain JSON; None where a figure is undefined."""
+    best, measures = result.best, document_of(result.best.assessment)
+    shared = ("noise_floor", "noise_floor_interval", "at_noise_floor", "chance", "chance_deviation", "notes")
+    return {
+        "name": result.study.settings.name,
+        "best": {
+            "index": best.trial.number,
+            "theta": dict(best.trial.theta),
+            "prpv": measures["prpv"],
+            "prpv_normalised": measures["prpv_normalised"],
+            "prpv_interval": measures["prpv_interval"],
+            "ppv": measures["ppv"],
+            "posterior_mean": best.posterior_mean,
+            "posterior_deviation": best.posterior_deviation,
+            "usefulness": measures,
+        },
+        **{key: measures[key] for key in shared},
+        "trials": [_trial(trial) for trial in result.trials],
+        "failures": list(result.failures),
+        "target": _target(result),
+        "settings": dict(as_document(result.study.settings)),
+    }
+
+
+def _trial(trial: TrialRecord) -> dict[str, Any]:
+    return {
+        "index": trial.number,
+        "theta": dict(trial.theta),
+        "prpv": None if trial.prpv is None else round(trial.prpv),
+        "ppv": trial.ppv,
+        "failed_episodes": trial.failed_episodes,
+        "failure": trial.failure or None,
+    }
+
+
+def _target(result: StudyResult) -> dict[str, Any]:
+    target = result.study.target
+    counts = [int(target.counts.min()), int(target.counts.max())]
+    return {"path": str(result.study.settings.target), "agents": len(target.agents), "episodes_per_agent": counts}

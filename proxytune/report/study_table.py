@@ -1,0 +1,58 @@
+"""A study's result for people: on the terminal."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from proxytune.study.result import StudyResult
+
+
+def best_theta(result: StudyResult) -> list[tuple[str, str, str]]:
+    """Parameter, value with unit, and the box searched, as texts."""
+    known = result.study.family.parameters
+    rows = []
+    for interval in result.study.settings.space.intervals:
+        value = f"{result.best.trial.theta[interval.name]:.4g} {known[interval.name].unit}".strip()
+        rows.append((interval.name, value, f"[{interval.low:g}, {interval.high:g}]"))
+    return rows
+
+
+def usefulness_lines(result: StudyResult) -> list[str]:
+    """PRPV with its interval, PPV, noise floor and chance, one line each, then what to take with care."""
+    found = result.best.assessment
+    inner, floor = found.prpv_interval, found.noise_floor
+    interval = "" if inner.low is None else f", interval {inner.low:.1f} to {inner.high:.1f}"
+    worst = found.prpv.range[1]
+    lines = [f"PRPV {found.prpv.value} of at most {worst}{interval}; lower is better"]
+    if found.ppv.value is not None:
+        lines.append(f"PPV {found.ppv.value:.3g}; lower is better")
+    if floor.value is not None:
+        lines.append(f"noise floor {floor.value:.1f} ({floor.low:.1f} to {floor.high:.1f}): the target against itself")
+    lines.append(f"chance {found.chance.mean:.1f} ± {found.chance.deviation:.1f}: a proxy that knows nothing")
+    return [*lines, *found.notes, *failure_lines(result)]
+
+
+def failure_lines(result: StudyResult) -> list[str]:
+    """How many episodes and trials failed, and the first of them; nothing where none did."""
+    if not result.failed_episodes:
+        return []
+    failed_trials = sum(trial.prpv is None for trial in result.trials)
+    trials = f", and with them {failed_trials} of {len(result.trials)} trials" if failed_trials else ""
+    head = f"{result.failed_episodes} of {result.episodes} episodes failed{trials}; the first:"
+    return [head, *(f"  {line}" for line in result.failures)]
+
+
+def study_table(result: StudyResult, spent: str, files: Mapping[str, Any]) -> RenderableType:
+    """The result of a study as `study` shows it."""
+    settings = result.study.settings
+    table = Table(box=None, pad_edge=False)
+    for column in ("parameter", "best", "searched"):
+        table.add_column(column)
+    for row in best_theta(result):
+        table.add_row(*row)
+    head = f"{settings.name}: {len(result.trials)} of {settings.budget} trials; best is trial {result.best.trial.number}"
+    lines = [*usefulness_lines(result), spent, *(f"{what}: {path}" for what, path in files.items())]
+    return Group(Text(head), table, *(Text(line) for line in lines))

@@ -1,0 +1,125 @@
+"""Opening study.db, and telling what is wrong with it in one line.
+
+The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_version`:
+
+    facts      key, value (JSON)                  what determines the trials: settings, target and domain family
+    instances  id, identity, theta (JSON)         domain instances S_θ: the family's identity and the parameters
+    trials     number (from 1), instance, state   'open', 'finished' or 'failed'
+               prpv, ppv, failed_episodes         its scores, and how many of its episodes failed
+               failure                            why it has no score
+    episodes   instance, agent, start, seed       what determines an episode: the key, so none is ever run twice
+               metrics (JSON) or failure          what it scored, or why it failed
+               seconds                            how long it took
+    sweeps     parameter, base (JSON), points (JSON), identity     the curves that have been asked for
+
+θ as JSON has its parameters sorted by name and every digit of its numbers. The journal is SQLite's rollback journal:
+everything is in the one file after a `kill -9`, and it may lie on a network folder.
+"""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from proxytune.errors import StoreError
+
+FORMAT = 1
+APPLICATION = 0x70747564  # "ptud"
+PATIENCE_S = 30.0
+
+SCHEMA = f"""
+BEGIN;
+CREATE TABLE facts (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE instances (
+    id INTEGER PRIMARY KEY, identity TEXT NOT NULL, theta TEXT NOT NULL, UNIQUE (identity, theta));
+CREATE TABLE trials (
+    number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
+    state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed')),
+    prpv REAL, ppv REAL, failed_episodes INTEGER NOT NULL DEFAULT 0, failure TEXT NOT NULL DEFAULT '');
+CREATE TABLE episodes (
+    instance INTEGER NOT NULL REFERENCES instances (id), agent TEXT NOT NULL, start INTEGER NOT NULL,
+    seed INTEGER NOT NULL, metrics TEXT, failure TEXT, seconds REAL NOT NULL,
+    PRIMARY KEY (instance, agent, start, seed), CHECK ((metrics IS NULL) <> (failure IS NULL))) WITHOUT ROWID;
+CREATE TABLE sweeps (
+    parameter TEXT NOT NULL, base TEXT NOT NULL, points TEXT NOT NULL, identity TEXT NOT NULL,
+    PRIMARY KEY (parameter, base, points, identity)) WITHOUT ROWID;
+PRAGMA application_id = {APPLICATION};
+PRAGMA user_version = {FORMAT};
+COMMIT;
+"""
+
+
+def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
+    """Open a study's database; a writable one is made where there is none.
+
+    Raises:
+        StoreError: If it is corrupt, is something else, comes from a newer proxytune, or cannot be written.
+    """
+    uri = f"{path.absolute().as_uri()}?mode={'rwc' if writable else 'ro'}"
+    with told(path):
+        connection = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None)
+        try:
+            connection.execute("PRAGMA synchronous = FULL")
+            _check(connection, path, writable)
+        except BaseException:
+            connection.close()
+            raise
+    return connection
+
+
+def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    if (application, version, tables) == (0, 0, 0):
+        if not writable:
+            raise StoreError(f"{path}: is empty; run the study first")
+        connection.executescript(SCHEMA)
+        return
+    if application != APPLICATION:
+        raise StoreError(f"{path}: is not a study's database; move it away")
+    if version > FORMAT:
+        raise StoreError(f"{path}: has format {version}, this proxytune reads up to {FORMAT}; install a newer one")
+    (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    if verdict != "ok":
+        raise _corrupt(path, str(verdict))
+
+
+@contextmanager
+def told(path: Path) -> Iterator[None]:
+    """Turn what SQLite complains of into one line with a remedy.
+
+    Raises:
+        StoreError: In place of any sqlite3.Error.
+    """
+    try:
+        yield
+    except sqlite3.Error as problem:
+        raise _explained(path, problem) from problem
+
+
+def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
+    code = getattr(problem, "sqlite_errorcode", None) or 0
+    match code & 0xFF:
+        case sqlite3.SQLITE_FULL:
+            return StoreError(f"{path}: the disk is full; make room and run again, what had been finished is kept")
+        case sqlite3.SQLITE_IOERR:
+            return StoreError(
+                f"{path}: cannot be read or written ({problem}); is the disk full? What is finished is kept"
+            )
+        case sqlite3.SQLITE_READONLY | sqlite3.SQLITE_CANTOPEN | sqlite3.SQLITE_PERM:
+            return StoreError(
+                f"{path}: cannot be written ({problem}); check the folder's permissions or copy the study"
+            )
+        case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_LOCKED:
+            return StoreError(f"{path}: another program holds it open for writing; close that and run again")
+        case sqlite3.SQLITE_NOTADB | sqlite3.SQLITE_CORRUPT:
+            return _corrupt(path, str(problem))
+        case _:
+            return StoreError(f"{path}: {problem}; if it is damaged, restore a copy or move it away")
+
+
+def _corrupt(path: Path, detail: str) -> StoreError:
+    return StoreError(
+        f"{path}: is damaged ({' '.join(detail.split())}); restore a copy, or move it away to start again"
+    )

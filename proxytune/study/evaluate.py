@@ -1,0 +1,137 @@
+"""Scoring one domain instance: all agents from all starts, compared with the target."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from proxytune.domain import Episode, make_episode
+from proxytune.errors import EpisodeError
+from proxytune.scores import ScoreTable
+from proxytune.space import Theta
+from proxytune.study.episodes import running
+from proxytune.study.progress import Watcher
+from proxytune.study.settings import StudySettings
+from proxytune.study.store import Outcome, Store
+from proxytune.study.study import Study
+from proxytune.usefulness import ppv, prpv
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """How useful a domain instance is.
+
+    Attributes:
+        theta: The instance.
+        proxy: The agents' scores in it, over the episodes that worked; None if an agent has none.
+        prpv: PRPV, None if an agent has no episode that worked.
+        ppv: PPV, None also where the target's agents all score alike.
+        failures: The outcomes that failed.
+        failure: Why there is no score, empty if there is one.
+    """
+
+    theta: Theta
+    proxy: ScoreTable | None
+    prpv: int | None
+    ppv: float | None
+    failures: tuple[Outcome, ...]
+    failure: str = ""
+
+
+def episode_seed(study_seed: int, start: int) -> int:
+    """The seed of every episode from this start: common random numbers for all agents and all θ."""
+    return int(np.random.SeedSequence([study_seed, start]).generate_state(1)[0])
+
+
+def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
+    """The episodes that score a domain instance: every agent from every start."""
+    return [
+        make_episode(theta, agent=agent, start=start, seed=episode_seed(seed, start))
+        for agent in settings.agents
+        for start in range(settings.starts)
+    ]
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What a run has cost: episodes simulated, and their time summed over all processes."""
+
+    episodes: int = 0
+    seconds: float = 0.0
+
+    def __add__(self, other: "Spent") -> "Spent":
+        return Spent(self.episodes + other.episodes, self.seconds + other.seconds)
+
+
+def simulate(study: Study, store: Store, theta: Theta, watcher: Watcher, what: str) -> Spent:
+    """Run the episodes of a domain instance that are not in the store yet; each is there as soon as it is finished.
+
+    A failed episode counts as known where failures do not stop the study; where they do, it is tried again, since
+    something is expected to have been mended.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+    """
+    settings, identity, spent = study.settings, study.identity, Spent()
+    known = store.outcomes(identity, theta)
+    planned = plan(settings, theta, settings.seed)
+    stop = settings.stop_on_failure
+    missing = [episode for episode in planned if episode not in known or (stop and known[episode].failure)]
+    watcher.begin(what, len(planned) - len(missing))
+    with running(study.family, longest_first(missing, store.seconds()), settings.jobs) as outcomes:
+        for outcome in outcomes:
+            store.save_outcome(identity, outcome)
+            watcher.episode()
+            spent += Spent(1, outcome.seconds)
+            if stop and outcome.failure:
+                raise EpisodeError(f"{told(outcome)}; mend it and run again, or set on_failure = 'continue'")
+    return spent
+
+
+def longest_first(episodes: list[Episode], seconds: Mapping[tuple[str, int], float]) -> list[Episode]:
+    """The episodes in the order that keeps several processes busy to the end, by how long their like took before."""
+    return sorted(episodes, key=lambda episode: -seconds.get((episode.agent, episode.start), float("inf")))
+
+
+def evaluation(study: Study, store: Store, theta: Theta) -> Evaluation | None:
+    """Score a domain instance from what the store has; None if an episode is still missing.
+
+    Each agent is scored over its own episodes that worked. A failed episode has no score, so none is made up for it;
+    an agent without any cannot be compared, and then the instance has no score either.
+    """
+    known = store.outcomes(study.identity, theta)
+    planned = plan(study.settings, theta, study.settings.seed)
+    if not all(episode in known for episode in planned):
+        return None
+    return score(study, theta, [known[episode] for episode in planned])
+
+
+def score(study: Study, theta: Theta, outcomes: list[Outcome]) -> Evaluation:
+    """Compare the outcomes of a domain instance's episodes with the target; a pure function."""
+    failures = tuple(outcome for outcome in outcomes if outcome.metrics is None)
+    worked = {outcome.episode.agent for outcome in outcomes if outcome.metrics is not None}
+    for failed in failures:
+        if failed.episode.agent not in worked:
+            reason = f"agent '{failed.episode.agent}' failed from every start, first with: {failed.failure}"
+            return Evaluation(theta, None, None, None, failures, reason)
+    proxy = table(outcomes)
+    metrics = study.settings.metrics
+    usefulness = prpv(proxy=proxy, target=study.target, metrics=metrics)
+    predictivity = ppv(proxy=proxy, target=study.target, metrics=metrics)
+    return Evaluation(theta, proxy, usefulness.value, predictivity.value, failures)
+
+
+def table(outcomes: list[Outcome]) -> ScoreTable:
+    """The scores of the episodes that worked, labelled by their start."""
+    scored: dict[tuple[str, str | int], Mapping[str, float]] = {
+        (outcome.episode.agent, outcome.episode.start): outcome.metrics
+        for outcome in outcomes
+        if outcome.metrics is not None
+    }
+    return ScoreTable.from_episodes(scored)
+
+
+def told(outcome: Outcome) -> str:
+    """Which episode failed and why, in one phrase."""
+    episode = outcome.episode
+    return f"agent '{episode.agent}' failed from start {episode.start}: {outcome.failure}"

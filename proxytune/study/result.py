@@ -1,0 +1,101 @@
+"""What a study has found out: its best θ, how useful the proxy is there, and what that is worth."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from proxytune.errors import RunError
+from proxytune.search.surrogate import fit_surrogate
+from proxytune.study.evaluate import Evaluation, evaluation, told
+from proxytune.study.run import as_trials
+from proxytune.study.store import Store, TrialRecord
+from proxytune.study.study import Study
+from proxytune.usefulness import Assessment, assess
+
+FAILURES_TOLD = 10
+
+
+@dataclass(frozen=True)
+class Best:
+    """The visited θ with the lowest posterior mean: the trial with the lowest PRPV of all is partly luck.
+
+    Attributes:
+        trial: The trial that visited it.
+        posterior_mean: Mean of PRPV there, given all trials.
+        posterior_deviation: Its standard deviation.
+        assessment: How useful the proxy is there, by every measure, with noise floor and chance level.
+    """
+
+    trial: TrialRecord
+    posterior_mean: float
+    posterior_deviation: float
+    assessment: Assessment
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """A study as it stands.
+
+    Attributes:
+        study: Which one.
+        trials: Its finished and failed trials, in order.
+        best: The best of them.
+        failures: The first failed episodes, told in one line each.
+    """
+
+    study: Study
+    trials: tuple[TrialRecord, ...]
+    best: Best
+    failures: tuple[str, ...]
+
+    @property
+    def failed_episodes(self) -> int:
+        """How many episodes of all trials failed."""
+        return sum(trial.failed_episodes for trial in self.trials)
+
+    @property
+    def episodes(self) -> int:
+        """How many episodes the trials took, failed ones counted."""
+        return len(self.trials) * len(self.study.settings.agents) * self.study.settings.starts
+
+
+def result_of(study: Study, store: Store) -> StudyResult:
+    """Sum up what the store has; nothing is simulated.
+
+    Raises:
+        RunError: If no trial has a score.
+    """
+    trials = tuple(trial for trial in store.trials() if trial.state != "open")
+    scored = [trial for trial in trials if trial.prpv is not None]
+    if not scored:
+        reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
+        raise RunError(f"{store.path}: {reason}")
+    return StudyResult(study, trials, _best(study, store, scored), _failures(study, store, trials))
+
+
+def _best(study: Study, store: Store, scored: list[TrialRecord]) -> Best:
+    space = study.settings.space
+    surrogate = fit_surrogate(space, as_trials(space, scored), study.settings.seed)
+    mean, deviation = surrogate.at_visited()
+    row = int(np.argmin(mean))
+    values = surrogate.visited[row].values
+    trial = next(trial for trial in scored if space.values(trial.theta) == values)
+    proxy = _known(study, store, trial).proxy
+    assert proxy is not None
+    assessment = assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
+    return Best(trial, float(mean[row]), float(deviation[row]), assessment)
+
+
+def _known(study: Study, store: Store, trial: TrialRecord) -> Evaluation:
+    found = evaluation(study, store, trial.theta)
+    if found is None:
+        raise RunError(f"{store.path}: lacks episodes of trial {trial.number}; move it away and run the study again")
+    return found
+
+
+def _failures(study: Study, store: Store, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]:
+    lines: list[str] = []
+    for trial in trials:
+        if trial.failed_episodes and len(lines) < FAILURES_TOLD:
+            lines += [f"trial {trial.number}: {told(outcome)}" for outcome in _known(study, store, trial).failures]
+    return tuple(lines[:FAILURES_TOLD])

@@ -1,0 +1,84 @@
+"""The loop of a study: propose, simulate, score, until the budget is spent."""
+
+from collections.abc import Sequence
+
+from proxytune.errors import RunError, SettingsError
+from proxytune.search.proposer import Proposer, Trial
+from proxytune.space import Space, Theta
+from proxytune.study.evaluate import Evaluation, Spent, evaluation, simulate
+from proxytune.study.progress import Watcher
+from proxytune.study.store import State, Store, TrialRecord
+from proxytune.study.study import Study, changes, facts
+
+
+def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) -> Spent:
+    """Run a study to the end of its budget, from wherever it was left.
+
+    The next θ is a function of the seed and the finished trials alone, and an episode that has been simulated is never
+    simulated again: a study stopped at any moment goes on as if it had not been.
+
+    Raises:
+        SettingsError: If what the finished trials depend on has changed.
+        EpisodeError: If an episode fails and the study is to stop then.
+        RunError: If the machine fails, or no trial of the initial design has a score.
+        StoreError: If the database cannot be written.
+    """
+    check_facts(study, store)
+    budget, spent = study.settings.budget, Spent()
+    trials = store.trials()
+    done = [trial for trial in trials if trial.state != "open"]
+    while len(done) < budget:
+        _check_hope(study, done)
+        number = len(done) + 1
+        theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, done)
+        store.save_trial(study.identity, TrialRecord(number, theta))
+        spent += simulate(study, store, theta, watcher, f"trial {number} of {budget}")
+        done.append(_record(number, evaluation(study, store, theta)))
+        store.save_trial(study.identity, done[-1])
+        _tell_best(watcher, done)
+    return spent
+
+
+def check_facts(study: Study, store: Store) -> None:
+    """See to it that what is in the store was made by this very study.
+
+    Raises:
+        SettingsError: If there are finished trials and what they depend on has changed.
+    """
+    before, after = store.facts(), facts(study)
+    if before == after:
+        return
+    if any(trial.state != "open" for trial in store.trials()):
+        raise SettingsError(
+            f"{study.settings.path}: changed since the first trial: {', '.join(changes(before, after))}; "
+            f"put it back, or move {store.path.name} away to start again"
+        )
+    store.begin(after)
+
+
+def as_trials(space: Space, done: Sequence[TrialRecord]) -> list[Trial]:
+    """Finished trials as the search sees them."""
+    return [Trial(space.values(trial.theta), trial.prpv) for trial in done]
+
+
+def _propose(study: Study, proposer: Proposer, done: Sequence[TrialRecord]) -> Theta:
+    space = study.settings.space
+    return space.theta(proposer.propose(space, as_trials(space, done), study.settings.seed))
+
+
+def _record(number: int, found: Evaluation | None) -> TrialRecord:
+    assert found is not None
+    state: State = "failed" if found.failure else "finished"
+    return TrialRecord(number, found.theta, state, found.prpv, found.ppv, len(found.failures), found.failure)
+
+
+def _check_hope(study: Study, done: Sequence[TrialRecord]) -> None:
+    """Stop where nothing has worked: more of the same would only burn time."""
+    if len(done) >= study.settings.initial and all(trial.state == "failed" for trial in done):
+        raise RunError(f"all {len(done)} trials failed; the first: {done[0].failure}")
+
+
+def _tell_best(watcher: Watcher, done: Sequence[TrialRecord]) -> None:
+    scores = [trial.prpv for trial in done if trial.prpv is not None]
+    if scores:
+        watcher.best(min(scores))

@@ -1,0 +1,144 @@
+"""What study.toml says, read strictly."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from proxytune.errors import InputError
+from proxytune.scores import Metric
+from proxytune.settings import Section, read_settings
+from proxytune.space import Interval, Space
+
+DEFAULT_FAMILY = "proxytune.driving.family:lane_following"
+FILE_NAME = "study.toml"
+FORMAT = 1
+KEYS = (
+    "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
+    "starts", "budget", "initial", "seed", "jobs", "on_failure", "parameters", "domain",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class StudySettings:
+    """A study.toml.
+
+    Attributes:
+        path: The file.
+        name: What the study is called.
+        family: Where the domain family comes from, as "module:factory".
+        proxy: A model.toml whose effects the proxy has, if any.
+        target: The score table of the target.
+        objective: The measure that is made small.
+        metrics: How agents are compared.
+        agents: Names of the agents, at least two.
+        starts: How many of the family's starting conditions, the first ones, each agent drives from.
+        budget: How many trials.
+        initial: How many of them come from the quasi-random design.
+        seed: Seed of the episodes and of the search.
+        jobs: How many processes run episodes.
+        stop_on_failure: Whether a failing episode stops the study.
+        space: The search box, its parameters sorted by name.
+        domain: The table that the family's factory reads.
+    """
+
+    path: Path
+    name: str
+    family: str
+    proxy: Path | None
+    target: Path
+    objective: str
+    metrics: tuple[Metric, ...]
+    agents: tuple[str, ...]
+    starts: int
+    budget: int
+    initial: int
+    seed: int
+    jobs: int
+    stop_on_failure: bool
+    space: Space
+    domain: Section
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the study."""
+        return self.path.parent
+
+    def error(self, key: str, problem: str) -> InputError:
+        """The one-line complaint about a key that only the domain family could check."""
+        return Section(self.path, "", {}).error(key, problem)
+
+
+def read_study_settings(path: Path) -> StudySettings:
+    """Read a study.toml, given as the file or as its folder.
+
+    Raises:
+        SettingsError: With file, key and remedy.
+    """
+    path = path / FILE_NAME if path.is_dir() else path
+    read = read_settings(path)
+    read.only(KEYS)
+    read.whole("format", low=1, high=FORMAT)
+    return StudySettings(
+        path=path,
+        name=read.text("name", path.absolute().parent.name),
+        family=read.text("family", DEFAULT_FAMILY),
+        proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
+        target=path.parent / read.text("target"),
+        objective=read.text("objective", "prpv", choices=("prpv",)),
+        metrics=_metrics(read),
+        agents=_agents(read),
+        starts=read.whole("starts", low=1),
+        budget=read.whole("budget", low=1, high=100_000),
+        initial=read.whole("initial", 8, low=1, high=100_000),
+        seed=read.whole("seed", 1),
+        jobs=read.whole("jobs", 1, low=1, high=1024),
+        stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
+        space=_space(read.section("parameters")),
+        domain=read.section("domain"),
+    )
+
+
+def _metrics(read: Section) -> tuple[Metric, ...]:
+    try:
+        metrics = tuple(Metric.parse(text) for text in read.texts("metrics"))
+    except InputError as problem:
+        raise read.error("metrics", str(problem)) from None
+    names = [metric.name for metric in metrics]
+    if not names:
+        raise read.error("metrics", 'is empty; give at least one, as in ["distance:max"]')
+    if len(set(names)) < len(names):
+        raise read.error("metrics", f"names a metric twice: {', '.join(names)}")
+    return metrics
+
+
+def _agents(read: Section) -> tuple[str, ...]:
+    agents = read.texts("agents")
+    if len(agents) < 2:
+        raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
+    return agents
+
+
+def _space(parameters: Section) -> Space:
+    if not parameters.values:
+        raise Section(parameters.path, "", {}).error("parameters", "is missing; write NAME = [low, high] in it")
+    return Space(tuple(Interval(name, *parameters.bounds(name)) for name in sorted(parameters.values)))
+
+
+def as_document(settings: StudySettings) -> Mapping[str, Any]:
+    """The settings as plain texts and numbers, for reports."""
+    return {
+        "path": str(settings.path),
+        "family": settings.family,
+        "proxy": str(settings.proxy) if settings.proxy else None,
+        "objective": settings.objective,
+        "metrics": [str(metric) for metric in settings.metrics],
+        "agents": list(settings.agents),
+        "starts": settings.starts,
+        "budget": settings.budget,
+        "initial": settings.initial,
+        "seed": settings.seed,
+        "jobs": settings.jobs,
+        "on_failure": "stop" if settings.stop_on_failure else "continue",
+        "parameters": {i.name: [i.low, i.high] for i in settings.space.intervals},
+    }

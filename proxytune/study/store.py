@@ -1,0 +1,197 @@
+"""What a study has done so far, kept in study.db: every finished episode is there at once and for good."""
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from proxytune.domain import Episode
+from proxytune.errors import InputError
+from proxytune.space import Theta
+from proxytune.study.database import connect, told
+
+FILE_NAME = "study.db"
+State = Literal["open", "finished", "failed"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one episode.
+
+    Attributes:
+        episode: Which one.
+        metrics: Its scores, None if it failed.
+        failure: Why it failed, empty if it did not.
+        seconds: How long it took.
+    """
+
+    episode: Episode
+    metrics: Mapping[str, float] | None
+    failure: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """One trial of a study.
+
+    Attributes:
+        number: Counted from 1.
+        theta: Where it was.
+        state: Whether it has been scored, has failed, or is still open.
+        prpv: Its PRPV, None unless finished.
+        ppv: Its PPV, None unless finished, and where the target's agents all score alike.
+        failed_episodes: How many of its episodes failed.
+        failure: Why it failed, empty if it did not.
+    """
+
+    number: int
+    theta: Theta
+    state: State = "open"
+    prpv: float | None = None
+    ppv: float | None = None
+    failed_episodes: int = 0
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class SweepRecord:
+    """A sweep that has been asked for: the parameter, the values of the others, and where it was looked at."""
+
+    parameter: str
+    base: Theta
+    points: tuple[float, ...]
+
+
+def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
+    """θ in the one form in which it is stored: sorted by name, every digit kept."""
+    return json.dumps({name: float(value) for name, value in sorted(dict(theta).items())}, allow_nan=False)
+
+
+class Store:
+    """A study's database. Every method raises StoreError in one line; what had been committed stays."""
+
+    def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
+        self.path = path
+        self._connection = connection
+
+    @classmethod
+    @contextmanager
+    def open(cls, folder: Path) -> Iterator["Store"]:
+        """Open the study's database for writing, making it where there is none; to be held under the study's lock."""
+        path = folder / FILE_NAME
+        connection = connect(path, writable=True)
+        try:
+            yield cls(path, connection)
+        finally:
+            connection.close()
+
+    @classmethod
+    @contextmanager
+    def read(cls, folder: Path) -> Iterator["Store"]:
+        """Open the study's database for reading, also while the study runs.
+
+        Raises:
+            InputError: If the study has not been run.
+        """
+        path = folder / FILE_NAME
+        if not path.exists():
+            raise InputError(f"{path}: no such file; run the study first: python -m proxytune study {folder}")
+        connection = connect(path, writable=False)
+        try:
+            yield cls(path, connection)
+        finally:
+            connection.close()
+
+    def facts(self) -> dict[str, Any]:
+        """What determined the finished trials; empty before the first."""
+        return {key: json.loads(value) for key, value in self._all("SELECT key, value FROM facts")}
+
+    def begin(self, facts: Mapping[str, Any]) -> None:
+        """Start a study afresh with these facts; episodes are kept, trials are not."""
+        with self._transaction() as connection:
+            connection.execute("DELETE FROM trials")
+            connection.execute("DELETE FROM facts")
+            rows = [(key, json.dumps(value, allow_nan=False)) for key, value in facts.items()]
+            connection.executemany("INSERT INTO facts VALUES (?, ?)", rows)
+
+    def trials(self) -> list[TrialRecord]:
+        """Every trial, in order; the last may be open."""
+        rows = self._all(
+            "SELECT number, theta, state, prpv, ppv, failed_episodes, failure"
+            " FROM trials JOIN instances ON instances.id = trials.instance ORDER BY number"
+        )
+        return [TrialRecord(number, json.loads(theta), *rest) for number, theta, *rest in rows]
+
+    def save_trial(self, identity: str, trial: TrialRecord) -> None:
+        """Write a trial, over what was known of it before."""
+        with self._transaction() as connection:
+            row = (trial.state, trial.prpv, trial.ppv, trial.failed_episodes, trial.failure)
+            instance = self._instance(connection, identity, theta_json(trial.theta))
+            connection.execute(
+                "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?)", (trial.number, instance, *row)
+            )
+
+    def save_outcome(self, identity: str, outcome: Outcome) -> None:
+        """Write an episode, over an earlier failure of the same."""
+        episode = outcome.episode
+        metrics = None if outcome.metrics is None else json.dumps(dict(outcome.metrics), allow_nan=False)
+        failure = None if outcome.metrics is not None else outcome.failure
+        with self._transaction() as connection:
+            instance = self._instance(connection, identity, theta_json(episode.theta))
+            row = (instance, episode.agent, episode.start, episode.seed, metrics, failure, outcome.seconds)
+            connection.execute("INSERT OR REPLACE INTO episodes VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+
+    def outcomes(self, identity: str, theta: Theta) -> dict[Episode, Outcome]:
+        """Every episode known of a domain instance."""
+        rows = self._all(
+            "SELECT theta, agent, start, seed, metrics, failure, seconds"
+            " FROM episodes JOIN instances ON instances.id = episodes.instance WHERE identity = ? AND theta = ?",
+            (identity, theta_json(theta)),
+        )
+        found = {}
+        for text, agent, start, seed, metrics, failure, seconds in rows:
+            episode = Episode(tuple(json.loads(text).items()), agent, start, seed)
+            found[episode] = Outcome(episode, json.loads(metrics) if metrics else None, failure or "", seconds)
+        return found
+
+    def seconds(self) -> dict[tuple[str, int], float]:
+        """How long the episodes of each agent and start took on average."""
+        rows = self._all("SELECT agent, start, avg(seconds) FROM episodes GROUP BY agent, start")
+        return {(agent, start): mean for agent, start, mean in rows}
+
+    def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
+        """Remember that a sweep has been asked for."""
+        row = (sweep.parameter, theta_json(sweep.base), json.dumps(sweep.points), identity)
+        with self._transaction() as connection:
+            connection.execute("INSERT OR IGNORE INTO sweeps VALUES (?, ?, ?, ?)", row)
+
+    def sweeps(self, identity: str) -> list[SweepRecord]:
+        """Every sweep that has been asked for."""
+        rows = self._all("SELECT parameter, base, points FROM sweeps WHERE identity = ?", (identity,))
+        return [SweepRecord(name, json.loads(base), tuple(json.loads(points))) for name, base, points in rows]
+
+    def _instance(self, connection: sqlite3.Connection, identity: str, theta: str) -> int:
+        connection.execute("INSERT OR IGNORE INTO instances (identity, theta) VALUES (?, ?)", (identity, theta))
+        query = "SELECT id FROM instances WHERE identity = ? AND theta = ?"
+        return int(connection.execute(query, (identity, theta)).fetchone()[0])
+
+    def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+        with told(self.path):
+            return self._connection.execute(query, values).fetchall()
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        with told(self.path):
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._connection
+                self._connection.execute("COMMIT")
+            except BaseException:
+                # A full disk may have rolled back already.
+                with suppress(sqlite3.Error):
+                    self._connection.execute("ROLLBACK")
+                raise

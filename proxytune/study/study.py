@@ -1,0 +1,112 @@
+"""A study ready to run: its settings, its domain family, and the target's scores."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proxytune.domain import DomainFamily
+from proxytune.errors import InputError
+from proxytune.scores import ScoreTable, read_scores
+from proxytune.settings import nearest
+from proxytune.study.family import load_family
+from proxytune.study.settings import StudySettings, read_study_settings
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a trial is a function of, apart from θ.
+
+    Attributes:
+        settings: What study.toml says.
+        family: The proxy's domain family.
+        target: The target's scores of the study's agents, in the study's order.
+    """
+
+    settings: StudySettings
+    family: DomainFamily
+    target: ScoreTable
+
+    @cached_property
+    def identity(self) -> str:
+        """What determines the result of an episode in the proxy, apart from the episode."""
+        return self.family.identity
+
+
+def open_study(path: Path) -> Study:
+    """Read a study.toml, load the family it names and the target's scores.
+
+    Raises:
+        InputError: If anything in it cannot be used, with file, key and remedy.
+    """
+    settings = read_study_settings(path)
+    family = load_family(settings, settings.proxy)
+    return Study(settings, family, read_target(settings))
+
+
+def read_target(settings: StudySettings) -> ScoreTable:
+    """The target's scores of the study's agents.
+
+    Raises:
+        InputError: If the table lacks an agent or a metric, or has a value that is not finite.
+    """
+    table = read_scores(settings.target, [metric.name for metric in settings.metrics])
+    missing = [agent for agent in settings.agents if agent not in table.agents]
+    if missing:
+        hint = nearest(missing[0], table.agents) if len(missing) == 1 else "add them, or take them out of the study"
+        raise InputError(f"{settings.target}: has no scores of {', '.join(missing)}; {hint}")
+    chosen = table.arrange(agents=settings.agents)
+    driven = [label for column, label in enumerate(chosen.episodes) if chosen.driven[:, column].any()]
+    return chosen.arrange(agents=settings.agents, episodes=driven)
+
+
+def facts(study: Study) -> dict[str, Any]:
+    """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
+
+    Budget, jobs and what to do on failure are not among them. The proxy's model is: the family's identity covers it.
+    """
+    settings = study.settings
+    return {
+        "family": settings.family,
+        "target": _table_digest(study.target),
+        "objective": settings.objective,
+        "metrics": sorted(str(metric) for metric in settings.metrics),
+        "agents": sorted(settings.agents),
+        "starts": settings.starts,
+        "initial": settings.initial,
+        "seed": settings.seed,
+        **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
+        **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
+        "identity": study.identity,
+    }
+
+
+def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+    """Which facts differ, each as one phrase for the user."""
+    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
+    named = [key for key in keys if key != "identity"]
+    if keys and not named:
+        return ["the domain family (its code, its robot or the proxy's model)"]
+    return [_change(key, before.get(key), after.get(key)) for key in named]
+
+
+def _change(key: str, before: Any, after: Any) -> str:
+    if key == "target":
+        return "target (its contents)"
+    shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
+    return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
+
+
+def _table_digest(table: ScoreTable) -> str:
+    order = np.argsort(table.agents, kind="stable")
+    text = json.dumps([sorted(table.agents), table.episodes, table.metrics, table.values[order].tolist()])
+    return _digest(text.encode())
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]

@@ -1,0 +1,119 @@
+"""Usefulness along one parameter of the domain family, the others held."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proxytune.errors import InputError
+from proxytune.settings import nearest
+from proxytune.space import Interval, Theta
+from proxytune.study.evaluate import Evaluation, Spent, evaluation, simulate
+from proxytune.study.progress import Watcher
+from proxytune.study.store import Store, SweepRecord
+from proxytune.study.study import Study
+from proxytune.usefulness import Assessment, assess
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One point of a curve.
+
+    Attributes:
+        value: The parameter, in its unit.
+        evaluation: What the agents scored there.
+        assessment: How useful the proxy is there; None if an agent has no episode that worked.
+    """
+
+    value: float
+    evaluation: Evaluation
+    assessment: Assessment | None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Usefulness along one parameter.
+
+    Attributes:
+        parameter: Its name.
+        unit: Its unit.
+        base: What the other parameters are held at; those not named are nominal.
+        points: In rising order of the parameter.
+    """
+
+    parameter: str
+    unit: str
+    base: Theta
+    points: tuple[SweepPoint, ...]
+
+
+def sweep_interval(study: Study, parameter: str) -> Interval:
+    """Where a parameter is swept: over the study's box, or over all it may be where the study does not search it.
+
+    Raises:
+        InputError: If the family has no such parameter.
+    """
+    boxes = {interval.name: interval for interval in study.settings.space.intervals}
+    if parameter in boxes:
+        return boxes[parameter]
+    known = study.family.parameters
+    if parameter not in known:
+        raise InputError(f"no parameter '{parameter}' in this study's domain family; {nearest(parameter, known)}")
+    return Interval(parameter, known[parameter].low, known[parameter].high)
+
+
+def check_base(study: Study, base: Theta) -> None:
+    """Refuse values that the family cannot take.
+
+    Raises:
+        InputError: With the parameter's name.
+    """
+    known = study.family.parameters
+    for name, value in base.items():
+        if name not in known:
+            raise InputError(f"no parameter '{name}' in this study's domain family; {nearest(name, known)}")
+        if not known[name].low <= value <= known[name].high:
+            low, high = known[name].low, known[name].high
+            raise InputError(f"parameter '{name}': must lie within [{low:g}, {high:g}], got {value:g}")
+
+
+def plan_sweep(interval: Interval, base: Theta, points: int) -> SweepRecord:
+    """An even grid over the interval, both ends included, and the parameter's own value in the base if it has one."""
+    grid = np.linspace(interval.low, interval.high, points).tolist()
+    own = [base[interval.name]] if interval.name in base else []
+    return SweepRecord(interval.name, dict(base), tuple(sorted({*grid, *own})))
+
+
+def run_sweep(study: Study, store: Store, sweep: SweepRecord, watcher: Watcher) -> Spent:
+    """Simulate what is missing of a sweep; episodes are shared with the study's trials and other sweeps."""
+    store.save_sweep(study.identity, sweep)
+    spent = Spent()
+    for number, value in enumerate(sweep.points, start=1):
+        what = f"{sweep.parameter} {number} of {len(sweep.points)}"
+        spent += simulate(study, store, _theta(sweep, value), watcher, what)
+    return spent
+
+
+def curve_of(study: Study, store: Store, sweep: SweepRecord) -> Curve | None:
+    """The curve of a sweep from what the store has; None if an episode is still missing."""
+    found = [(value, evaluation(study, store, _theta(sweep, value))) for value in sweep.points]
+    points = [_point(study, value, known) for value, known in found if known is not None]
+    if len(points) < len(found):
+        return None
+    return Curve(sweep.parameter, study.family.parameters[sweep.parameter].unit, sweep.base, tuple(points))
+
+
+def all_curves(study: Study, store: Store) -> Sequence[Curve]:
+    """The curves of every sweep that has been finished in this domain family."""
+    curves = [curve_of(study, store, sweep) for sweep in store.sweeps(study.identity)]
+    return [curve for curve in curves if curve is not None]
+
+
+def _theta(sweep: SweepRecord, value: float) -> dict[str, float]:
+    return {**sweep.base, sweep.parameter: value}
+
+
+def _point(study: Study, value: float, known: Evaluation) -> SweepPoint:
+    if known.proxy is None:
+        return SweepPoint(value, known, None)
+    return SweepPoint(value, known, assess(proxy=known.proxy, target=study.target, metrics=study.settings.metrics))

@@ -1,0 +1,49 @@
+"""Chance: the PRPV of a proxy that knows nothing about which agent is which."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.prpv import dominance
+
+
+@dataclass(frozen=True)
+class Chance:
+    """PRPV when the proxy's scores are handed out to the agents at random.
+
+    Attributes:
+        mean: Mean over permutations.
+        deviation: Standard deviation over permutations.
+        p_value: How probable a PRPV as low as the proxy's is by chance, the proxy's own order counted as one.
+        permutations: How many were drawn.
+        inputs: What was compared, with its sample sizes.
+    """
+
+    mean: float
+    deviation: float
+    p_value: float
+    permutations: int
+    inputs: Comparison
+
+
+def chance(
+    *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], permutations: int = 1000, seed: int = 0
+) -> Chance:
+    """Permute which agent got which of the proxy's scores; the metrics of one agent stay together.
+
+    Raises:
+        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
+    """
+    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    in_proxy, on_target = (dominance(means, inputs.metrics) for means in inputs.means)
+    rng = np.random.default_rng(seed)
+    values = np.empty(permutations)
+    for draw in range(permutations):
+        order = rng.permutation(len(inputs.agents))
+        values[draw] = np.abs(in_proxy[np.ix_(order, order)] - on_target).sum()
+    as_low = (values <= np.abs(in_proxy - on_target).sum()).sum()
+    p_value = float((1 + as_low) / (1 + permutations))
+    return Chance(float(values.mean()), float(values.std(ddof=1)), p_value, permutations, inputs)

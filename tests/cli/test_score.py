@@ -1,0 +1,184 @@
+"""`score` reads tables as people keep them and prints every measure, for people and as JSON."""
+
+import argparse
+import json
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from proxytune.cli import score
+from proxytune.errors import InputError, ScoresError
+
+SCORES = Path(__file__).parents[2] / "../shared/data/scores"
+SIM = "agent,episode,distance,time\n" + "".join(
+    f"{agent},{episode},{base + 0.1 * ((episode * base) % 3)},{10 - base}\n"
+    for base, agent in enumerate("ABCD")
+    for episode in (1, 2, 3)
+)
+REAL = SIM.replace("C,", "c,").replace("D,", "C,").replace("c,", "D,")
+PROMISED = {"prpv", "prpv_normalised", "ppv", "srcc", "mmrv", "kendall_tau", "prpv_interval", "noise_floor", "chance"}
+
+
+@pytest.fixture
+def tables(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("sim.csv").write_text(SIM)
+    Path("real.csv").write_text(REAL)
+    both = [f"{name},{line}" for name, text in (("sim", SIM), ("real", REAL)) for line in text.splitlines()[1:]]
+    Path("both.csv").write_text("\n".join(["domain,agent,episode,distance,time", *both]) + "\n")
+
+
+def run(*words):
+    parser = argparse.ArgumentParser()
+    score.configure(parser)
+    return score.run(parser.parse_args(list(words)))
+
+
+def document(*words):
+    return json.loads(json.dumps(run(*words).document, allow_nan=False))
+
+
+def shown(*words):
+    console = Console(width=160, record=True, file=None, quiet=False)
+    with console.capture() as captured:
+        console.print(run(*words).shown)
+    return captured.get()
+
+
+METRIC = ("--metric", "distance:max", "--metric", "time:min")
+
+
+def test_one_proxy_has_the_promised_keys_at_the_top_level(tables):
+    found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    assert found.keys() >= PROMISED
+    assert (found["proxy"], found["target"], found["prpv"]) == ("sim", "real", 2)
+    assert found["prpv_normalised"] == pytest.approx(2 / 12)
+    assert found["prpv_interval"][0] <= 2 <= found["prpv_interval"][1]
+    assert found["pairs"] == [{"better": "C", "worse": "D", "flip": "reversed"}]
+    assert found["srcc"].keys() == found["mmrv"].keys() == found["kendall_tau"].keys() == {"distance", "time"}
+
+
+def test_domains_of_one_file_can_be_either_side(tables):
+    apart = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    together = document("--proxy", "both.csv:sim", "--target", "both.csv:real", *METRIC)
+    assert apart == together
+    assert document("--proxy", "both.csv", "--target", "both.csv:real", *METRIC) == apart
+
+
+def test_several_proxies_are_ranked_with_their_differences(tables):
+    Path("worse.csv").write_text(SIM.replace("A,", "x,").replace("D,", "A,").replace("x,", "D,"))
+    found = document("--proxy", "worse.csv", "--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    assert [(one["rank"], one["proxy"]) for one in found["proxies"]] == [(1, "sim"), (2, "worse")]
+    assert all(one.keys() >= PROMISED for one in found["proxies"])
+    difference = found["differences"][0]
+    assert (difference["better"], difference["worse"]) == ("sim", "worse")
+    assert difference["difference"] == found["proxies"][1]["prpv"] - found["proxies"][0]["prpv"]
+    assert difference["beyond_noise"] is (difference["interval"][0] > 0)
+
+
+def test_proxies_of_the_same_file_name_are_told_apart_and_the_same_one_is_refused(tables):
+    Path("other").mkdir()
+    Path("other/sim.csv").write_text(SIM)
+    found = document("--proxy", "sim.csv", "--proxy", "other/sim.csv", "--target", "real.csv", *METRIC)
+    assert {one["proxy"] for one in found["proxies"]} == {"sim", str(Path("other/sim.csv"))}
+    with pytest.raises(InputError, match="given twice"):
+        run(*["--proxy", "sim.csv"] * 3, "--target", "real.csv", *METRIC)
+
+
+def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
+    text = shown("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    for part in ("PRPV", "noise floor", "chance", "PPV", "SRCC distance", "Kendall τ time", "MMRV time", "1 reversed"):
+        assert part in text
+    assert "note: 3 episodes per agent are few" in text
+    assert "sim as a proxy of real: 4 agents, 3 proxy episodes and 3 target episodes each" in text
+
+
+def test_the_ranking_shows_every_proxy_and_names_with_brackets_survive(tables):
+    Path("sim[2].csv").write_text(SIM)
+    text = shown("--proxy", "sim.csv", "--proxy", "sim[2].csv", "--target", "real.csv", *METRIC)
+    assert "2 proxies of real" in text
+    assert "sim[2]" in text
+
+
+def test_single_rows_give_no_interval_but_a_note(tables):
+    rows = "agent,distance\nA,1\nB,2\nC,3\n"
+    Path("one.csv").write_text(rows)
+    found = document("--proxy", "one.csv", "--target", "one.csv", "--metric", "distance:max")
+    assert found["prpv"] == 0
+    assert found["prpv_interval"] is found["noise_floor"] is found["intervals"] is None
+    assert any("no interval: each agent has one episode" in note for note in found["notes"])
+    assert "–" in shown("--proxy", "one.csv", "--target", "one.csv", "--metric", "distance:max")
+
+
+def test_a_constant_metric_is_null_with_a_note(tables):
+    Path("flat.csv").write_text("agent,distance\nA,1\nB,1\nC,1\n")
+    found = document("--proxy", "flat.csv", "--target", "flat.csv", "--metric", "distance:max")
+    assert found["srcc"] == found["kendall_tau"] == {"distance": None}
+    assert found["ppv"] is None
+    assert len(found["notes"]) == len(set(found["notes"])) == 7
+
+
+def test_weights_unpaired_episodes_and_the_seed_are_obeyed(tables):
+    base = ("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    weighted = document(*base, "--beta", "distance:2", "--beta", "time:0")
+    assert weighted["beta"] == {"distance": 2.0, "time": 0.0}
+    assert document(*base, "--unpaired")["episodes"]["paired"] is False
+    assert document(*base)["episodes"] == {"proxy": [3, 3], "target": [3, 3], "paired": True, "resamples": 1000}
+    assert document(*base, "--seed", "1") == document(*base, "--seed", "1")
+
+
+def test_figures_are_drawn_where_asked(tables):
+    found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--output", "out")
+    assert [Path(path).name for path in found["figures"]] == ["scatter.png", "flipped_pairs.png"]
+    Path("b a.csv").write_text(SIM)
+    found = document("--proxy", "sim.csv", "--proxy", "b a.csv", "--target", "real.csv", *METRIC, "--output", "many")
+    assert sorted(path.name for path in Path("many").iterdir()) == [
+        "flipped_pairs_b_a.png",
+        "flipped_pairs_sim.png",
+        "scatter_b_a.png",
+        "scatter_sim.png",
+    ]
+    assert all(Path(path).exists() for path in found["figures"])
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--proxy", "none.csv", "--target", "real.csv", *METRIC), "none.csv: no such file"),
+        (("--proxy", "both.csv:sm", "--target", "real.csv", *METRIC), "no domain 'sm'; did you mean 'sim'"),
+        (("--proxy", "sim.csv", "--target", "both.csv", *METRIC), "choose one, as in both.csv:sim"),
+        (("--proxy", "sim.csv", "--target", "real.csv", "--metric", "distanc:max"), "did you mean 'distance'"),
+        (("--proxy", "sim.csv", "--target", "real.csv", "--metric", "distance"), "write NAME:max"),
+        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--resamples", "3"), "--resamples"),
+        (("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--beta", "distance"), "write NAME:WEIGHT"),
+        (
+            ("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--beta", "distance:1"),
+            "no weight is given for time",
+        ),
+    ],
+)
+def test_bad_input_gives_one_line_that_says_what_to_change(tables, words, complaint):
+    with pytest.raises(InputError) as problem:
+        run(*words)
+    assert complaint in str(problem.value)
+    assert "\n" not in str(problem.value)
+
+
+def test_a_missing_agent_is_named(tables):
+    Path("less.csv").write_text("\n".join(line for line in SIM.splitlines() if not line.startswith("B")))
+    with pytest.raises(ScoresError, match="the proxy lacks scores of B"):
+        run("--proxy", "less.csv", "--target", "real.csv", *METRIC)
+
+
+@pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
+def test_the_pilots_real_duckiebot_is_scored_from_its_episodes():
+    path = SCORES / "duckietown_pilot_episodes.csv"
+    metric = ("--metric", "distance:max", "--metric", "survival_time_s:max", "--metric", "time_out_of_lane_s:min")
+    found = document("--proxy", str(path), "--target", f"{path}:real", *metric)
+    assert [one["rank"] for one in found["proxies"]] == [1, 2, 3, 4, 5, 6]
+    assert {one["proxy"] for one in found["proxies"]} == {
+        "base", "synthetic_tiles", "trim_plus_0.2", "delay_doubled", "blur_0.1", "trim_minus_0.2",
+    }  # fmt: skip
+    assert all(one["prpv_interval"][0] <= one["prpv"] <= one["prpv_interval"][1] for one in found["proxies"])
+    assert any("2 episodes per agent are few" in note for note in found["proxies"][0]["notes"])

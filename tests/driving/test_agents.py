@@ -1,0 +1,153 @@
+"""Agents see pictures and nothing else, and never answer with anything but two finite duties."""
+
+import numpy as np
+import pytest
+
+from proxytune.driving.agents import AGENTS, Agent, LanePilot, Laggy, Leaning, Smoothed, Wary
+from proxytune.driving.agents.loading import load_agent
+from proxytune.driving.agents.perception import fit_lane, open_eye, white_pixels, yellow_pixels
+from proxytune.driving.agents.pilots import HALF_LANE_M, duties
+from proxytune.driving.cameras import GroundPlaneCamera
+from proxytune.driving.maps import SMALL_LOOP
+from proxytune.driving.robot import read_robot
+from proxytune.driving.texture import draw_floor
+from proxytune.errors import SettingsError
+
+ROBOT = read_robot("duckiebot")
+CAMERA = GroundPlaneCamera(ROBOT.camera_figures(), draw_floor(SMALL_LOOP))
+EAST_LANE_X = 2.5 * SMALL_LOOP.tile + SMALL_LOOP.lane_offset
+
+
+def pictures():
+    random = np.random.default_rng(0)
+    shape = (int(ROBOT.figures["camera_rows"]), int(ROBOT.figures["camera_columns"]), 3)
+    yield np.zeros(shape, dtype=np.uint8)
+    yield np.full(shape, 255, dtype=np.uint8)
+    yield random.integers(0, 256, shape, dtype=np.uint8)
+    yield from CAMERA.render(np.array([(EAST_LANE_X, 0.8, np.pi / 2), (0.9, 0.9, 0.3), (-0.5, 3.0, 1.0)]))
+
+
+def seen_from(left=0.0, turned=0.0):
+    """The picture from the outer lane of the eastern straight, shifted to the left [m] and turned left [rad]."""
+    return CAMERA.render(np.array([(EAST_LANE_X - left, 0.62, np.pi / 2 + turned)]))[0]
+
+
+@pytest.mark.parametrize("name", AGENTS)
+def test_every_picture_is_answered_with_two_finite_duties(name):
+    memory = AGENTS[name].begin(ROBOT)
+    for picture in pictures():
+        command, memory = AGENTS[name].act(picture, memory)
+        assert command.shape == (2,)
+        assert np.isfinite(command).all()
+        assert np.abs(command).max() <= 1.0
+
+
+@pytest.mark.parametrize("name", AGENTS)
+def test_acting_leaves_agent_and_memory_as_they_were(name):
+    first = AGENTS[name].begin(ROBOT)
+    scenes = list(pictures())
+    once = [AGENTS[name].act(picture, first)[0] for picture in scenes]
+    again = [AGENTS[name].act(picture, first)[0] for picture in scenes]
+    np.testing.assert_array_equal(once, again)
+
+
+def test_the_agents_differ_from_each_other():
+    assert len({str(agent) for agent in AGENTS.values()}) == len(AGENTS) >= 10
+
+
+@pytest.mark.parametrize(("left", "turned"), [(0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.2), (0.0, -0.2), (0.04, 0.1)])
+def test_the_lane_is_found_where_it_lies(left, turned):
+    eye = open_eye(ROBOT, reach_m=0.5)
+    picture = seen_from(left, turned)
+    lane = fit_lane(eye, yellow=yellow_pixels(picture, eye), white=white_pixels(picture, eye), half_lane_m=HALF_LANE_M)
+    assert lane is not None
+    assert lane.slope == pytest.approx(-np.tan(turned), abs=0.12)
+    assert lane.offset == pytest.approx(-left / np.cos(turned), abs=0.025)
+
+
+def test_without_markings_there_is_no_lane():
+    eye = open_eye(ROBOT)
+    nothing = np.empty(0, dtype=np.intp)
+    assert fit_lane(eye, yellow=nothing, white=nothing, half_lane_m=HALF_LANE_M) is None
+
+
+@pytest.mark.parametrize("name", ["steady", "brisk", "pursuer_near", "white_only", "smooth"])
+def test_off_centre_agents_turn_back_to_the_lane(name):
+    agent = AGENTS[name]
+    turns = []
+    for left in (0.06, -0.06):
+        command, _ = agent.act(seen_from(left), agent.begin(ROBOT))
+        turns.append(command[1] - command[0])
+    assert turns[0] < 0 < turns[1]
+
+
+def test_duties_ask_for_the_twist_and_turn_first_where_a_wheel_saturates():
+    np.testing.assert_allclose(duties(0.3, 0.0, full_speed=0.6, baseline=0.16), [0.5, 0.5])
+    np.testing.assert_allclose(duties(0.6, 3.75, full_speed=0.6, baseline=0.16), [0.0, 1.0])
+
+
+class Fixed:
+    """Always the same command."""
+
+    def __init__(self, *command):
+        self.command = np.array(command)
+
+    def begin(self, robot):
+        return None
+
+    def act(self, picture, memory):
+        return self.command, memory
+
+
+def commands(agent: Agent, steps: int) -> np.ndarray:
+    memory, out = agent.begin(ROBOT), []
+    for _ in range(steps):
+        command, memory = agent.act(seen_from(), memory)
+        out.append(command)
+    return np.array(out)
+
+
+def test_laggy_waits_its_steps():
+    np.testing.assert_allclose(commands(Laggy(Fixed(0.4, 0.5), steps=2), 4)[:, 0], [0.0, 0.0, 0.4, 0.4])
+
+
+def test_smoothed_goes_a_share_of_the_way():
+    np.testing.assert_allclose(commands(Smoothed(Fixed(0.4, 0.4), share=0.5), 3)[:, 0], [0.2, 0.3, 0.35])
+
+
+def test_leaning_gives_the_right_wheel_more():
+    np.testing.assert_allclose(commands(Leaning(Fixed(0.4, 0.4), bias=0.1), 1), [[0.36, 0.44]])
+
+
+def test_wary_slows_down_where_nothing_is_crisp():
+    wary = Wary(Fixed(0.5, 0.5), contrast=254.0, crisp=5.0, slowest=0.3)
+    np.testing.assert_allclose(commands(wary, 3)[:, 0], 0.15)
+    sure = Wary(Fixed(0.5, 0.5), contrast=30.0, crisp=5.0, slowest=0.3)
+    assert commands(sure, 60)[-1, 0] > 0.49
+
+
+def test_an_unknown_agent_is_told_with_the_nearest(tmp_path):
+    with pytest.raises(SettingsError, match="agent 'stead' is unknown; did you mean 'steady'"):
+        load_agent("stead", tmp_path)
+
+
+def test_a_users_agent_is_loaded_from_its_folder(tmp_path):
+    (tmp_path / "mine_agents.py").write_text(
+        "class Mine:\n    def begin(self, robot): return 0\n    def act(self, picture, memory): return (0.1, 0.1), memory\n"
+        "ready = Mine()\nbroken = 3\n",
+        encoding="utf-8",
+    )
+    assert load_agent("mine_agents:Mine", tmp_path).act(None, 0) == ((0.1, 0.1), 0)
+    assert load_agent("mine_agents:ready", tmp_path).begin(ROBOT) == 0
+    for name in ("mine_agents:gone", "no_such_module:x", "mine_agents:broken"):
+        with pytest.raises(SettingsError, match=f"agent '{name}'"):
+            load_agent(name, tmp_path)
+
+
+def test_lane_pilots_of_one_marking_do_not_look_at_the_other():
+    yellow = LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, markings="yellow")
+    blind = LanePilot(speed=0.2, offset_gain=8.0, slope_gain=2.0, markings="yellow", contrast=254.0)
+    straight = duties(0.2, 0.0, full_speed=0.6, baseline=0.16)
+    scene = seen_from(0.06)
+    np.testing.assert_allclose(blind.act(scene, blind.begin(ROBOT))[0], straight)
+    assert np.abs(yellow.act(scene, yellow.begin(ROBOT))[0] - straight).max() > 0.05

@@ -1,0 +1,69 @@
+"""The figures of `score` show the figures of the assessment."""
+
+import numpy as np
+import pytest
+
+from proxytune.errors import RunError
+from proxytune.report.score_figures import FLIP_COLOURS, flipped_pairs, save, scatter
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness import assess
+
+M = (Metric("distance"), Metric("time", "min"))
+
+
+def table(seed, agents=6, episodes=3):
+    values = np.random.default_rng(seed).normal(size=(agents, episodes, 2))
+    return ScoreTable(
+        tuple(f"A{i}" for i in range(agents)), tuple(map(str, range(episodes))), ("distance", "time"), values
+    )
+
+
+@pytest.fixture
+def assessment():
+    return assess(proxy=table(1), target=table(2), metrics=M, resamples=100)
+
+
+def test_the_scatter_has_a_panel_per_metric_with_every_agent_named(assessment):
+    panels = scatter(assessment).axes
+    assert [axes.get_xlabel() for axes in panels] == ["distance on the target", "time on the target"]
+    for column, axes in enumerate(panels):
+        points = next(line for line in axes.lines if line.get_marker() == "o")
+        np.testing.assert_array_equal(points.get_xdata(), assessment.inputs.target.means[:, column])
+        np.testing.assert_array_equal(points.get_ydata(), assessment.inputs.proxy.means[:, column])
+        named = {name for text in axes.texts for name in text.get_text().split(", ")}
+        assert named == set(assessment.inputs.agents)
+
+
+def test_error_bars_are_standard_errors(assessment):
+    axes = scatter(assessment).axes[0]
+    bars = axes.collections[0].get_segments()
+    values = assessment.inputs.target.values[0, :, 0]
+    half = np.ptp(bars[0][:, 0]) / 2
+    assert half == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)))
+
+
+def test_the_map_colours_each_pair_once_and_counts_them(assessment):
+    axes = flipped_pairs(assessment.prpv).axes[0]
+    cells = np.asarray(axes.collections[0].get_array().filled(np.nan))
+    kinds = list(FLIP_COLOURS)
+    drawn = {kind: int((cells == number).sum()) for number, kind in enumerate(kinds)}
+    for kind in kinds[1:]:
+        assert drawn[kind] == sum(pair.flip == kind for pair in assessment.prpv.pairs)
+    assert sum(drawn.values()) == 15
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"{k}: {n}" for k, n in drawn.items()]
+
+
+def test_constant_scores_and_two_agents_are_drawn_too(tmp_path):
+    flat = ScoreTable(("A", "B"), ("1",), ("distance", "time"), np.ones((2, 1, 2)))
+    found = assess(proxy=flat, target=flat, metrics=M)
+    assert scatter(found).axes[0].get_title() == "SRCC undefined"
+    for name, figure in (("one", scatter(found)), ("two", flipped_pairs(found.prpv))):
+        save(figure, tmp_path / "new" / f"{name}.png")
+        assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_figure_that_cannot_be_written_leaves_nothing_behind(assessment, tmp_path):
+    (tmp_path / "map.png").mkdir()
+    with pytest.raises(RunError, match=r"map\.png: the figure cannot be written"):
+        save(flipped_pairs(assessment.prpv), tmp_path / "map.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["map.png"]

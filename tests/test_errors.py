@@ -1,0 +1,15 @@
+"""The tree of exceptions is as drawn."""
+
+from proxytune import errors
+
+
+def test_every_exception_is_exported_and_in_the_drawing():
+    names = {name for name, thing in vars(errors).items() if isinstance(thing, type)}
+    assert names == set(errors.__all__)
+    assert all(name in (errors.__doc__ or "") for name in names)
+
+
+def test_bad_input_and_failed_runs_are_apart():
+    assert issubclass(errors.ScoresError, errors.InputError)
+    assert issubclass(errors.StoreError, errors.RunError)
+    assert not issubclass(errors.RunError, errors.InputError)

@@ -1,0 +1,184 @@
+"""Score tables are read strictly, written reproducibly and compared by stated metrics."""
+
+import numpy as np
+import pytest
+
+from proxytune.errors import InputError, ScoresError
+from proxytune.scores import Metric, ScoreTable, read_domains, read_scores, varies, write_scores
+
+GOOD = "agent,episode,distance,time\nA,1,1.5,10\nA,2,2.5,20\nB,1,3,30\n"
+
+
+@pytest.fixture
+def csv(tmp_path):
+    def write(text, name="scores.csv"):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("text", "metric"),
+    [
+        ("distance:max", Metric("distance")),
+        ("time:min:0.5", Metric("time", "min", 0.5)),
+        ("distance:max:5%", Metric("distance", "max", 5.0, percent=True)),
+        (" lap time : max : 1e-3 ", Metric("lap time", "max", 1e-3)),
+    ],
+)
+def test_a_metric_is_read_from_its_text_and_written_back(text, metric):
+    assert Metric.parse(text) == metric
+    assert Metric.parse(str(metric)) == metric
+
+
+@pytest.mark.parametrize(
+    "text", ["", "distance", "distance:up", "a:max:", "a:max:x", "a:max:5%%", "a:max:-1", "a:max:nan"]
+)
+def test_a_malformed_metric_is_refused_by_name(text):
+    with pytest.raises(InputError, match=r"metric '"):
+        Metric.parse(text)
+
+
+def test_a_percentage_is_of_the_largest_value_of_each_table():
+    merits, tie = Metric.parse("a:max:10%").merits(np.array([[1.0, 4.0], [10.0, 20.0]]))
+    np.testing.assert_allclose(merits, [[0.25, 1.0], [0.5, 1.0]])
+    np.testing.assert_allclose(tie, [[0.1], [0.1]])
+
+
+def test_where_less_is_better_merits_are_reversed():
+    for text in ("a:min", "a:min:10%"):
+        merits, _ = Metric.parse(text).merits(np.array([1.0, 4.0]))
+        assert merits[0] > merits[1]
+
+
+def test_a_table_keeps_episodes_counts_and_means(csv):
+    table = read_scores(csv(GOOD), ["distance", "time"])
+    assert (table.agents, table.episodes, table.metrics) == (("A", "B"), ("1", "2"), ("distance", "time"))
+    assert table.counts.tolist() == [2, 1]
+    assert table.means.tolist() == [[2.0, 15.0], [3.0, 30.0]]
+    assert not table.complete
+
+
+def test_only_the_metrics_asked_for_are_read(csv):
+    table = read_scores(csv("agent,comment,distance\nA,fine,1\nB,,2\n"), ["distance"])
+    assert table.means[:, 0].tolist() == [1.0, 2.0]
+
+
+def test_spreadsheets_marks_are_understood(csv):
+    table = read_scores(csv(b"\xef\xbb\xbfagent, episode ,distance\r\nA,1, 1.5\r\n\r\nB,1,2\r\n"), ["distance"])
+    assert table.means[:, 0].tolist() == [1.5, 2.0]
+
+
+def test_domains_are_read_apart(csv):
+    path = csv("domain,agent,distance\nsim,A,1\nreal,A,2\n")
+    assert list(read_domains(path, ["distance"])) == ["sim", "real"]
+    assert read_scores(path, ["distance"], "real").means[0, 0] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "is empty"),
+        ("\n\n", "is empty"),
+        ("agent,distance\n", "has no rows"),
+        ("robot,distance\nA,1\n", "no column 'agent'"),
+        ("agent;distance\nA;1\n", "no column 'agent'"),
+        ("agent,distanc\nA,1\n", "no column 'distance'; did you mean 'distanc'?"),
+        ("agent,distance,distance\nA,1,2\n", "column 'distance' twice"),
+        ("agent,distance\nA,1\nB,nan\n", "line 3, column 'distance': must be a finite number, got 'nan'"),
+        ("agent,distance\nA,1\nB,\n", "line 3, column 'distance': must be a finite number, got ''"),
+        ("agent,distance\nA,inf\n", "must be a finite number"),
+        ("agent,distance\nA,1e300\n", "must be a finite number"),
+        ("agent,distance\nA,far\n", "must be a finite number, got 'far'"),
+        ("agent,distance\nA\n", "line 2: has 1 cells, but the first line names 2"),
+        ("agent,distance\nA,1,2\n", "line 2: has 3 cells, but the first line names 2"),
+        ("agent,distance\n,1\n", "line 2, column 'agent': is empty"),
+        ("agent,episode,distance\nA,,1\n", "line 2, column 'episode': is empty"),
+        ("agent,distance\nA,1\nA,2\n", "line 3: agent 'A' is there twice; add a column 'episode'"),
+        ("agent,episode,distance\nA,1,1\nA,1,2\n", "line 3: agent 'A' has episode '1' twice"),
+        ("domain,agent,distance\nx,A,1\ny,A,1\nx,A,2\n", "line 4: agent 'A' is there twice in domain 'x'"),
+        (b"\x89PNG\r\n\x1a\n\xff", "is not a CSV file"),
+        ('agent,distance\n"A,1\n', "is not a CSV file"),
+        ('{"agent": "A"}', "no column 'agent'"),
+    ],
+)
+def test_a_bad_file_gives_one_line_with_file_place_and_remedy(csv, text, complaint):
+    path = csv(text)
+    with pytest.raises(ScoresError) as problem:
+        read_scores(path, ["distance"])
+    assert str(problem.value).startswith(f"{path}: ")
+    assert complaint in str(problem.value)
+    assert "\n" not in str(problem.value)
+
+
+def test_the_domain_must_be_chosen_and_known(csv, tmp_path):
+    path = csv("domain,agent,distance\nsim,A,1\nreal,A,2\n")
+    with pytest.raises(ScoresError, match="has the domains sim, real; choose one"):
+        read_scores(path, ["distance"])
+    with pytest.raises(ScoresError, match="no domain 'rael'; did you mean 'real'"):
+        read_scores(path, ["distance"], "rael")
+    with pytest.raises(ScoresError, match="has no column 'domain'"):
+        read_scores(csv(GOOD), ["distance"], "real")
+    with pytest.raises(ScoresError, match="no such file"):
+        read_scores(tmp_path / "none.csv", ["distance"])
+    with pytest.raises(ScoresError, match="cannot be read"):
+        read_scores(tmp_path, ["distance"])
+
+
+def test_writing_gives_the_same_bytes_and_reading_the_same_values(csv, tmp_path):
+    table = read_scores(csv(GOOD.replace("1.5", "0.1")), ["distance", "time"])
+    write_scores(table, tmp_path / "one.csv")
+    write_scores(read_scores(tmp_path / "one.csv", ["distance", "time"]), tmp_path / "two.csv")
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+    assert (
+        tmp_path / "one.csv"
+    ).read_text() == "agent,episode,distance,time\nA,1,0.1,10.0\nA,2,2.5,20.0\nB,1,3.0,30.0\n"
+
+
+def test_a_table_that_cannot_be_written_leaves_nothing_behind(csv, tmp_path):
+    table = read_scores(csv(GOOD), ["distance"])
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(ScoresError, match="cannot be written"):
+        write_scores(table, tmp_path / "none" / "x.csv")
+    with pytest.raises(ScoresError, match="cannot be written"):
+        write_scores(table, tmp_path / "folder")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "scores.csv"]
+
+
+def test_a_table_is_built_from_finished_episodes():
+    table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("B", 1): {"m": 2.0}, ("A", 2): {"m": 3.0}})
+    assert table.means[:, 0].tolist() == [2.0, 2.0]
+    assert table.driven.tolist() == [[True, True], [True, False]]
+
+
+@pytest.mark.parametrize(
+    "scored", [{}, {("A", 1): {"m": float("nan")}}, {("A", 1): {"m": 1.0, "n": 1.0}, ("A", 2): {"m": 1.0}}]
+)
+def test_episodes_without_a_finite_score_are_refused(scored):
+    with pytest.raises(ScoresError):
+        ScoreTable.from_episodes(scored)
+
+
+def test_an_unknown_metric_is_refused_with_the_nearest_name():
+    table = ScoreTable.from_episodes({("A", 1): {"distance": 1.0}})
+    with pytest.raises(ScoresError, match="no metric 'distanz' in the scores; did you mean 'distance'"):
+        table.select(["distanz"])
+
+
+def test_unpaired_episodes_share_no_label_and_keep_the_means():
+    table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("A", 2): {"m": 4.0}, ("B", 1): {"m": 2.0}})
+    loose = table.unpaired()
+    assert loose.driven.sum(axis=0).tolist() == [1, 1, 1]
+    np.testing.assert_array_equal(loose.means, table.means)
+
+
+def test_arranging_moves_values_with_their_names():
+    table = ScoreTable.from_episodes({(a, e): {"m": 10.0 * i + e} for i, a in enumerate("AB") for e in (1, 2)})
+    moved = table.arrange(agents=("B", "A"), episodes=("2", "1"))
+    assert moved.values[:, :, 0].tolist() == [[12.0, 11.0], [2.0, 1.0]]
+
+
+def test_rounding_is_no_variation():
+    assert varies(np.array([[0.3, 1.0], [0.1 + 0.2, 2.0]])).tolist() == [False, True]

@@ -1,0 +1,72 @@
+"""Settings files are read strictly: each mistake is one line with file, key and remedy."""
+
+import pytest
+
+from proxytune.errors import SettingsError
+from proxytune.settings import Section, nearest, read_settings
+
+
+def section(path, **values):
+    return Section(path, "", values)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda s: s.number("a"), "a: is missing; add it"),
+        (lambda s: s.number("text"), "text: must be a number, got 'x'"),
+        (lambda s: s.number("yes"), "yes: must be a number, got True"),
+        (lambda s: s.number("nan"), "nan: must be finite"),
+        (lambda s: s.number("n", low=5), "n: must be between 5 and inf, got 3"),
+        (lambda s: s.whole("half"), "half: must be a whole number, got 0.5"),
+        (lambda s: s.whole("n", high=2), "n: must be between 0 and 2, got 3"),
+        (lambda s: s.text("n"), "n: must be text in quotes, got 3"),
+        (lambda s: s.text("text", choices=("xy", "z")), "text: unknown value 'x'; did you mean 'xy'?"),
+        (lambda s: s.texts("n"), "n: must be a list of texts in quotes"),
+        (lambda s: s.texts("twice"), "twice: names something twice"),
+        (lambda s: s.bounds("reversed"), "reversed: the lower bound must be below the upper one, got [2, 1]"),
+        (lambda s: s.bounds("n"), "n: must be [low, high], got 3"),
+        (lambda s: s.bounds("open"), "open: bounds must be finite"),
+        (lambda s: s.section("n"), "n: must be a table, written [n], got 3"),
+        (lambda s: s.only(["text", "number"]), "unknown key"),
+    ],
+)
+def test_a_mistake_names_file_key_and_remedy(tmp_path, call, says):
+    values = {"n": 3, "text": "x", "yes": True, "nan": float("nan"), "half": 0.5, "twice": ["a", "a"]}
+    values |= {"reversed": [2, 1], "open": [0, float("inf")]}
+    with pytest.raises(SettingsError) as caught:
+        call(section(tmp_path / "study.toml", **values))
+    assert says in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "study.toml"))
+    assert "\n" not in str(caught.value)
+
+
+def test_good_values_are_taken_as_they_are(tmp_path):
+    s = section(tmp_path, n=3, x=0.5, t="a", ts=["a", "b"], b=[1, 2.5], deep={"k": 1})
+    assert (s.number("n"), s.whole("n"), s.number("x"), s.text("t"), s.texts("ts")) == (3.0, 3, 0.5, "a", ("a", "b"))
+    assert s.bounds("b") == (1.0, 2.5)
+    assert s.section("deep").whole("k") == 1
+    assert s.section("none").values == {}
+    assert (s.number("gone", 2.0), s.text("gone", "d"), s.texts("gone", ("e",))) == (2.0, "d", ("e",))
+
+
+@pytest.mark.parametrize(
+    ("content", "says"), [(None, "no such file"), (b"a = [1", "is not valid TOML"), (b"\xff\xfe", "cannot be read")]
+)
+def test_a_file_that_is_not_toml_is_one_line(tmp_path, content, says):
+    path = tmp_path / "study.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(SettingsError, match=says) as caught:
+        read_settings(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_in_place_of_a_file_is_one_line(tmp_path):
+    with pytest.raises(SettingsError, match="cannot be read"):
+        read_settings(tmp_path)
+
+
+def test_the_nearest_name_is_suggested_and_otherwise_all():
+    assert nearest("trimm", ["trim", "delay"]) == "did you mean 'trim'?"
+    assert nearest("zzz", ["trim", "delay"]) == "known are: delay, trim"

@@ -1,0 +1,105 @@
+"""The bootstrap keeps pairs together, tells when it cannot be had, and covers what it claims to cover."""
+
+import numpy as np
+import pytest
+
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness import bootstrap_prpv, compare, resampling
+from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.usefulness.resampling import bootstrap_means, draw_counts
+
+M = (Metric("m"), Metric("n"))
+
+
+def table(values, labels=None):
+    agents, episodes, _ = values.shape
+    labels = labels or [str(e) for e in range(episodes)]
+    return ScoreTable(tuple(f"A{i}" for i in range(agents)), tuple(labels), ("m", "n"), values)
+
+
+def noisy(seed, agents=6, episodes=5, noise=1.0):
+    rng = np.random.default_rng(seed)
+    return table(rng.normal(size=(agents, 1, 2)) + noise * rng.normal(size=(agents, episodes, 2)))
+
+
+def test_paired_episodes_are_resampled_alike_for_all_agents_and_both_domains():
+    """Scores that depend on the start alone stay equal in every resample."""
+    starts = np.random.default_rng(0).normal(size=(1, 5, 2)).repeat(4, axis=0)
+    means = bootstrap_means(compare(proxy=table(starts), target=table(starts), metrics=M), resamples=50, seed=1)
+    np.testing.assert_array_equal(means[0], means[1])
+    assert np.ptp(means[0], axis=1).max() == 0.0
+    assert np.ptp(means[0], axis=0).min() > 0.0
+
+
+def test_episodes_of_other_labels_are_resampled_apart():
+    starts = np.random.default_rng(0).normal(size=(1, 5, 2)).repeat(4, axis=0)
+    inputs = compare(proxy=table(starts, "abcde"), target=table(starts), metrics=M)
+    means = bootstrap_means(inputs, resamples=50, seed=1)
+    assert np.abs(means[0] - means[1]).max() > 0.0
+
+
+def test_each_agent_keeps_its_own_number_of_episodes():
+    values = np.random.default_rng(0).normal(size=(3, 4, 2))
+    values[0, 2:], values[1, 0] = np.nan, np.nan
+    uneven = table(values)
+    counts = draw_counts(uneven, np.random.default_rng(2), 100)
+    assert (counts.sum(axis=-1) == np.array([[2], [3], [4]])).all()
+    assert not counts[~np.isnan(values[:, None, :, 0]).repeat(100, axis=1) == 0].any()
+    result = bootstrap_prpv(proxy=uneven, target=noisy(3, agents=3), metrics=M, seed=0)
+    assert result.low <= result.value <= result.high
+
+
+def test_identical_tables_stay_identical_in_every_resample():
+    same = noisy(1)
+    result = bootstrap_prpv(proxy=same, target=same, metrics=M)
+    assert (result.value, result.expected, result.low, result.high) == (0, 0.0, 0.0, 0.0)
+
+
+def test_the_same_seed_gives_the_same_interval_and_another_seed_another():
+    sides = {"proxy": noisy(1, episodes=9), "target": noisy(2, episodes=9), "metrics": M}
+    first, again, other = (bootstrap_prpv(**sides, seed=seed) for seed in (1, 1, 2))
+    assert (first.expected, first.low, first.high) == (again.expected, again.low, again.high)
+    assert first.expected != other.expected
+
+
+def test_without_noise_the_interval_is_a_point():
+    still = {"proxy": noisy(1, noise=0.0), "target": noisy(2, noise=0.0)}
+    result = bootstrap_prpv(**still, metrics=M)
+    assert result.low == result.high == result.value == result.expected
+    assert result.value > 0
+
+
+def test_one_episode_gives_no_interval_and_says_why():
+    for sides, where in (((1, 5), "in the proxy"), ((5, 1), "on the target")):
+        result = bootstrap_prpv(proxy=noisy(1, episodes=sides[0]), target=noisy(2, episodes=sides[1]), metrics=M)
+        assert result.low is result.high is result.expected is None
+        assert f"each agent has one episode {where}" in result.reason
+    uneven = noisy(1).values.copy()
+    uneven[3, 1:] = np.nan
+    assert "agent 'A3' has one" in bootstrap_prpv(proxy=table(uneven), target=noisy(2), metrics=M).reason
+
+
+def test_blocks_change_nothing(monkeypatch):
+    sides = {"proxy": noisy(1), "target": noisy(2), "metrics": M}
+    whole = bootstrap_prpv(**sides)
+    monkeypatch.setattr(resampling, "BLOCK", 100)
+    assert bootstrap_prpv(**sides).expected == whole.expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("paired", [True, False])
+def test_the_interval_covers_the_expected_prpv_at_about_the_nominal_rate(paired):
+    """Over 300 repeated experiments; the expected PRPV itself is the mean over 20 000 of them."""
+    agents, episodes, noise = 10, 8, 0.7
+    rng = np.random.default_rng(5)
+    truth = rng.normal(size=(2, agents, 2)) * [[[0.5]], [[1.0]]]
+    truth[0] += truth[1]
+    many = truth[:, None] + noise / np.sqrt(episodes) * rng.normal(size=(2, 20_000, agents, 2))
+    expected = prpv_of_means(many[0], many[1], M).mean()
+    held = []
+    for seed in range(300):
+        sides = [table(mean[:, None] + noise * rng.normal(size=(agents, episodes, 2))) for mean in truth]
+        sides = sides if paired else [side.unpaired() for side in sides]
+        result = bootstrap_prpv(proxy=sides[0], target=sides[1], metrics=M, resamples=300, seed=seed)
+        held.append(result.low <= expected <= result.high)
+    assert np.mean(held) == 5

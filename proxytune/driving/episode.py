@@ -78,18 +78,15 @@ class _View:
         self._shape = first.shape[1:]
         setting = Setting(TICK_HZ, first.reshape(-1), instance.robot.figures, seed)
         self._memory = self._chain.begin(setting)
-        self._ticks = 0
+        self._waiting = np.empty((0, 3))
         self.picture: Picture = self._develop(first)
 
     def pass_by(self, poses: Signal) -> None:
         """Let the shutter see the poses of the next ticks."""
-        due = self._every - self._ticks % self._every
-        for begin, end in ((0, min(due, len(poses))), (due, len(poses))):
-            if begin < end:
-                self._ticks += end - begin
-                picture = self._develop(self._camera.render(poses[begin:end]))
-                if self._ticks % self._every == 0:
-                    self.picture = picture
+        self._waiting = np.concatenate((self._waiting, poses))
+        while len(self._waiting) >= self._every:
+            seen, self._waiting = self._waiting[: self._every], self._waiting[self._every :]
+            self.picture = self._develop(self._camera.render(seen))
 
     def _develop(self, pictures: NDArray[np.uint8]) -> Picture:
         signal = pictures.reshape(len(pictures), -1)

@@ -17,11 +17,10 @@ from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import TICK_HZ, Course, Drive, Instance, drive
-from proxytune.driving.lane import off_map
 from proxytune.driving.maps import MAPS
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
-from proxytune.driving.robot import Robot, read_robot
+from proxytune.driving.robot import Robot, read_robot, robot_names
 from proxytune.driving.texture import Floor, draw_floor
 from proxytune.effects import (
     PARAMETERS,
@@ -116,7 +115,7 @@ class LaneFollowing:
         road = MAPS[self.map]
         noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
         start = task.start_pose(road, episode.start, seed=episode.seed, **noise)
-        course = Course(np.asarray(start), self.seconds, episode.seed, functools.partial(off_map, road))
+        course = Course(np.asarray(start), self.seconds, episode.seed, functools.partial(task.off_map, road))
         instance = self.instance(dict(episode.theta))
         agent = load_agent(episode.agent, self.folder)
         try:
@@ -178,12 +177,12 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     """
     section.only(("robot", "plant", "camera", "map", "seconds", "position_noise_m", "heading_noise_deg", "effects"))
     given = read_model(model) if model else None
-    robot = _agreed(section, "robot", given.robot if given else None, "duckiebot")
-    plant = _agreed(section, "plant", given.plant if given else None, "bullet")
+    robot = _agreed(section, "robot", given.robot if given else None, "duckiebot", robot_names())
+    plant = _agreed(section, "plant", given.plant if given else None, "bullet", PLANTS)
     theta, _ = read_effects(section.section("effects"))
     effects = {**(given.theta if given else {}), **theta}
-    family = LaneFollowing(
-        robot=read_robot(robot).name,
+    return LaneFollowing(
+        robot=robot,
         plant=plant,
         camera=section.text("camera", "ground_plane", choices=CAMERAS),
         map=section.text("map", "small_loop", choices=MAPS),
@@ -193,12 +192,12 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
         effects=tuple(sorted(effects.items())),
         folder=section.path.resolve().parent,
     )
-    if plant not in PLANTS:
-        raise section.error("plant", f"unknown value '{plant}'; {nearest(plant, PLANTS)}")
-    return family
 
 
-def _agreed(section: Section, key: str, of_model: str | None, default: str) -> str:
-    if key in section.values and of_model is not None and section.text(key) != of_model:
-        raise section.error(key, f"is '{section.text(key)}' but the model says '{of_model}'; take one of them out")
-    return of_model or section.text(key, default)
+def _agreed(section: Section, key: str, of_model: str | None, default: str, known: tuple[str, ...]) -> str:
+    value = section.text(key, of_model or default)
+    if of_model is not None and value != of_model:
+        raise section.error(key, f"is '{value}' but the model says '{of_model}'; take one of them out")
+    if value not in known:
+        raise section.error(key, f"unknown value '{value}'; {nearest(value, known)}")
+    return value

@@ -1,82 +1,97 @@
-"""Where on the road a robot is: which lane it should be in, how far along it, and how far beside its centre."""
+"""The lanes of a loop road as geometry: how far along, how far aside and how askew a robot is."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.driving.maps import LoopMap
 
-Numbers = NDArray[np.floating[Any]]
+Values = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
-class LanePosition(NamedTuple):
-    """Positions in the lanes that their headings belong to, each of shape (…,).
+class LanePose(NamedTuple):
+    """Poses as seen from the lanes they are in, each field of shape (…).
 
     Attributes:
-        outer: Whether the lane is the outer one, which runs counter-clockwise; the inner one runs clockwise.
-        along: Arc length along the lane's centre line in its direction [m], from 0 to the lap's length.
-        deviation: Distance from the lane's centre line [m], positive to the left of its direction.
-        heading_error: Heading less the lane's direction [rad], within ±π/2.
-        lap: Length of the lane's centre line [m].
+        counter_clockwise: Whether it is the outer lane (right-hand traffic), else the inner, clockwise one.
+        along: Arc length along that lane's centre line in its direction [m], from 0 to its length.
+        deviation: Distance from that centre line [m], positive to the left of travel.
+        heading_error: Heading less the lane's direction [rad], from −π/2 to π/2, positive to the left.
     """
 
-    outer: NDArray[np.bool_]
-    along: Numbers
-    deviation: Numbers
-    heading_error: Numbers
-    lap: Numbers
+    counter_clockwise: Flags
+    along: Values
+    deviation: Values
+    heading_error: Values
 
 
-def lap_length(road: LoopMap, *, outer: bool) -> float:
-    """Length of a lane's centre line [m]: four straights and four quarter circles."""
-    radius = road.tile / 2.0 + (road.lane_offset if outer else -road.lane_offset)
-    return 4.0 * _straight(road) + 2.0 * np.pi * radius
+class _Projection(NamedTuple):
+    """The nearest point of the road's centre line, which lies half a tile around the square of the inner tiles.
 
-
-def lane_position(road: LoopMap, poses: Numbers) -> LanePosition:
-    """Find poses (…, 3) of x [m], y [m], heading [rad] in the lane whose direction agrees with the heading.
-
-    The road's centre line lies half a tile outside the square that the loop runs round; every point is projected on
-    it, whether on the road or not.
+    Attributes:
+        normal: Direction that points out of the loop there, from 0 to 2π [rad].
+        edges: Way along that square's edges from where the normal is 0 [m], counter-clockwise.
+        outside: Signed distance from the road's centre line, outside the loop positive [m].
     """
-    direction, edge, turned, outward = _around(road, np.asarray(poses, dtype=float))
-    error = np.remainder(poses[..., 2] - direction + np.pi, 2.0 * np.pi) - np.pi
-    outer = np.abs(error) <= np.pi / 2.0
-    radius = road.tile / 2.0 + np.where(outer, road.lane_offset, -road.lane_offset)
-    lap = 4.0 * _straight(road) + 2.0 * np.pi * radius
-    anticlockwise = edge + radius * turned
-    return LanePosition(
-        outer,
-        np.remainder(np.where(outer, anticlockwise, lap - anticlockwise), lap),
-        np.where(outer, road.lane_offset - outward, road.lane_offset + outward),
-        np.where(outer, error, error - np.sign(error) * np.pi),
-        lap,
+
+    normal: Values
+    edges: Values
+    outside: Values
+
+
+def lane_length(road: LoopMap, counter_clockwise: Flags | bool) -> Values:
+    """Length of one lap along the centre line of the outer (counter-clockwise) or inner (clockwise) lane [m]."""
+    edges = 4.0 * (road.tiles - 2) * road.tile
+    return np.asarray(edges + 2.0 * np.pi * _corner_radius(road, counter_clockwise))
+
+
+def lane_pose(road: LoopMap, positions: Values, headings: Values) -> LanePose:
+    """See poses from the lane whose direction agrees with their heading.
+
+    What counts is the centre line's nearest point, so every finite pose has a finite answer, off the map too.
+    The deviation from either lane is continuous everywhere; along and heading error jump only
+    where two sides are equally near: on the diagonals of the square that the road encloses.
+
+    Args:
+        road: The map.
+        positions: x and y [m], shape (…, 2).
+        headings: Counter-clockwise from the x axis [rad], shape (…).
+    """
+    normal, edges, outside = _project(road, positions)
+    outer = np.sin(headings - normal) >= 0.0
+    sense = np.where(outer, 1.0, -1.0)
+    way = sense * (edges + _corner_radius(road, outer) * normal)
+    turned = headings - normal - sense * np.pi / 2.0
+    return LanePose(
+        counter_clockwise=outer,
+        along=np.mod(way, lane_length(road, outer)),
+        deviation=road.lane_offset - sense * outside,
+        heading_error=np.arctan2(np.sin(turned), np.cos(turned)),
     )
 
 
-def _straight(road: LoopMap) -> float:
-    return (road.tiles - 2) * road.tile
+def off_map(road: LoopMap, x: float, y: float) -> bool:
+    """Whether a point [m] lies beyond the map's edge; a point that is not a number does."""
+    return not (0.0 <= x <= road.side and 0.0 <= y <= road.side)
 
 
-def _around(road: LoopMap, poses: Numbers) -> tuple[Numbers, Numbers, Numbers, Numbers]:
-    """Counter-clockwise round the inner square: direction [rad], straights passed [m], angle turned [rad], and
-    distance outwards from the road's centre line [m]."""
-    side, half = _straight(road), _straight(road) / 2.0
-    x, y = poses[..., 0] - road.side / 2.0, poses[..., 1] - road.side / 2.0
-    over_x, over_y = np.abs(x) - half, np.abs(y) - half
-    corner = (over_x > 0.0) & (over_y > 0.0)
-    vertical = over_x > over_y  # nearest to the east or west edge
-    normal = np.where(vertical, np.where(x > 0.0, 0.0, np.pi), np.where(y > 0.0, np.pi / 2.0, -np.pi / 2.0))
-    across = np.arctan2(np.maximum(over_y, 0.0) * np.sign(y), np.maximum(over_x, 0.0) * np.sign(x))
-    normal = np.where(corner, across, normal)
-    outward = np.where(corner, np.hypot(over_x, over_y), np.maximum(over_x, over_y)) - road.tile / 2.0
-    turned = np.remainder(normal + np.pi / 2.0, 2.0 * np.pi)  # from the southern edge on
-    quarters = turned / (np.pi / 2.0)
-    passed = np.where(corner, np.floor(quarters), np.rint(quarters))
-    ahead = np.select(
-        [corner, vertical & (x > 0.0), vertical, y > 0.0],
-        [np.full_like(x, side), y + half, half - y, half - x],
-        x + half,
-    )
-    return normal + np.pi / 2.0, passed * side + np.clip(ahead, 0.0, side), turned, outward
+def _corner_radius(road: LoopMap, counter_clockwise: Flags | bool) -> Values:
+    return road.tile / 2.0 + np.where(counter_clockwise, road.lane_offset, -road.lane_offset)
+
+
+def _project(road: LoopMap, positions: Values) -> _Projection:
+    half = (road.tiles - 2) * road.tile / 2.0
+    x, y = np.moveaxis(np.asarray(positions, dtype=float) - road.side / 2.0, -1, 0)
+    out_x, out_y = x - np.clip(x, -half, half), y - np.clip(y, -half, half)
+    enclosed = (out_x == 0.0) & (out_y == 0.0)
+    sideways = np.abs(x) >= np.abs(y)
+    out_x = np.where(enclosed & sideways, np.copysign(1.0, x), out_x)
+    out_y = np.where(enclosed & ~sideways, np.copysign(1.0, y), out_y)
+    normal = np.mod(np.arctan2(out_y, out_x), 2.0 * np.pi)
+    side = np.floor(normal / (np.pi / 2.0))  # 0 right, 1 top, 2 left, 3 bottom; a corner belongs to the side before it
+    past = np.choose(side.astype(int) % 4, (y, -x, -y, x))
+    edges = 2.0 * half * side + np.clip(past, -half, half) + half
+    distance = np.where(enclosed, np.maximum(np.abs(x), np.abs(y)) - half, np.hypot(out_x, out_y))
+    return _Projection(normal, edges, distance - road.tile / 2.0)

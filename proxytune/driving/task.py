@@ -1,73 +1,101 @@
-"""The lane-following task: where an episode starts, when it is over, and what a trajectory is worth."""
+"""The lane-following task: where an episode starts, and what a drive is worth.
 
+An episode ends when the axle's middle leaves the map, when the robot hits something, or when its time is over. The
+lane of a pose is the one whose direction agrees with its heading (right-hand traffic); a robot is in it
+while it is at most half a lane width from its centre line. So whoever drives the wrong way is in neither lane.
+"""
+
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
-from proxytune.driving.lane import LanePosition, Numbers, lane_position
+from proxytune.driving.lane import LanePose, lane_length, lane_pose
 from proxytune.driving.maps import LoopMap
+from proxytune.errors import EpisodeError
+
+Values = NDArray[np.float64]
 
 METRICS: Mapping[str, str] = MappingProxyType(
     {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"}
 )
-"""The task's metrics with their units."""
+"""What an episode yields, with units."""
 
 
 def start_pose(
     road: LoopMap, index: int, *, seed: int, position_noise_m: float, heading_noise_deg: float
-) -> Numbers:
-    """A start of the map, put down as well as a person can: (3,) x [m], y [m], heading [rad].
+) -> tuple[float, float, float]:
+    """Put the robot down at one of the map's starts, as exactly as a hand does.
 
     Args:
         road: The map.
-        index: Which of its starts.
-        seed: Together with the index it determines the noise.
+        index: Which start.
+        seed: Seed of the episode; the same seed and index give the same pose.
         position_noise_m: Standard deviation of x and of y [m].
         heading_noise_deg: Standard deviation of the heading [deg].
+
+    Returns:
+        x [m], y [m], heading [rad].
     """
-    x, y, heading = road.starts[index]
-    noise = np.random.default_rng((seed, index)).normal(size=3)
-    spread = np.array((position_noise_m, position_noise_m, np.radians(heading_noise_deg)))
-    return np.array((x, y, np.radians(heading))) + spread * noise
+    x, y, heading_deg = road.starts[index]
+    noise = np.random.default_rng((seed, index)).standard_normal(3)
+    heading = math.radians(heading_deg + heading_noise_deg * float(noise[2]))
+    return x + position_noise_m * float(noise[0]), y + position_noise_m * float(noise[1]), heading
 
 
-def off_map(road: LoopMap, x: float, y: float) -> bool:
-    """Whether the middle of the axle at x, y [m] has left the map."""
-    return not (0.0 <= x <= road.side and 0.0 <= y <= road.side)
+def score_trajectory(road: LoopMap, poses: Values, *, tick_s: float, seconds: float) -> dict[str, float]:
+    """Score a drive by the task's metrics.
 
+    - distance [m]: net way along the lane's centre line in its direction, counted while in the lane; a step against it
+      is negative. A step from one lane to the other counts nothing, one across a lane's edge counts half.
+    - survival_time [s]: from the first pose to the first one off the map, or the last one; at most `seconds`.
+    - time_out_of_lane [s]: time until then that was not spent in the lane.
+    - deviation [m]: mean over that time of the distance from the lane's centre line, in the lane or out of it.
 
-def score_trajectory(road: LoopMap, poses: Numbers, *, tick_s: float, seconds: float) -> Mapping[str, float]:
-    """What a trajectory is worth.
-
-    - distance: Progress along the lane in its direction [m], steps against it negative, counted while the robot is
-      in the lane that its heading belongs to (within half a lane's width of its centre line).
-    - survival_time: Until it leaves the map or the episode ends [s], at most `seconds`.
-    - time_out_of_lane: Time spent further than half a lane's width from that centre line [s].
-    - deviation: Mean distance from that centre line [m].
+    Distances and times of a drive's parts, the pose at the cut in both, add up to the whole drive's.
 
     Args:
         road: The map.
-        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
-        tick_s: Length of a tick [s].
-        seconds: Longest time an episode takes [s].
+        poses: x [m], y [m], heading [rad] at a constant rate, shape (samples, 3); the last one is where the robot hit
+            something, if it did.
+        tick_s: Time between two poses [s].
+        seconds: When time is over [s].
+
+    Raises:
+        EpisodeError: If a pose is not finite.
     """
-    gone = ~((poses[:, :2] >= 0.0) & (poses[:, :2] <= road.side)).all(axis=1)
-    ticks = int(np.argmax(gone)) if gone.any() else len(poses) - 1
-    lane = lane_position(road, poses[: ticks + 1])
-    inside = np.abs(lane.deviation) <= road.lane_width / 2.0
+    driven = _driven(road, poses, tick_s=tick_s, seconds=seconds)
+    pose = lane_pose(road, driven[:, :2], driven[:, 2])
+    aside = np.abs(pose.deviation)
+    in_lane = _over_steps((aside <= road.lane_width / 2.0).astype(float))
     return {
-        "distance": float(_progress(lane, inside).sum()),
-        "survival_time": min(ticks * tick_s, seconds),
-        "time_out_of_lane": float((~inside[1:]).sum() * tick_s),
-        "deviation": float(np.abs(lane.deviation).mean()),
+        "distance": float(np.sum(in_lane * _steps_along(road, pose))),
+        "survival_time": tick_s * len(in_lane),
+        "time_out_of_lane": tick_s * float(np.sum(1.0 - in_lane)),
+        "deviation": float(np.mean(_over_steps(aside))) if len(in_lane) else float(aside[0]),
     }
 
 
-def _progress(lane: LanePosition, inside: np.ndarray) -> Numbers:
-    """Progress of each step [m]: none across a change of lane or outside of it."""
-    step = np.diff(lane.along)
-    lap = lane.lap[1:]
-    step = np.remainder(step + lap / 2.0, lap) - lap / 2.0
-    same = (lane.outer[1:] == lane.outer[:-1]) & inside[1:] & inside[:-1]
-    return np.where(same, step, 0.0)
+def _driven(road: LoopMap, poses: Values, *, tick_s: float, seconds: float) -> Values:
+    """The poses until time is over or the first one is off the map, that one included."""
+    in_time = poses[: math.floor(seconds / tick_s + 1e-9) + 1]  # 1e-9: a whole number of ticks may divide to just less
+    off = np.any((in_time[:, :2] < 0.0) | (in_time[:, :2] > road.side), axis=1)
+    driven = in_time[: int(np.argmax(off)) + 1] if off.any() else in_time
+    if not np.isfinite(driven).all():
+        step = int(np.argmin(np.isfinite(driven).all(axis=1)))
+        raise EpisodeError(f"the pose is not finite at {step * tick_s:.2f} s; the plant cannot follow these commands")
+    return driven
+
+
+def _steps_along(road: LoopMap, pose: LanePose) -> Values:
+    """Way along the lane from each pose to the next [m], the short way round the loop."""
+    lap = lane_length(road, pose.counter_clockwise[:-1])
+    way = np.mod(np.diff(pose.along) + lap / 2.0, lap) - lap / 2.0
+    return np.where(pose.counter_clockwise[1:] == pose.counter_clockwise[:-1], way, 0.0)
+
+
+def _over_steps(values: Values) -> Values:
+    """Mean over each step of what was sampled at its two ends."""
+    return (values[:-1] + values[1:]) / 2.0

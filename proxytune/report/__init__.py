@@ -1,0 +1,1 @@
+"""What is found, for people: figures, tables, pages and JSON documents."""

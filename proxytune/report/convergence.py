@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from proxytune.study.result import StudyResult
-from proxytune.study.store import TrialRecord
 
 BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"  # Okabe and Ito, safe for the colour-blind
 
@@ -23,8 +23,8 @@ def convergence(result: StudyResult) -> Figure:
     axes.set_xlabel("trial", fontsize=8)
     axes.set_ylabel("PRPV [ordered pairs of agents]", fontsize=8)
     axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
-    axes.xaxis.get_major_locator().set_params(integer=True)
-    axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.tick_params(labelsize=7)
     axes.spines[["top", "right"]].set_visible(False)
     handles, labels = axes.get_legend_handles_labels()
@@ -42,22 +42,23 @@ def _levels(axes: Axes, result: StudyResult) -> None:
 
 
 def _trials(axes: Axes, result: StudyResult) -> None:
-    scored = [trial for trial in result.trials if trial.prpv is not None]
+    scored = [(trial.number, trial.prpv) for trial in result.trials if trial.prpv is not None]
     failed = [trial.number for trial in result.trials if trial.prpv is None]
     initial = result.study.settings.initial
-    _points(axes, [trial for trial in scored if trial.number <= initial], "white", "design")
-    _points(axes, [trial for trial in scored if trial.number > initial], BLUE, "proposed")
+    _points(axes, [point for point in scored if point[0] <= initial], "white", "design")
+    _points(axes, [point for point in scored if point[0] > initial], BLUE, "proposed")
     if failed:
         axes.plot(failed, np.zeros(len(failed)), "x", color=VERMILLION, markersize=4, label="failed")
-    numbers = [trial.number for trial in scored]
-    lowest = np.minimum.accumulate([trial.prpv for trial in scored if trial.prpv is not None])
+    numbers, scores = zip(*scored, strict=True)
+    lowest = np.minimum.accumulate(scores)
     last = result.trials[-1].number
     axes.step([*numbers, last], [*lowest, lowest[-1]], where="post", color=ORANGE, linewidth=1.5, label="lowest so far")
-    best = result.best.trial
-    axes.plot(best.number, best.prpv, "o", color=VERMILLION, fillstyle="none", markersize=9, label="best θ")
+    best = result.best
+    ring = {"color": VERMILLION, "fillstyle": "none", "markersize": 9}
+    axes.plot(best.trial.number, best.assessment.prpv.value, "o", label="best θ", **ring)
 
 
-def _points(axes: Axes, trials: list[TrialRecord], face: str, label: str) -> None:
-    if trials:
-        numbers, scores = [trial.number for trial in trials], [trial.prpv for trial in trials]
+def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) -> None:
+    if points:
+        numbers, scores = zip(*points, strict=True)
         axes.plot(numbers, scores, "o", color=BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)

@@ -53,6 +53,8 @@ def study_table(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Re
         table.add_column(column)
     for row in best_theta(result):
         table.add_row(*row)
-    head = f"{settings.name}: {len(result.trials)} of {settings.budget} trials; best is trial {result.best.trial.number}"
+    head = (
+        f"{settings.name}: {len(result.trials)} of {settings.budget} trials; best is trial {result.best.trial.number}"
+    )
     lines = [*usefulness_lines(result), spent, *(f"{what}: {path}" for what, path in files.items())]
     return Group(Text(head), table, *(Text(line) for line in lines))

@@ -6,14 +6,13 @@ import pickle
 import sys
 import time
 from collections.abc import Generator, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, cast
 
 from joblib import Parallel, delayed
-from joblib.externals import cloudpickle
-from joblib.externals.loky.process_executor import BrokenProcessPool
 from threadpoolctl import threadpool_limits
 
 from proxytune.domain import DomainFamily, Episode
@@ -51,7 +50,7 @@ def _here(family: DomainFamily, episodes: Sequence[Episode]) -> Generator[Outcom
 
 
 def _spread(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Generator[Outcome, None, None]:
-    recipe = _Recipe(cloudpickle.dumps(family), tuple(sys.path))
+    recipe = _Recipe(pickle.dumps(family), tuple(sys.path))
     parallel = Parallel(n_jobs=min(jobs, max(1, len(episodes))), batch_size=1, return_as="generator_unordered")
     outcomes = parallel(delayed(_run_pickled)(recipe, episode) for episode in episodes)
     return cast("Generator[Outcome, None, None]", outcomes)
@@ -110,7 +109,7 @@ def _checked(family: DomainFamily, episode: Episode, result: Any) -> dict[str, f
 def _told(outcomes: Iterator[Outcome]) -> Iterator[Outcome]:
     try:
         yield from outcomes
-    except BrokenProcessPool:
+    except BrokenExecutor:
         raise RunError(
             "a process that ran episodes was killed (out of memory?); run again to go on, perhaps with jobs = 1"
         ) from None

@@ -1,6 +1,8 @@
 """The loop of a study: propose, simulate, score, until the budget is spent."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 from proxytune.errors import RunError, SettingsError
 from proxytune.search.proposer import Proposer, Trial
@@ -49,11 +51,28 @@ def check_facts(study: Study, store: Store) -> None:
     if before == after:
         return
     if any(trial.state != "open" for trial in store.trials()):
-        raise SettingsError(
-            f"{study.settings.path}: changed since the first trial: {', '.join(changes(before, after))}; "
-            f"put it back, or move {store.path.name} away to start again"
-        )
+        raise _changed(study, store, before)
     store.begin(after)
+
+
+def as_stored(study: Study, store: Store) -> Study:
+    """The study as its trials were run: with the domain family of then, where its code has changed since.
+
+    Raises:
+        SettingsError: If anything else that the finished trials depend on has changed.
+    """
+    before = store.facts()
+    then = replace(study, identity=before.get("identity", study.identity))
+    if before and before != facts(then):
+        raise _changed(then, store, before)
+    return then
+
+
+def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsError:
+    return SettingsError(
+        f"{study.settings.path}: changed since the first trial: {', '.join(changes(before, facts(study)))}; "
+        f"put it back, or move {store.path.name} away to start again"
+    )
 
 
 def as_trials(space: Space, done: Sequence[TrialRecord]) -> list[Trial]:

@@ -4,7 +4,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -26,16 +25,13 @@ class Study:
         settings: What study.toml says.
         family: The proxy's domain family.
         target: The target's scores of the study's agents, in the study's order.
+        identity: What determines the result of an episode in the proxy, apart from the episode.
     """
 
     settings: StudySettings
     family: DomainFamily
     target: ScoreTable
-
-    @cached_property
-    def identity(self) -> str:
-        """What determines the result of an episode in the proxy, apart from the episode."""
-        return self.family.identity
+    identity: str
 
 
 def open_study(path: Path) -> Study:
@@ -46,7 +42,7 @@ def open_study(path: Path) -> Study:
     """
     settings = read_study_settings(path)
     family = load_family(settings, settings.proxy)
-    return Study(settings, family, read_target(settings))
+    return Study(settings, family, read_target(settings), family.identity)
 
 
 def read_target(settings: StudySettings) -> ScoreTable:

@@ -14,6 +14,9 @@ from proxytune.study.store import Store, SweepRecord
 from proxytune.study.study import Study
 from proxytune.usefulness import Assessment, assess
 
+DECIMALS = 12
+"""Grid values are rounded to so many, that 0.1 is 0.1 and not a hair less."""
+
 
 @dataclass(frozen=True)
 class SweepPoint:
@@ -79,7 +82,7 @@ def check_base(study: Study, base: Theta) -> None:
 
 def plan_sweep(interval: Interval, base: Theta, points: int) -> SweepRecord:
     """An even grid over the interval, both ends included, and the parameter's own value in the base if it has one."""
-    grid = np.linspace(interval.low, interval.high, points).tolist()
+    grid = np.linspace(interval.low, interval.high, points).round(DECIMALS).tolist()
     own = [base[interval.name]] if interval.name in base else []
     return SweepRecord(interval.name, dict(base), tuple(sorted({*grid, *own})))
 

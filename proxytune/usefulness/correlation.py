@@ -10,7 +10,8 @@ from proxytune.scores import ROUNDING, Array, Metric, ScoreTable, varies
 from proxytune.usefulness.comparison import Comparison, compare
 
 SIMPLER_EPSILON = 1e-8
-"""SIMPLER adds this to Pearson's denominator; so do we, to give the figures of published comparisons to every digit."""
+"""SIMPLER adds this to Pearson's denominator unless both sides are equal; so do we, for its published figures to come
+out to every digit. Elsewhere it is below notice, as long as scores are not of the order of 1e-4 or less."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ def pearson_of_means(proxy: Array, target: Array) -> Array:
     one = proxy - proxy.mean(axis=-2, keepdims=True)
     other = target - target.mean(axis=-2, keepdims=True)
     norms = np.sqrt((one**2).sum(axis=-2) * (other**2).sum(axis=-2))
-    coefficients = (one * other).sum(axis=-2) / (norms + SIMPLER_EPSILON)
-    return np.where(varies(proxy) & varies(target), coefficients, np.nan)
+    coefficients = np.where((one == other).all(axis=-2), 1.0, (one * other).sum(axis=-2) / (norms + SIMPLER_EPSILON))
+    return np.where(varies(proxy) & varies(target), np.clip(coefficients, -1, 1), np.nan)
 
 
 def kendall_of_means(proxy: Array, target: Array) -> Array:

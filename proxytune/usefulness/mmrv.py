@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.scores import ROUNDING, Array, Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare
@@ -42,7 +43,7 @@ def mmrv_of_means(proxy: Array, target: Array, metrics: Sequence[Metric]) -> Arr
         Shape (…, metrics).
     """
     signs = np.array([1.0 if metric.direction == "max" else -1.0 for metric in metrics])
-    violated = _below(proxy * signs) != _below(target * signs)
+    violated = _above(proxy * signs) != _above(target * signs)
     costs = np.abs(target[..., :, None, :] - target[..., None, :, :]) * violated
     return np.asarray(costs.max(axis=-2).mean(axis=-2), dtype=np.float64)
 
@@ -50,7 +51,8 @@ def mmrv_of_means(proxy: Array, target: Array, metrics: Sequence[Metric]) -> Arr
 def mmrv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Mmrv:
     """Average over agents the largest target difference among the pairs that the proxy orders wrongly.
 
-    Source: Li et al., Evaluating Real-World Robot Manipulation Policies in Simulation (2024), eq. (1).
+    Of two agents that the proxy ties and the target does not, the better one counts as violated, as in SIMPLER's code.
+    Source: Li et al., Evaluating Real-World Robot Manipulation Policies in Simulation (2024).
 
     Raises:
         ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
@@ -60,7 +62,7 @@ def mmrv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) ->
     return Mmrv({m.name: float(value) for m, value in zip(inputs.metrics, values, strict=True)}, inputs)
 
 
-def _below(scores: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """Whether row scores below column, shape (…, agents, agents, metrics)."""
+def _above(scores: Array) -> NDArray[np.bool_]:
+    """Whether row scores above column, shape (…, agents, agents, metrics)."""
     tie = ROUNDING * np.abs(scores).max(axis=-2)[..., None, None, :]
-    return np.asarray(scores[..., None, :, :] - scores[..., :, None, :] > tie, dtype=np.bool_)
+    return np.asarray(scores[..., :, None, :] - scores[..., None, :, :] > tie, dtype=np.bool_)

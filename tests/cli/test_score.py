@@ -86,6 +86,11 @@ def test_proxies_of_the_same_file_name_are_told_apart_and_the_same_one_is_refuse
         run(*["--proxy", "sim.csv"] * 3, "--target", "real.csv", *METRIC)
 
 
+def test_a_file_with_a_colon_in_its_name_is_a_file(tables):
+    Path("run:1.csv").write_text(SIM)
+    assert document("--proxy", "run:1.csv", "--target", "real.csv", *METRIC)["proxy"] == "run:1"
+
+
 def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
     text = shown("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
     for part in ("PRPV", "noise floor", "chance", "PPV", "SRCC distance", "Kendall τ time", "MMRV time", "1 reversed"):
@@ -95,10 +100,10 @@ def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
 
 
 def test_the_ranking_shows_every_proxy_and_names_with_brackets_survive(tables):
-    Path("sim[2].csv").write_text(SIM)
-    text = shown("--proxy", "sim.csv", "--proxy", "sim[2].csv", "--target", "real.csv", *METRIC)
+    Path("sim[red].csv").write_text(SIM)
+    text = shown("--proxy", "sim.csv", "--proxy", "sim[red].csv", "--target", "real.csv", *METRIC)
     assert "2 proxies of real" in text
-    assert "sim[2]" in text
+    assert "sim[red]" in text
 
 
 def test_single_rows_give_no_interval_but_a_note(tables):

@@ -20,7 +20,7 @@ def table(seed, agents=6, episodes=3):
 
 @pytest.fixture
 def assessment():
-    return assess(proxy=table(1), target=table(2), metrics=M, resamples=100)
+    return assess(proxy=table(4), target=table(5), metrics=M, resamples=100)
 
 
 def test_the_scatter_has_a_panel_per_metric_with_every_agent_named(assessment):
@@ -49,7 +49,9 @@ def test_the_map_colours_each_pair_once_and_counts_them(assessment):
     drawn = {kind: int((cells == number).sum()) for number, kind in enumerate(kinds)}
     for kind in kinds[1:]:
         assert drawn[kind] == sum(pair.flip == kind for pair in assessment.prpv.pairs)
+    assert len(assessment.prpv.pairs) > 3
     assert sum(drawn.values()) == 15
+    assert np.isnan(cells[np.triu_indices(6)]).all()
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"{k}: {n}" for k, n in drawn.items()]
 
 

@@ -39,6 +39,12 @@ def test_a_constant_metric_is_undefined_and_said_so():
         assert (result.better, result.range) == ("higher", (-1, 1))
 
 
+def test_identical_tables_correlate_exactly():
+    same = table([(0.1, 5), (0.2, 3), (0.4, 4)])
+    for measure in (srcc, kendall_tau):
+        assert measure(proxy=same, target=same, metrics=M).value == {"m": 1.0, "n": 1.0}
+
+
 def test_two_agents_correlate_perfectly_which_means_nothing():
     result = srcc(proxy=table([(1, 1), (2, 2)]), target=table([(1, 2), (2, 1)]), metrics=M)
     assert result.value == {"m": pytest.approx(1.0), "n": pytest.approx(-1.0)}

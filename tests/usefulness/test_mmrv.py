@@ -1,9 +1,11 @@
 """MMRV is what a wrong order costs on the target."""
 
+import numpy as np
 import pytest
 
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import mmrv
+from proxytune.usefulness.mmrv import mmrv_of_means
 
 
 def table(values):
@@ -18,11 +20,31 @@ def test_three_agents_by_hand():
     assert result.better == "lower"
 
 
-def test_a_proxy_that_ties_what_the_target_orders_is_charged_to_the_worse_agent():
-    """SIMPLER compares with <, so the two of a tied pair fare differently; the direction says which is the worse."""
-    tied, target = table([0.5, 0.5, 0.9]), table([0.1, 0.4, 0.9])
-    assert mmrv(proxy=tied, target=target, metrics=[Metric("m")]).value["m"] == pytest.approx(0.1)
-    assert mmrv(proxy=tied, target=target, metrics=[Metric("m", "min")]).value["m"] == pytest.approx(0.1)
+def simplers_loop(proxy, target):
+    """The definition as a double loop, with SIMPLER's > between agents."""
+    agents = range(len(proxy))
+    costs = [
+        [abs(target[i] - target[j]) * ((proxy[i] > proxy[j]) != (target[i] > target[j])) for j in agents]
+        for i in agents
+    ]
+    return np.mean([max(row) for row in costs])
+
+
+def test_it_is_simplers_double_loop_also_where_there_are_ties():
+    rng = np.random.default_rng(0)
+    proxy, target = rng.integers(0, 4, size=(2, 40, 5, 1)).astype(float)
+    for direction, sign in (("max", 1), ("min", -1)):
+        values = mmrv_of_means(proxy, target, [Metric("m", direction)])[:, 0]
+        expected = [simplers_loop(sign * p[:, 0], sign * t[:, 0]) for p, t in zip(proxy, target, strict=True)]
+        np.testing.assert_allclose(values, expected, atol=1e-12)
+
+
+def test_a_proxy_that_ties_everything_is_charged_for_the_better_agents():
+    tied, target = table([0.5, 0.5, 0.5]), table([0.1, 0.4, 0.9])
+    assert mmrv(proxy=tied, target=target, metrics=[Metric("m")]).value["m"] == pytest.approx((0 + 0.3 + 0.8) / 3)
+    assert mmrv(proxy=tied, target=target, metrics=[Metric("m", "min")]).value["m"] == pytest.approx(
+        (0.8 + 0.5 + 0) / 3
+    )
 
 
 def test_the_same_order_costs_nothing_in_either_direction():

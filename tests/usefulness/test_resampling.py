@@ -55,6 +55,13 @@ def test_identical_tables_stay_identical_in_every_resample():
     assert (result.value, result.expected, result.low, result.high) == (0, 0.0, 0.0, 0.0)
 
 
+def test_the_interval_holds_the_value_even_where_noise_flips_pairs_in_every_resample():
+    same = noisy(1, agents=8, noise=3.0).unpaired()
+    result = bootstrap_prpv(proxy=same, target=noisy(1, agents=8, noise=3.0), metrics=M)
+    assert result.value == result.low == 0
+    assert result.expected > 5
+
+
 def test_the_same_seed_gives_the_same_interval_and_another_seed_another():
     sides = {"proxy": noisy(1, episodes=9), "target": noisy(2, episodes=9), "metrics": M}
     first, again, other = (bootstrap_prpv(**sides, seed=seed) for seed in (1, 1, 2))
@@ -102,4 +109,4 @@ def test_the_interval_covers_the_expected_prpv_at_about_the_nominal_rate(paired)
         sides = sides if paired else [side.unpaired() for side in sides]
         result = bootstrap_prpv(proxy=sides[0], target=sides[1], metrics=M, resamples=300, seed=seed)
         held.append(result.low <= expected <= result.high)
-    assert np.mean(held) == 5
+    assert 0.92 <= np.mean(held) <= 0.99

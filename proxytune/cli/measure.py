@@ -1,0 +1,60 @@
+"""`measure`: score a study's agents in the domain of a model file, as a target is measured."""
+
+import argparse
+from pathlib import Path
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from proxytune.cli.answer import Answer
+from proxytune.errors import InputError
+from proxytune.scores import ScoreTable, write_scores
+from proxytune.study.measure import SEED_OFFSET, measure
+from proxytune.study.progress import Bars
+from proxytune.study.settings import read_study_settings
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the study, the model and the table to write."""
+    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder: its agents, starts and [domain]")
+    parser.add_argument("--model", type=Path, required=True, metavar="MODEL", help="the model.toml of the domain")
+    parser.add_argument("--output", type=Path, required=True, metavar="CSV", help="the score table to write")
+    parser.add_argument(
+        "--seed", type=int, metavar="N", help=f"seed of the episodes [the study's seed plus {SEED_OFFSET}]"
+    )
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Score every agent from every start, and write the table."""
+    settings = read_study_settings(arguments.path)
+    seed = settings.seed + SEED_OFFSET if arguments.seed is None else arguments.seed
+    if seed < 0:
+        raise InputError(f"--seed must be at least 0, got {seed}")
+    if not arguments.output.absolute().parent.is_dir():
+        raise InputError(f"{arguments.output}: its folder does not exist; make it first")
+    with Bars(len(settings.agents) * settings.starts) as bars:
+        scores = measure(settings, arguments.model, seed, bars)
+    write_scores(scores, arguments.output)
+    document = {
+        "scores": str(arguments.output),
+        "model": str(arguments.model),
+        "seed": seed,
+        "agents": list(scores.agents),
+        "episodes": len(scores.episodes),
+        "means": {agent: _means(scores, row) for row, agent in enumerate(scores.agents)},
+    }
+    return Answer(document, Group(_table(scores), Text(f"seed {seed}\n{arguments.output}")))
+
+
+def _means(scores: ScoreTable, row: int) -> dict[str, float]:
+    return {name: float(value) for name, value in zip(scores.metrics, scores.means[row], strict=True)}
+
+
+def _table(scores: ScoreTable) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in ("agent", *scores.metrics):
+        table.add_column(name.replace("_", " "), justify="left" if name == "agent" else "right")
+    for row, agent in enumerate(scores.agents):
+        table.add_row(agent, *(f"{value:.3f}" for value in scores.means[row]))
+    return table

@@ -1,0 +1,82 @@
+"""`study`: run or resume a study, and sum it up."""
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+from proxytune.cli.answer import Answer
+from proxytune.cli.study_folder import study_folder
+from proxytune.report.convergence import convergence
+from proxytune.report.page import page
+from proxytune.report.score_figures import save
+from proxytune.report.study_document import study_document
+from proxytune.report.study_table import study_table
+from proxytune.report.writing import write_text
+from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.study.evaluate import Spent
+from proxytune.study.lock import locked
+from proxytune.study.progress import Bars
+from proxytune.study.result import StudyResult, result_of
+from proxytune.study.run import run_study
+from proxytune.study.store import Store
+from proxytune.study.study import open_study
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the study."""
+    parser.add_argument(
+        "path", type=Path, metavar="PATH", help="a study's folder, or where to put one that travels with proxytune"
+    )
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Run what is left of a study; a finished one is summed up again without simulating."""
+    begun = time.perf_counter()
+    folder = study_folder(arguments.path)
+    study = open_study(folder)
+    settings = study.settings
+    episodes = settings.budget * len(settings.agents) * settings.starts
+    with locked(folder), Store.open(folder) as store:
+        with Bars(episodes) as bars:
+            spent = run_study(study, store, GaussianProcess(settings.initial), bars)
+        result = result_of(study, store)
+    figures, report = draw(result, folder)
+    costs = _costs(result, spent, time.perf_counter() - begun)
+    document = {**study_document(result), **costs, "figures": [str(path) for path in figures], "report": str(report)}
+    files = {"figure": figures[0], "report": report}
+    return Answer(document, study_table(result, _told(costs), files))
+
+
+def draw(result: StudyResult, folder: Path) -> tuple[list[Path], Path]:
+    """Draw the convergence figure and the report; their paths."""
+    figure = folder / "figures" / "convergence.png"
+    report = folder / "report.html"
+    save(convergence(result), figure)
+    write_text(report, page(result, [figure]))
+    return [figure], report
+
+
+def _costs(result: StudyResult, spent: Spent, total: float) -> dict[str, Any]:
+    """Episodes and seconds of this run; outside of episodes is what is not spent within them, waiting included."""
+    jobs = result.study.settings.jobs
+    return {
+        "episodes": {
+            "run": spent.episodes,
+            "reused": result.episodes - spent.episodes,
+            "failed": result.failed_episodes,
+        },
+        "seconds": {
+            "total": total,
+            "episodes": spent.seconds,
+            "outside_episodes": max(0.0, total - spent.seconds / jobs),
+        },
+    }
+
+
+def _told(costs: dict[str, Any]) -> str:
+    episodes, seconds = costs["episodes"], costs["seconds"]
+    return (
+        f"{episodes['run']} episodes run, {episodes['reused']} reused; "
+        f"{seconds['total']:.1f} s, of which {seconds['outside_episodes']:.1f} s outside of episodes"
+    )

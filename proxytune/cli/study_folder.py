@@ -1,0 +1,51 @@
+"""The folder that a PATH means: one that is there, or a copy of a study that travels with the package."""
+
+import contextlib
+import os
+import shutil
+import sys
+from pathlib import Path
+
+from proxytune.errors import InputError, StoreError
+from proxytune.settings import nearest
+from proxytune.shipped import shipped
+from proxytune.study.settings import FILE_NAME
+
+MADE = ("study.db*", "study.lock", "figures", "report.html", "__pycache__")
+"""What running a study adds: not copied."""
+
+
+def study_folder(path: Path) -> Path:
+    """The study's folder, given as itself or as its study.toml.
+
+    Where there is none and its last part names a study that travels with the package, that is copied there.
+
+    Raises:
+        InputError: If there is no such study.
+        StoreError: If the copy cannot be written.
+    """
+    folder = path.parent if path.name == FILE_NAME else path
+    if folder.exists():
+        if not (folder / FILE_NAME).is_file():
+            raise InputError(f"{folder}: has no {FILE_NAME}; give the folder of a study")
+        return folder
+    studies = {home.name: home for home in shipped("studies").iterdir() if (home / FILE_NAME).is_file()}
+    if folder.name not in studies:
+        raise InputError(f"{folder}: no such study; {nearest(folder.name, studies)}, copied to where you say")
+    _copy(studies[folder.name], folder)
+    print(f"copied the study '{folder.name}' that travels with proxytune to {folder}", file=sys.stderr)
+    return folder
+
+
+def _copy(source: Path, folder: Path) -> None:
+    """Copy whole or not at all."""
+    draft = folder.with_name(f".{folder.name}.{os.getpid()}")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*MADE))
+        draft.replace(folder)
+    except (OSError, shutil.Error) as problem:
+        with contextlib.suppress(OSError):
+            shutil.rmtree(draft)
+        reason = problem.strerror if isinstance(problem, OSError) and problem.strerror else "copying failed"
+        raise StoreError(f"{folder}: cannot be written ({reason}); choose another place") from None

@@ -1,0 +1,122 @@
+"""`sweep`: usefulness along one parameter, or along each parameter of the study."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+
+from rich.console import Group
+from rich.text import Text
+
+from proxytune.cli.answer import Answer
+from proxytune.cli.study_folder import study_folder
+from proxytune.effects import read_model
+from proxytune.errors import InputError
+from proxytune.report.score_figures import save
+from proxytune.report.sweep_document import curve_csv, curve_document, curve_name, curve_table, failures
+from proxytune.report.sweep_figure import sweep_figure
+from proxytune.report.writing import write_text
+from proxytune.space import Theta
+from proxytune.study.evaluate import Spent
+from proxytune.study.lock import locked
+from proxytune.study.progress import Bars
+from proxytune.study.store import Store, SweepRecord
+from proxytune.study.study import Study, open_study
+from proxytune.study.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval
+
+MOST_POINTS = 10_000
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the study, the parameter, and where the others are held."""
+    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder")
+    parser.add_argument("--parameter", required=True, metavar="NAME", help="what to sweep, or 'all' the study searches")
+    parser.add_argument("--points", type=int, default=13, metavar="N", help="values of the parameter [13]")
+    parser.add_argument(
+        "--at",
+        metavar="NAME=VALUE,…|MODEL",
+        help="what the other parameters are held at, or a model.toml that says so [nominal]",
+    )
+    parser.add_argument("--output", type=Path, metavar="DIR", help="where the curves go [the study's figures]")
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Simulate what is missing of the sweeps, and draw them."""
+    folder = study_folder(arguments.path)
+    study = open_study(folder)
+    sweeps = _planned(study, arguments)
+    points = sum(len(sweep.points) for sweep in sweeps)
+    spent = Spent()
+    with locked(folder), Store.open(folder) as store:
+        with Bars(points * len(study.settings.agents) * study.settings.starts) as bars:
+            for sweep in sweeps:
+                spent += run_sweep(study, store, sweep, bars)
+        curves = [curve for sweep in sweeps if (curve := curve_of(study, store, sweep))]
+    output = arguments.output or folder / "figures"
+    figures = draw_curves(curves, output)
+    files = write_curves(curves, output)
+    document = {
+        "curves": [curve_document(curve) for curve in curves],
+        "episodes": {"run": spent.episodes},
+        "figures": [str(path) for path in figures],
+        "files": [str(path) for path in files],
+    }
+    lines = [*failures(curves), f"{spent.episodes} episodes run", *(str(path) for path in [*figures, *files])]
+    return Answer(document, Group(*map(curve_table, curves), Text("\n".join(lines))))
+
+
+def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
+    """Draw one figure per curve, and one of all that hold the parameters at the same values; their paths."""
+    groups = {curve_name(curve): [curve] for curve in curves}
+    for base, members in groupby(sorted(curves, key=_base), key=_base):
+        together = list({curve.parameter: curve for curve in members}.values())
+        if len(together) > 1:
+            groups["_".join(["sweep_all", *(f"{name}={value:g}" for name, value in base)])] = together
+    for name, group in groups.items():
+        save(sweep_figure(group), folder / f"{name}.png")
+    return [folder / f"{name}.png" for name in groups]
+
+
+def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
+    """Write each curve as CSV and as JSON; the paths."""
+    written = []
+    for curve in curves:
+        texts = {"csv": curve_csv(curve), "json": json.dumps(curve_document(curve), indent=2, allow_nan=False) + "\n"}
+        for ending, text in texts.items():
+            written.append(folder / f"{curve_name(curve)}.{ending}")
+            write_text(written[-1], text)
+    return written
+
+
+def read_base(text: str | None) -> Theta:
+    """What the other parameters are held at: NAME=VALUE pairs, or a model.toml.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    if text is None:
+        return {}
+    if text.endswith(".toml"):
+        return read_model(Path(text)).theta
+    pairs = [pair.partition("=") for pair in text.split(",")]
+    try:
+        base = {name.strip(): float(value) for name, _, value in pairs}
+    except ValueError:
+        raise InputError(f"--at {text}: write NAME=VALUE,NAME=VALUE or the path of a model.toml") from None
+    if len(base) < len(pairs):
+        raise InputError(f"--at {text}: names a parameter twice")
+    return base
+
+
+def _planned(study: Study, arguments: argparse.Namespace) -> list[SweepRecord]:
+    if not 2 <= arguments.points <= MOST_POINTS:
+        raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {arguments.points}")
+    base = read_base(arguments.at)
+    check_base(study, base)
+    names = study.settings.space.names if arguments.parameter == "all" else (arguments.parameter,)
+    return [plan_sweep(sweep_interval(study, name), base, arguments.points) for name in names]
+
+
+def _base(curve: Curve) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(curve.base.items()))

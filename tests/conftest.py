@@ -1,0 +1,70 @@
+"""What several rooms' tests share: a study of a domain family that is a formula."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+FAKES = Path(__file__).parent / "fakes"
+sys.path.append(str(FAKES))
+
+STUDY = {
+    "format": "1",
+    "name": '"wobbly"',
+    "family": '"wobbly:wobbly"',
+    "target": '"target.csv"',
+    "metrics": '["distance:max", "survival_time:max"]',
+    "agents": '["agent0", "agent1", "agent2", "agent3", "agent4", "agent5"]',
+    "starts": "3",
+    "budget": "7",
+    "initial": "5",
+    "seed": "1",
+    "jobs": "1",
+}
+PARAMETERS = {"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
+TRUTH = {"trim": 0.1, "delay": 0.12}
+
+MakeStudy = Callable[..., Path]
+
+
+def study_text(parameters: dict[str, str], domain: dict[str, str], changes: dict[str, str | None]) -> str:
+    """A study.toml; a change to None leaves the key out."""
+    keys = {key: value for key, value in {**STUDY, **changes}.items() if value is not None}
+    tables = {"": keys, "[parameters]": parameters, "[domain]": domain}
+    lines = [line for head, table in tables.items() for line in (head, *(f"{k} = {v}" for k, v in table.items()))]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.fixture
+def make_study(tmp_path: Path) -> MakeStudy:
+    """Write a study's folder; call it again to edit the study.toml."""
+
+    def make(
+        name: str = "study",
+        parameters: dict[str, str] = PARAMETERS,
+        domain: dict[str, str] | None = None,
+        **changes: str | None,
+    ) -> Path:
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        (folder / "study.toml").write_text(study_text(parameters, domain or {}, changes))
+        if not (folder / "target.csv").exists():
+            write_target(folder / "target.csv")
+        return folder
+
+    return make
+
+
+def write_target(path: Path) -> None:
+    """The scores of every agent at the truth, under other seeds than a study's."""
+    from wobbly import AGENTS, formula
+
+    from proxytune.domain import make_episode
+
+    lines = ["agent,episode,distance,survival_time"]
+    for agent in AGENTS:
+        for start in range(3):
+            scores = formula(TRUTH, make_episode(TRUTH, agent=agent, start=start, seed=900 + start))
+            lines.append(f"{agent},{start},{scores['distance']!r},{scores['survival_time']!r}")
+    path.write_text("\n".join(lines) + "\n")

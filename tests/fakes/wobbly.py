@@ -1,0 +1,114 @@
+"""A domain family that is a formula: fast, seeded, picklable, and as faulty as a test asks for."""
+
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from proxytune.domain import Episode
+from proxytune.errors import EpisodeError, SettingsError
+from proxytune.settings import Section, nearest, read_settings
+from proxytune.space import Parameter
+
+AGENTS = tuple(f"agent{number}" for number in range(6))
+PARAMETERS = MappingProxyType(
+    {"trim": Parameter("trim", "", -0.3, 0.3, 0.0), "delay": Parameter("delay", "s", 0.0, 0.3, 0.0)}
+)
+
+
+@dataclass(frozen=True)
+class Wobbly:
+    """Agents that like different values of trim and delay, and do worse the further off they are.
+
+    Attributes:
+        theta: The values of an instance where the episode does not name them.
+        sleep: Seconds an episode takes.
+        faults: What goes wrong, as "agent:start:fault"; a start of * means every one.
+        journal: A file to which each simulated episode adds a line; empty for none.
+        version: Stands for the code's version.
+    """
+
+    theta: tuple[tuple[str, float], ...] = ()
+    sleep: float = 0.0
+    faults: tuple[str, ...] = ()
+    journal: str = ""
+    version: str = "1"
+
+    @property
+    def identity(self) -> str:
+        return f"wobbly {self.version} {self.theta}"
+
+    @property
+    def metrics(self) -> Mapping[str, str]:
+        return {"distance": "m", "survival_time": "s"}
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        return PARAMETERS
+
+    @property
+    def starts(self) -> int:
+        return 5
+
+    def check_agent(self, name: str) -> None:
+        if name not in AGENTS:
+            raise SettingsError(f"no agent '{name}'; {nearest(name, AGENTS)}")
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        if self.journal:
+            with open(self.journal, "a") as journal:
+                journal.write(f"{episode.agent} {episode.start} {episode.theta} {os.getpid()}\n")
+        time.sleep(self.sleep)
+        fault = next((f.split(":")[2] for f in self.faults if self._hits(f, episode)), "")
+        if fault == "raises":
+            raise EpisodeError(f"agent '{episode.agent}' raised ValueError at 1.20 s: it lost its way")
+        if fault == "crashes":
+            raise ZeroDivisionError("division\nby zero")
+        if fault == "dies":
+            os._exit(9)
+        if fault == "full":
+            raise OSError(28, "No space left on device")
+        scores = formula({**dict(self.theta), **dict(episode.theta)}, episode)
+        return {**scores, "distance": float("nan")} if fault == "nan" else scores
+
+    @staticmethod
+    def _hits(fault: str, episode: Episode) -> bool:
+        agent, start, _ = fault.split(":")
+        return agent == episode.agent and start in ("*", str(episode.start))
+
+
+def formula(theta: Mapping[str, float], episode: Episode) -> dict[str, float]:
+    """Distance and survival time, wobbling with the seed."""
+    number = AGENTS.index(episode.agent)
+    trim, delay = theta.get("trim", 0.0) / 0.3, theta.get("delay", 0.0) / 0.3
+    wobble = np.random.default_rng([episode.seed, episode.start]).normal(0.0, 0.02, 2)
+    far = abs(trim - np.sin(3.0 * number)) + abs(delay - (0.5 + 0.5 * np.cos(5.0 * number)))
+    near = abs(trim + np.cos(2.0 * number)) + 0.3 * delay
+    return {"distance": float(5.0 - far + wobble[0]), "survival_time": float(60.0 - 10.0 * near + wobble[1])}
+
+
+def wobbly(section: Section, *, model: Path | None) -> Wobbly:
+    """The family that a [domain] table describes; a model is a TOML file of θ values."""
+    section.only(("sleep", "faults", "journal", "version"))
+    held = read_settings(model).values if model else {}
+    return Wobbly(
+        tuple(sorted((name, float(value)) for name, value in held.items())),
+        section.number("sleep", 0.0, low=0.0),
+        section.texts("faults", ()),
+        section.text("journal", ""),
+        section.text("version", "1"),
+    )
+
+
+def broken_factory(section: Section, *, model: Path | None) -> Wobbly:
+    """A factory with a bug."""
+    raise KeyError("robot")
+
+
+def not_a_family(section: Section, *, model: Path | None) -> dict[str, str]:
+    """A factory of something else."""
+    return {}

@@ -56,8 +56,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"proxytune {arguments.command}: {problem}", file=sys.stderr)
         return BAD_INPUT if isinstance(problem, InputError) else FAILED
     except KeyboardInterrupt:
-        print(f"proxytune {arguments.command}: interrupted; what was finished is kept, the same command goes on",
-              file=sys.stderr)
+        print(
+            f"proxytune {arguments.command}: interrupted; what was finished is kept, the same command goes on",
+            file=sys.stderr,
+        )
         return INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

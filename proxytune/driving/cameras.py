@@ -3,7 +3,7 @@
 import functools
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,7 +72,7 @@ class CameraFigures:
 class Camera(Protocol):
     """A camera on a robot."""
 
-    def render(self, poses: NDArray[np.floating]) -> NDArray[np.uint8]:
+    def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
         ...
 
@@ -91,7 +91,8 @@ def _floor_hits(figures: CameraFigures, right: float, down: float) -> NDArray[np
     rays = _rays(figures, right, down)
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = np.where(rays[..., 2] < 0.0, figures.height_m / -rays[..., 2], np.nan)
-    return rays[..., :2] * reach[..., None] + np.array([figures.forward_m, 0.0])
+    hits: NDArray[np.float64] = rays[..., :2] * reach[..., None] + (figures.forward_m, 0.0)
+    return hits
 
 
 def _rays(figures: CameraFigures, right: float, down: float) -> NDArray[np.float64]:
@@ -110,14 +111,12 @@ def _rays(figures: CameraFigures, right: float, down: float) -> NDArray[np.float
 
 def orientation(figures: CameraFigures) -> NDArray[np.float64]:
     """Rotation (3, 3) from the camera's frame to the robot's, both forward, left, up: roll, then pitch, then yaw."""
-    (cr, cp, cy), (sr, sp, sy) = (
-        [f(math.radians(angle)) for angle in (figures.roll_deg, figures.pitch_deg, figures.yaw_deg)]
-        for f in (math.cos, math.sin)
-    )
-    roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return np.asarray(yaw @ pitch @ roll)
+    roll, pitch, yaw = (math.radians(angle) for angle in (figures.roll_deg, figures.pitch_deg, figures.yaw_deg))
+    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
+    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
+    rotation: NDArray[np.float64] = about_z @ about_y @ about_x
+    return rotation
 
 
 class GroundPlaneCamera:
@@ -134,20 +133,19 @@ class GroundPlaneCamera:
         on_floor = np.isfinite(points[:, 0])
         copy = np.where(on_floor, _blur_octaves(figures, floor).ravel(), 0)
         scale = copies.per_metre[copy]
-        plane = np.stack((points[:, 0] * scale, points[:, 1] * scale, scale, -floor.origin * scale))
+        plane = np.stack((points[:, 0] * scale, points[:, 1] * scale, scale))
         # Pixels above the horizon stay at the last texel, the sky
         self._plane = np.where(on_floor, plane, 0.0).astype(np.float32)
+        self._origin = np.float32(floor.origin)
         self._last = np.where(on_floor, copies.sides[copy] - 1, 0).astype(np.float32)
         self._first = np.where(on_floor, copies.firsts[copy], copies.texels.size - 1).astype(np.int32)
         self._side = copies.sides[copy].astype(np.int32)
         self._texels = copies.texels
         self._shape = (figures.rows, figures.columns)
 
-    def render(self, poses: NDArray[np.floating]) -> NDArray[np.uint8]:
+    def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
-        where = _motions(poses) @ self._plane
-        np.clip(where, 0.0, self._last, out=where)
-        column, row = where.astype(np.int32).reshape(2, len(poses), -1)
+        column, row = self._look(poses)
         row *= self._side
         row += column
         row += self._first
@@ -157,15 +155,17 @@ class GroundPlaneCamera:
             pictures[..., colour] = texels[..., colour]
         return pictures
 
-
-def _motions(poses: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Matrix (2n, 4) that takes robot-frame x, y, 1, 1 to map x (first n rows) and map y (last n) plus the last 1."""
-    n = len(poses)
-    cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    motions = np.ones((2 * n, 4), dtype=np.float32)
-    motions[:n, 0], motions[:n, 1], motions[:n, 2] = cos, -sin, poses[:, 0]
-    motions[n:, 0], motions[n:, 1], motions[n:, 2] = sin, cos, poses[:, 1]
-    return motions
+    def _look(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.int32]:
+        """Column and row (2, n, pixels) of each pixel's texel in its copy."""
+        cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        ahead, left = np.stack((cos, sin), dtype=np.float32), np.stack((-sin, cos), dtype=np.float32)
+        place = poses[:, :2].T.astype(np.float32) - self._origin
+        # Not a matrix product: BLAS rounds differently from processor to processor, and so would the pictures
+        where: NDArray[np.float32] = ahead[..., None] * self._plane[0]
+        where += left[..., None] * self._plane[1]
+        where += place[..., None] * self._plane[2]
+        np.clip(where, 0.0, self._last, out=where)
+        return where.astype(np.int32)
 
 
 @dataclass(frozen=True)
@@ -213,4 +213,5 @@ def _blur_octaves(figures: CameraFigures, floor: Floor) -> NDArray[np.int64]:
     across = _floor_hits(figures, 0.5, 0.0) - _floor_hits(figures, -0.5, 0.0)
     along = _floor_hits(figures, 0.0, 0.5) - _floor_hits(figures, 0.0, -0.5)
     width = np.sqrt((across**2 + along**2).sum(axis=-1)) / 2.0 * floor.pixels_per_metre
-    return np.rint(np.clip(np.log2(np.nan_to_num(width, nan=np.inf)), 0, OCTAVES)).astype(np.int64)
+    octaves: NDArray[np.int64] = np.rint(np.clip(np.log2(np.nan_to_num(width, nan=np.inf)), 0, OCTAVES)).astype(int)
+    return octaves

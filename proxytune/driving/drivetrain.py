@@ -50,8 +50,11 @@ class Drivetrain:
 
     def _twists(self, wheels: Signal) -> Signal:
         full_speed, baseline = self.robot.figures["full_speed"], self.robot.figures["effective_baseline"]
-        left, right = wheels[..., 0] * full_speed, wheels[..., 1] * full_speed
-        return np.stack(((left + right) / 2.0, np.zeros_like(left), (right - left) / baseline), axis=-1)
+        left, right = wheels[..., 0], wheels[..., 1]
+        twists = np.zeros((*left.shape, 3))
+        twists[..., 0] = (left + right) * (full_speed / 2.0)
+        twists[..., 2] = (right - left) * (full_speed / baseline)
+        return twists
 
 
 def drivetrain(robot: Robot, effects: Iterable[Effect]) -> Drivetrain:

@@ -44,11 +44,13 @@ class Drive(NamedTuple):
         poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
         commands: What the agent issued, (control steps, 2).
         crashed: Whether it ended by hitting something or falling over.
+        memory: What the agent remembered in the end.
     """
 
     poses: Signal
     commands: Signal
     crashed: bool
+    memory: Any
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ class _View:
         if self._chain.effects:
             developed, self._memory = self._chain.apply(signal.astype(np.float32), self._memory)
             signal = np.clip(np.rint(developed[-1:]), 0, 255).astype(np.uint8)
-        return signal[-1].reshape(self._shape)
+        return np.asarray(signal[-1].reshape(self._shape))
 
 
 def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Drive:
@@ -117,7 +119,7 @@ def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Dri
         commands.append(command)
         if crashed or course.ended(float(moved[-1, 0]), float(moved[-1, 1])):
             break
-    return Drive(np.concatenate(poses), np.array(commands), crashed)
+    return Drive(np.concatenate(poses), np.array(commands), crashed, driver)
 
 
 def _begin(agent: Agent, robot: Robot) -> Any:
@@ -134,7 +136,9 @@ def _ask(agent: Agent, picture: Picture, memory: Any, time_s: float) -> tuple[Co
     except Exception as problem:
         raise EpisodeError(f"raised {type(problem).__name__} at {time_s:.2f} s: {problem}") from problem
     if command.shape != (2,):
-        raise EpisodeError(f"answered with shape {command.shape} at {time_s:.2f} s; a command is two duties, left and right")
+        raise EpisodeError(
+            f"answered with shape {command.shape} at {time_s:.2f} s; a command is two duties, left and right"
+        )
     if not (math.isfinite(command[0]) and math.isfinite(command[1])):
         raise EpisodeError(f"answered {command.tolist()} at {time_s:.2f} s; duties must be finite")
     return command, memory

@@ -5,18 +5,22 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.domain import Episode
 from proxytune.driving import task
+from proxytune.driving.agents import Agent
 from proxytune.driving.agents.loading import load_agent
+from proxytune.driving.agents.playback import Playback
 from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import TICK_HZ, Course, Drive, Instance, drive
+from proxytune.driving.lane import off_map
 from proxytune.driving.maps import MAPS
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
@@ -39,6 +43,18 @@ from proxytune.space import Parameter, Theta
 
 PLANTS = ("bullet", "planar")
 CAMERAS = ("ground_plane", "renderer")
+
+
+class Observation(NamedTuple):
+    """What recorded commands lead to.
+
+    Attributes:
+        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
+        pictures: The picture before every command, (steps, rows, columns, 3).
+    """
+
+    poses: Signal
+    pictures: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -104,7 +120,9 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the agent's name and the time at which it failed.
         """
-        return task.score_trajectory(MAPS[self.map], self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        return task.score_trajectory(
+            MAPS[self.map], self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds
+        )
 
     def drive(self, episode: Episode) -> Drive:
         """Drive one episode.
@@ -112,17 +130,30 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the agent's name and the time at which it failed.
         """
-        road = MAPS[self.map]
-        noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
-        start = task.start_pose(road, episode.start, seed=episode.seed, **noise)
-        course = Course(np.asarray(start), self.seconds, episode.seed, functools.partial(task.off_map, road))
-        instance = self.instance(dict(episode.theta))
-        agent = load_agent(episode.agent, self.folder)
+        course = Course(self._start(episode), self.seconds, episode.seed, functools.partial(off_map, MAPS[self.map]))
         try:
-            with self._plant(instance.robot, course.start) as plant:
-                return drive(instance, plant, agent, course)
+            return self._drive(episode, load_agent(episode.agent, self.folder), course)
         except EpisodeError as problem:
             raise EpisodeError(f"agent '{episode.agent}' {problem}") from problem.__cause__
+
+    def replay(self, episode: Episode, commands: Signal) -> Observation:
+        """Drive recorded commands (steps, 2), one per control step, in place of the episode's agent.
+
+        It goes on wherever it leads, so that two domains can be compared step by step.
+        """
+        seconds = len(commands) / read_robot(self.robot).figures["control_rate"]
+        course = Course(self._start(episode), seconds, episode.seed, lambda x, y: False)
+        driven = self._drive(episode, Playback(commands), course)
+        return Observation(driven.poses, np.stack(driven.memory.pictures))
+
+    def _start(self, episode: Episode) -> Signal:
+        noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
+        return np.asarray(task.start_pose(MAPS[self.map], episode.start, seed=episode.seed, **noise))
+
+    def _drive(self, episode: Episode, agent: Agent, course: Course) -> Drive:
+        instance = self.instance(dict(episode.theta))
+        with self._plant(instance.robot, course.start) as plant:
+            return drive(instance, plant, agent, course)
 
     def instance(self, theta: Theta) -> Instance:
         """The domain instance S_θ: nominal effects, then the family's, then θ."""
@@ -136,7 +167,9 @@ class LaneFollowing:
 def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
     robot = read_robot(family.robot)
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures)
-    return Instance(robot, drivetrain(robot, effects), _camera(family, robot, effects), stage_chain(effects, Stage.IMAGE))
+    return Instance(
+        robot, drivetrain(robot, effects), _camera(family, robot, effects), stage_chain(effects, Stage.IMAGE)
+    )
 
 
 def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) -> Camera:

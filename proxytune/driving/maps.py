@@ -50,6 +50,8 @@ SMALL_LOOP = LoopMap(
     lane_width=0.22,
     white_width=0.048,
     yellow_width=0.024,
+    # Measured on gym-duckietown's frames of photographed tiles: the yellow line passes 0.343 m from the inner corner at
+    # 45°, where an arc of half a tile would pass at 0.293 m; dashes 4.3 cm on straight tiles, 5.4 cm on corner tiles
     corner_radius=0.17,
     straight_dashes=9,
     corner_dashes=6,

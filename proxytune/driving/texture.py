@@ -1,6 +1,7 @@
 """The floor of a map as a picture seen from above, drawn from the map's figures."""
 
 import functools
+import math
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -49,31 +50,33 @@ def draw_floor(road: LoopMap) -> Floor:
 
     Every edge is anti-aliased over one pixel. The same figures give the same bytes.
     """
-    side = MARGIN * int(np.ceil(road.side * PIXELS_PER_METRE / MARGIN + 2.0))
+    side = MARGIN * math.ceil(road.side * PIXELS_PER_METRE / MARGIN + 2.0)
     origin = (road.side - side / PIXELS_PER_METRE) / 2.0
-    along = origin + (np.arange(side) + 0.5) / PIXELS_PER_METRE - road.side / 2.0
-    x, y = np.abs(along)[None, :], np.abs(along)[:, None]
-    far, near = np.maximum(x, y), np.minimum(x, y)
-    off_centre = centre_line_distance(road, far, near)
+    off_middle = np.abs(origin + (np.arange(side) + 0.5) / PIXELS_PER_METRE - road.side / 2.0)
+    x, y = np.meshgrid(off_middle, off_middle)
     picture = np.tile(np.array(COLOURS["off_map"], dtype=float), (side, side, 1))
-    for colour, distance in (
-        ("asphalt", far - road.side / 2.0),
-        ("white", _white_distance(road, off_centre)),
-        ("yellow", np.maximum(np.abs(off_centre) - road.yellow_width / 2.0, _dash_distance(road, far, near))),
-    ):
+    for colour, distance in _shapes(road, np.maximum(x, y), np.minimum(x, y)).items():
         cover = np.clip(0.5 - distance * PIXELS_PER_METRE, 0.0, 1.0)[..., None]
         picture += cover * (np.array(COLOURS[colour]) - picture)
     return Floor(np.rint(picture).astype(np.uint8), PIXELS_PER_METRE, origin)
 
 
-def centre_line_distance(road: LoopMap, far: Metres, near: Metres) -> Metres:
-    """Signed distance from the road's centre line, a square with rounded corners; outside positive [m].
+def _shapes(road: LoopMap, far: Metres, near: Metres) -> dict[str, Metres]:
+    """Signed distance from what is painted in each colour, inside negative [m], the lowest layer first.
 
-    Args:
-        road: The map.
-        far: The larger of |x| and |y| from the map's middle [m].
-        near: The smaller of them [m].
+    All eight octants look alike: `far` and `near` are the larger and the smaller of |x| and |y| from the map's middle.
     """
+    off_centre = _centre_line_distance(road, far, near)
+    beside_yellow = np.abs(off_centre) - road.yellow_width / 2.0
+    return {
+        "asphalt": far - road.side / 2.0,
+        "white": _white_distance(road, off_centre),
+        "yellow": np.maximum(beside_yellow, _dash_distance(road, far, near)),
+    }
+
+
+def _centre_line_distance(road: LoopMap, far: Metres, near: Metres) -> Metres:
+    """Signed distance from the road's centre line, a square with rounded corners; outside positive [m]."""
     straight = (road.tiles - 1) * road.tile / 2.0 - road.corner_radius
     past_far, past_near = far - straight, near - straight
     outside = np.hypot(np.maximum(past_far, 0.0), np.maximum(past_near, 0.0))

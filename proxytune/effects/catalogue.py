@@ -41,11 +41,7 @@ def theta_names(effect: type[Effect]) -> tuple[str, ...]:
 
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
-    {
-        name: parameter
-        for effect in _ALL
-        for name, parameter in zip(theta_names(effect), effect.parameters, strict=True)
-    }
+    {name: parameter for effect in _ALL for name, parameter in zip(theta_names(effect), effect.parameters, strict=True)}
 )
 """Every effect's parameters by their names in θ."""
 

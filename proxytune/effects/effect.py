@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.space import Parameter
 
-Signal = NDArray[np.floating[Any]]
+Signal = NDArray[Any]
 """An array of shape (…, time, channels); a value holds, or is the mean, over one sample interval."""
 
 Memory = Any

@@ -30,6 +30,9 @@ def sweep_figure(curves: Sequence[Curve]) -> Figure:
         lower.set_xlabel(f"{curve.parameter} [{curve.unit}]" if curve.unit else curve.parameter, fontsize=8)
         for axes in (upper, lower):
             _dress(axes, curve)
+    # Only now: a limit set earlier would hide what later columns of the shared axis hold.
+    for axes in panels[:, 0]:
+        axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
     panels[0, 0].set_ylabel("PRPV [ordered pairs]", fontsize=8)
     panels[1, 0].set_ylabel("PPV", fontsize=8)
     handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -42,14 +45,13 @@ def _prpv(axes: Axes, points: Sequence[tuple[float, Assessment]]) -> None:
     found = [assessment for _, assessment in points]
     if not found:
         return
-    _noise(axes, found[0])
+    _levels(axes, found)
     inner = [assessment.prpv_interval for assessment in found]
     if all(one.low is not None for one in inner):
         lows, highs = [one.low or 0.0 for one in inner], [one.high or 0.0 for one in inner]
         axes.fill_between(values, lows, highs, color=BLUE, alpha=0.18, linewidth=0, label="95 % interval")
     scores = [assessment.prpv.value for assessment in found]
     axes.plot(values, scores, "o-", color=BLUE, markersize=3, linewidth=1.2, label="PRPV")
-    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
 def _ppv(axes: Axes, points: Sequence[tuple[float, Assessment]]) -> None:
@@ -59,15 +61,16 @@ def _ppv(axes: Axes, points: Sequence[tuple[float, Assessment]]) -> None:
         values, lows, highs = np.array(banded).T
         axes.fill_between(values, lows, highs, color=BLUE, alpha=0.18, linewidth=0)
     axes.plot([value for value, _ in known], [score for _, score in known], "o-", color=BLUE, ms=3, lw=1.2)
-    axes.set_ylim(bottom=0.0)
 
 
-def _noise(axes: Axes, assessment: Assessment) -> None:
-    floor = assessment.noise_floor
+def _levels(axes: Axes, found: Sequence[Assessment]) -> None:
+    """The target's noise floor, and chance: its mean, since it varies a little with the proxy's own order."""
+    floor = found[0].noise_floor
     if floor.value is not None and floor.low is not None and floor.high is not None:
         axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
         axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label="noise floor")
-    axes.axhline(assessment.chance.mean, color="0.45", linewidth=1.0, linestyle=":", label="chance")
+    chance = float(np.mean([assessment.chance.mean for assessment in found]))
+    axes.axhline(chance, color="0.45", linewidth=1.0, linestyle=":", label="chance")
 
 
 def _dress(axes: Axes, curve: Curve) -> None:

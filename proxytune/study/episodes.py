@@ -2,8 +2,10 @@
 
 import errno
 import math
+import os
 import pickle
 import sys
+import threading
 import time
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
@@ -19,6 +21,7 @@ from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import EpisodeError, RunError
 from proxytune.study.store import Outcome
 
+WATCH_S = 0.5
 OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)
 
 
@@ -37,7 +40,7 @@ def running(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Ite
     Raises:
         RunError: If the machine fails rather than an episode: a process dies, memory or disk run out.
     """
-    outcomes = _here(family, episodes) if jobs == 1 else _spread(family, episodes, jobs)
+    outcomes = _spread(family, episodes, jobs) if min(jobs, len(episodes)) > 1 else _here(family, episodes)
     try:
         yield _told(outcomes)
     finally:
@@ -50,22 +53,37 @@ def _here(family: DomainFamily, episodes: Sequence[Episode]) -> Generator[Outcom
 
 
 def _spread(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Generator[Outcome, None, None]:
-    recipe = _Recipe(pickle.dumps(family), tuple(sys.path))
-    parallel = Parallel(n_jobs=min(jobs, max(1, len(episodes))), batch_size=1, return_as="generator_unordered")
+    recipe = _Recipe(pickle.dumps(family), tuple(sys.path), os.getpid())
+    parallel = Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered")
     outcomes = parallel(delayed(_run_pickled)(recipe, episode) for episode in episodes)
     return cast("Generator[Outcome, None, None]", outcomes)
 
 
 @dataclass(frozen=True)
 class _Recipe:
-    """A family pickled once, and where its modules are found: a process that has it unpickles it once."""
+    """A family pickled once, where its modules are found, and whose it is: a process unpickles it once."""
 
     pickled: bytes
     folders: tuple[str, ...]
+    owner: int
 
 
 def _run_pickled(recipe: _Recipe, episode: Episode) -> Outcome:
+    if os.getppid() == recipe.owner:
+        _end_with(recipe.owner)
     return run_episode(_unpickled(recipe), episode)
+
+
+@lru_cache
+def _end_with(parent: int) -> None:
+    """End this process soon after its parent: after a `kill -9` it would wait for work for minutes."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 @lru_cache(maxsize=1)

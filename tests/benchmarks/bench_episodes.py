@@ -1,1 +1,63 @@
-"""What an episode costs: `python -m pytest tests/benchmarks --benchmark-only --ignore-glob= -c /dev/null`."""
+"""What episodes cost. Run: python -m pytest tests/benchmarks/bench_episodes.py -o addopts= --benchmark-group-by=group."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from proxytune.domain import make_episode
+from proxytune.driving.bullet.plant import BulletPlant
+from proxytune.driving.drivetrain import drivetrain
+from proxytune.driving.episode import TICK_HZ
+from proxytune.driving.family import lane_following
+from proxytune.driving.planar import integrate
+from proxytune.driving.robot import read_robot
+from proxytune.effects import Setting, effects_from
+from proxytune.settings import Section
+
+ROBOT = read_robot("duckiebot")
+MINUTE = 60 * TICK_HZ
+CAREFUL = make_episode({}, agent="steady", start=1, seed=0)
+
+
+def twists():
+    train = drivetrain(ROBOT, effects_from(ROBOT.theta, ROBOT.figures))
+    duties = np.tile((0.33, 0.36), (MINUTE, 1))
+    return train.apply(duties, train.begin(Setting(TICK_HZ, np.zeros(2), ROBOT.figures)))[0]
+
+
+def family(folder: Path, plant: str):
+    return lane_following(Section(folder / "study.toml", "domain.", {"plant": plant}), model=None)
+
+
+@pytest.mark.benchmark(group="60-s episode")
+@pytest.mark.parametrize("plant", ["bullet", "planar"])
+def test_episode_with_camera_and_agent(benchmark, tmp_path, plant):
+    domain = family(tmp_path, plant)
+    metrics = benchmark.pedantic(domain.run, args=(CAREFUL,), rounds=7, warmup_rounds=1)
+    assert metrics["survival_time"] == 60.0
+
+
+@pytest.mark.benchmark(group="60-s episode")
+def test_bare_steps_of_the_same_episode(benchmark, tmp_path):
+    """PyBullet's stepSimulation alone, as often as in the episode, the robot driving along."""
+    import pybullet
+
+    def setup():
+        plant = BulletPlant(ROBOT, np.array((0.9, 0.2, 0.0)), 1.0 / TICK_HZ)
+        plant.move(np.tile((0.2, 0.0, 0.4), (TICK_HZ, 1)))
+        return (plant,), {}
+
+    def step(plant):
+        for _ in range(MINUTE):
+            pybullet.stepSimulation(plant._world)
+        plant.__exit__(None, None, None)
+
+    benchmark.pedantic(step, setup=setup, rounds=7, warmup_rounds=1)
+
+
+@pytest.mark.benchmark(group="one-minute log")
+def test_planar_replay_of_a_one_minute_log(benchmark):
+    """Duties at 60 Hz through delay, trim and motor lag to poses."""
+    poses = benchmark(lambda: integrate(np.zeros(3), twists(), 1.0 / TICK_HZ))
+    assert poses.shape == (MINUTE, 3)

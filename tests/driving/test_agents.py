@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from proxytune.driving.agents import AGENTS, Agent, LanePilot, Laggy, Leaning, Smoothed, Wary
+from proxytune.driving.agents import AGENTS, Agent, Laggy, LanePilot, Leaning, Smoothed, Wary
 from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.agents.perception import fit_lane, open_eye, white_pixels, yellow_pixels
 from proxytune.driving.agents.pilots import HALF_LANE_M, duties
@@ -55,7 +55,9 @@ def test_the_agents_differ_from_each_other():
     assert len({str(agent) for agent in AGENTS.values()}) == len(AGENTS) >= 10
 
 
-@pytest.mark.parametrize(("left", "turned"), [(0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.2), (0.0, -0.2), (0.04, 0.1)])
+@pytest.mark.parametrize(
+    ("left", "turned"), [(0.0, 0.0), (0.05, 0.0), (-0.05, 0.0), (0.0, 0.2), (0.0, -0.2), (0.04, 0.1)]
+)
 def test_the_lane_is_found_where_it_lies(left, turned):
     eye = open_eye(ROBOT, reach_m=0.5)
     picture = seen_from(left, turned)

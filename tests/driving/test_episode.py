@@ -100,16 +100,27 @@ def test_every_effect_of_the_catalogue_moves_an_agents_trajectory(tmp_path, thet
 
 def test_naming_a_nominal_value_changes_nothing(tmp_path):
     domain = family(tmp_path, plant="planar")
-    nominal = {"trim": 0.0, "delay": 0.15, "blur": 0.05, "camera_pitch": 19.15, "wheel_gain.left": 1.0, "driver_map": 0.0}
+    nominal = {
+        "trim": 0.0,
+        "delay": 0.15,
+        "blur": 0.05,
+        "camera_pitch": 19.15,
+        "wheel_gain.left": 1.0,
+        "driver_map": 0.0,
+    }
     np.testing.assert_array_equal(poses(domain, **nominal), poses(domain))
 
 
 def test_theta_goes_before_the_sections_effects_and_those_before_the_models(tmp_path):
     model = tmp_path / "model.toml"
-    model.write_text('robot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n[effects.delay]\ndelay = 0.1\n', encoding="utf-8")
+    model.write_text(
+        'robot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n[effects.delay]\ndelay = 0.1\n', encoding="utf-8"
+    )
     domain = family(tmp_path, model=model, effects={"trim": {"trim": 0.2}})
     instance = domain.instance({"delay": 0.0})
-    values = {e.name: e for chain in (instance.drivetrain.command, instance.drivetrain.actuation) for e in chain.effects}
+    values = {
+        e.name: e for chain in (instance.drivetrain.command, instance.drivetrain.actuation) for e in chain.effects
+    }
     assert values["trim"].trim == 0.2
     assert values["delay"].delay == 0.0
     assert values["motor_lag"].time_constant == 0.2
@@ -175,6 +186,26 @@ def test_pictures_come_at_the_cameras_rate(tmp_path):
         module.load_agent = original
     fresh = [not np.array_equal(a, b) for a, b in zip(seen, seen[1:], strict=False)]
     assert sum(fresh[20:40]) == 15
+
+
+@pytest.mark.parametrize("plant", ["bullet", "planar"])
+def test_replaying_an_agents_commands_repeats_its_drive(tmp_path, plant):
+    domain = family(tmp_path, plant=plant)
+    episode = make_episode({"trim": 0.1}, agent="brisk", start=2, seed=3)
+    driven = domain.drive(episode)
+    again = domain.replay(episode, driven.commands)
+    np.testing.assert_array_equal(again.poses, driven.poses)
+    assert len(again.pictures) == len(driven.commands)
+
+
+def test_the_same_commands_look_different_through_another_camera(tmp_path):
+    domain = family(tmp_path, plant="planar")
+    commands = np.full((20, 2), 0.3)
+    level, steep = (
+        domain.replay(make_episode({"camera_pitch": pitch}, agent="-", start=0, seed=0), commands) for pitch in (15, 25)
+    )
+    np.testing.assert_array_equal(level.poses, steep.poses)
+    assert np.abs(level.pictures.astype(float) - steep.pictures).mean() > 5.0
 
 
 def test_camera_effects_are_those_of_the_camera_stage():

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.effects import CATALOGUE, CHANNELS, Setting, Stage, effects_from, theta_names
 from proxytune.driving.robot import read_robot
+from proxytune.effects import CATALOGUE, CHANNELS, Setting, Stage, effects_from, theta_names
 
 ROBOT = read_robot("duckiebot")
 RATE_HZ = 60.0
@@ -53,7 +53,8 @@ def test_neutral_value_changes_nothing(name):
 
 @pytest.mark.parametrize(("name", "theta_name", "value"), PROBES)
 def test_every_probe_value_changes_the_signal(name, theta_name, value):
-    neutral = {n: p.neutral_value(ROBOT.figures) for n, p in zip(theta_names(CATALOGUE[name]), CATALOGUE[name].parameters)}
+    pairs = zip(theta_names(CATALOGUE[name]), CATALOGUE[name].parameters, strict=True)
+    neutral = {theta: parameter.neutral_value(ROBOT.figures) for theta, parameter in pairs}
     (effect,) = effects_from(neutral | {theta_name: value}, ROBOT.figures)
     (still,) = effects_from(neutral, ROBOT.figures)
     signal = a_signal(effect.stage, 2)

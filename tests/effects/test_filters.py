@@ -50,7 +50,8 @@ def test_wheel_gain_scales_each_wheel():
 def test_driver_map_jumps_by_its_offset_and_is_odd():
     duty = np.array([[0.0, 0.005], [0.01, 1.0], [-0.5, 0.5]])
     offset = 60 / 255
-    expected = [[0.0, 0.0], [offset + 0.01 * (1 - offset), 1.0], [-offset - 0.5 * (1 - offset), offset + 0.5 * (1 - offset)]]
+    low, half = offset + 0.01 * (1 - offset), offset + 0.5 * (1 - offset)
+    expected = [[0.0, 0.0], [low, 1.0], [-half, half]]
     np.testing.assert_allclose(run(DriverMap(offset), duty), expected)
 
 

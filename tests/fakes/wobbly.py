@@ -85,7 +85,7 @@ def formula(theta: Mapping[str, float], episode: Episode) -> dict[str, float]:
     """Distance and survival time, wobbling with the seed."""
     number = AGENTS.index(episode.agent)
     trim, delay = theta.get("trim", 0.0) / 0.3, theta.get("delay", 0.0) / 0.3
-    wobble = np.random.default_rng([episode.seed, episode.start]).normal(0.0, 0.02, 2)
+    wobble = np.random.default_rng([episode.seed, episode.start]).normal(0.0, 0.15, 2)
     far = abs(trim - np.sin(3.0 * number)) + abs(delay - (0.5 + 0.5 * np.cos(5.0 * number)))
     near = abs(trim + np.cos(2.0 * number)) + 0.3 * delay
     return {"distance": float(5.0 - far + wobble[0]), "survival_time": float(60.0 - 10.0 * near + wobble[1])}

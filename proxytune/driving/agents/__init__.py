@@ -22,9 +22,7 @@ AGENTS: Mapping[str, Agent] = MappingProxyType(
         "smooth": Smoothed(LanePilot(speed=0.25, offset_gain=8.0, slope_gain=2.0), share=0.15),
         "laggy": Laggy(LanePilot(speed=0.22, offset_gain=8.0, slope_gain=2.0), steps=5),
         "drifter": Leaning(LanePilot(speed=0.18, offset_gain=2.5, slope_gain=0.6), bias=0.15),
-        "wary": Wary(
-            LanePilot(speed=0.50, offset_gain=14.0, slope_gain=4.5), contrast=120.0, crisp=14.0, slowest=0.15
-        ),
+        "wary": Wary(LanePilot(speed=0.50, offset_gain=14.0, slope_gain=4.5), contrast=120.0, crisp=14.0, slowest=0.15),
         "wary_pursuer": Wary(PursuitPilot(speed=0.60, look_ahead_m=0.25), contrast=118.0, crisp=20.0, slowest=0.15),
         "sharp_eyed": LanePilot(speed=0.22, offset_gain=8.0, slope_gain=2.0, markings="yellow", contrast=112.0),
         "braitenberg": Braitenberg(speed=0.20, push=14.0),
@@ -33,5 +31,5 @@ AGENTS: Mapping[str, Agent] = MappingProxyType(
 )
 """The agents that travel with the package, by name."""
 
-__all__ = ["AGENTS", "Agent", "Braitenberg", "Command", "EdgePilot", "LanePilot", "Laggy", "Leaning", "Picture"]
+__all__ = ["AGENTS", "Agent", "Braitenberg", "Command", "EdgePilot", "Laggy", "LanePilot", "Leaning", "Picture"]
 __all__ += ["PursuitPilot", "Smoothed", "Wary"]

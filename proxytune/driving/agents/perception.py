@@ -36,11 +36,13 @@ class Eye:
         first_row: The rows from here on are looked at.
         ahead: How far ahead of the axle each of their pixels lies [m], NaN beyond `reach`.
         left: How far to the left [m].
+        near: Whether it lies within `reach`.
     """
 
     first_row: int
     ahead: NDArray[np.float64]
     left: NDArray[np.float64]
+    near: NDArray[np.bool_]
 
 
 @functools.lru_cache
@@ -49,7 +51,8 @@ def _eye(figures: CameraFigures, reach_m: float) -> Eye:
     near = ground[..., 0] <= reach_m
     first_row = int(np.argmax(near.any(axis=1)))
     floor = np.where(near[..., None], ground, np.nan)[first_row:].reshape(-1, 2)
-    return Eye(first_row, floor[:, 0], floor[:, 1])
+    ahead, left = np.ascontiguousarray(floor.T)
+    return Eye(first_row, ahead, left, near[first_row:].ravel())
 
 
 def open_eye(robot: Robot, *, reach_m: float = 0.7) -> Eye:
@@ -59,16 +62,17 @@ def open_eye(robot: Robot, *, reach_m: float = 0.7) -> Eye:
 
 def yellow_pixels(picture: Picture, eye: Eye, *, contrast: float = 60.0) -> Pixels:
     """Pixels of the dashed centre line: red and green brighter than blue by `contrast` (of 255)."""
-    red, green, blue = _colours(picture, eye)
-    yellow = (np.minimum(red, green) - blue > contrast) & ~np.isnan(eye.ahead)
-    return np.flatnonzero(yellow)
+    looked = picture[eye.first_row :].reshape(-1, 3)
+    blue = looked[:, 2].astype(np.int16)
+    yellow = np.minimum(looked[:, 0], looked[:, 1]) - blue > contrast
+    return np.flatnonzero(yellow & eye.near)
 
 
 def white_pixels(picture: Picture, eye: Eye, *, brightness: float = 150.0) -> Pixels:
     """Pixels of the solid edge lines: every colour brighter than `brightness` (of 255)."""
-    red, green, blue = _colours(picture, eye)
-    white = (np.minimum(np.minimum(red, green), blue) > brightness) & ~np.isnan(eye.ahead)
-    return np.flatnonzero(white)
+    looked = picture[eye.first_row :].reshape(-1, 3)
+    darkest = np.minimum(np.minimum(looked[:, 0], looked[:, 1]), looked[:, 2])
+    return np.flatnonzero((darkest > brightness) & eye.near)
 
 
 def fit_lane(eye: Eye, *, yellow: Pixels, white: Pixels, half_lane_m: float) -> Lane | None:
@@ -79,18 +83,16 @@ def fit_lane(eye: Eye, *, yellow: Pixels, white: Pixels, half_lane_m: float) -> 
     Returns:
         The lane, or None where fewer than six pixels are left to fit.
     """
-    divide = np.mean(eye.left[yellow]) if yellow.size else half_lane_m
-    white = white[eye.left[white] < divide]
-    ahead = np.concatenate((eye.ahead[yellow], eye.ahead[white]))
-    left = np.concatenate((eye.left[yellow] - half_lane_m, eye.left[white] + half_lane_m))
-    if ahead.size < 6:
+    left_of_robot = eye.left.take(yellow)
+    divide = left_of_robot.sum() / yellow.size if yellow.size else half_lane_m
+    white = white[eye.left.take(white) < divide]
+    count = yellow.size + white.size
+    if count < 6:
         return None
-    mean_ahead, mean_left = float(ahead.mean()), float(left.mean())
+    ahead = eye.ahead.take(np.concatenate((yellow, white)))
+    left = np.concatenate((left_of_robot - half_lane_m, eye.left.take(white) + half_lane_m))
+    mean_ahead, mean_left = float(ahead.sum()) / count, float(left.sum()) / count
     centred = ahead - mean_ahead
     # a ridge keeps a handful of pixels at one distance from spinning the line round
-    slope = float(centred @ (left - mean_left)) / (float(centred @ centred) + 0.005 * ahead.size)
-    return Lane(mean_left - slope * mean_ahead, slope, ahead.size)
-
-
-def _colours(picture: Picture, eye: Eye) -> NDArray[np.int16]:
-    return picture[eye.first_row :].reshape(-1, 3).T.astype(np.int16)
+    slope = float(centred @ left) / (float(centred @ centred) + 0.005 * count)
+    return Lane(mean_left - slope * mean_ahead, slope, count)

@@ -1,0 +1,107 @@
+"""The two cameras agree: PyBullet's renderer is the reference for the ground-plane camera."""
+
+from dataclasses import replace
+
+import numpy as np
+import pybullet
+import pytest
+
+from proxytune.driving.bullet.renderer import BulletCamera
+from proxytune.driving.cameras import SKY, CameraFigures, GroundPlaneCamera, ground_points
+from proxytune.driving.maps import SMALL_LOOP
+from proxytune.driving.texture import Floor, draw_floor
+from proxytune.errors import SettingsError
+
+LEVEL = {"roll_deg": 0.0, "yaw_deg": 0.0, "k1": 0.0}
+NOMINAL = CameraFigures(
+    columns=64, rows=48, forward_m=0.066, pitch_deg=19.15, height_m=0.108, field_of_view_deg=75.0, **LEVEL
+)
+FLOOR = draw_floor(SMALL_LOOP)
+
+
+def loop_poses(count):
+    """Poses along both lanes, in their directions, curves and straights."""
+    angles = np.linspace(0.0, 2 * np.pi, count, endpoint=False)
+    outer = np.arange(count) % 2 == 0
+    radius, middle = np.where(outer, 0.72, 0.46), SMALL_LOOP.side / 2
+    heading = angles + np.where(outer, np.pi / 2, -np.pi / 2)
+    return np.stack((middle + radius * np.cos(angles), middle + radius * np.sin(angles), heading), axis=1)
+
+
+def markings(pictures):
+    """Masks of white and yellow together."""
+    red, green, blue = np.moveaxis(pictures.astype(int), -1, 0)
+    white = (np.minimum(np.minimum(red, green), blue) > 115) & (blue - red < 40)
+    return white | ((red - blue > 50) & (red > 90))
+
+
+def both(figures, floor, poses):
+    with BulletCamera(figures, floor) as reference:
+        return GroundPlaneCamera(figures, floor).render(poses), reference.render(poses)
+
+
+def below_horizon(figures):
+    """Rows without a pixel that touches the horizon, where the reference mixes floor and sky."""
+    on_floor = np.isfinite(ground_points(figures)[..., 0]).all(axis=1)
+    return on_floor & np.roll(on_floor, 1)
+
+
+@pytest.mark.parametrize(("columns", "rows", "overlap", "difference"), [(160, 120, 0.92, 1.0), (64, 48, 0.86, 2.0)])
+def test_the_cameras_agree_along_the_loop(columns, rows, overlap, difference):
+    """Below the horizon at 12 poses: intersection over union of markings and mean absolute difference in grey levels.
+
+    Measured: 0.95 and 0.8 at 160 × 120, 0.90 and 1.5 at 64 × 48, where much of a line lies in pixels on its edge.
+    With half a degree of pitch between the cameras the overlaps are 0.73 and 0.76.
+    """
+    figures = replace(NOMINAL, columns=columns, rows=rows)
+    ours, reference = both(figures, FLOOR, loop_poses(12))
+    rows_seen = below_horizon(figures)
+    a, b = markings(ours[:, rows_seen]), markings(reference[:, rows_seen])
+    assert (a & b).sum() / (a | b).sum() > overlap
+    assert np.abs(ours.astype(float) - reference)[:, rows_seen].mean() < difference
+
+
+@pytest.mark.parametrize(
+    "mounting",
+    [{}, {"roll_deg": 8.0}, {"yaw_deg": -12.0}, {"pitch_deg": 32.0, "height_m": 0.15}, {"field_of_view_deg": 60.0}],
+)
+def test_the_cameras_agree_on_a_floor_without_symmetry_however_they_are_mounted(mounting):
+    """Red grows with x and green with y: one grey level is 1 cm."""
+    side = 1024
+    pixels = np.full((side, side, 3), 60, dtype=np.uint8)
+    pixels[..., 0] = np.linspace(0, 255, side)[None, :]
+    pixels[..., 1] = np.linspace(0, 255, side)[:, None]
+    figures = replace(NOMINAL, **mounting)
+    ours, reference = both(figures, Floor(pixels, 400.0, -0.4), loop_poses(4))
+    near = np.linalg.norm(ground_points(figures), axis=-1) < 0.8
+    off = np.abs(ours.astype(float) - reference)[:, near]
+    assert near.mean() > 0.4
+    assert off.mean() < 0.4
+    assert off.max() < 3.0
+
+
+def test_both_see_the_sky_where_the_horizon_is():
+    ours, reference = both(NOMINAL, FLOOR, loop_poses(2))
+    sky = (ours == SKY).all(axis=-1)
+    assert (reference[sky & np.roll(sky, -1, axis=1)] == SKY).all()
+    assert not (reference[~sky] == SKY).all(axis=-1).any()
+
+
+def test_a_distorting_lens_is_refused_with_the_way_out():
+    with pytest.raises(SettingsError, match="ground_plane") as caught:
+        BulletCamera(replace(NOMINAL, k1=-0.2), FLOOR)
+    assert "\n" not in str(caught.value)
+
+
+def test_cameras_live_side_by_side_and_end_with_their_worlds():
+    before = [pybullet.isConnected(world) for world in range(8)]
+    poses = loop_poses(1)
+    with BulletCamera(NOMINAL, FLOOR) as one:
+        alone = one.render(poses)
+        with BulletCamera(replace(NOMINAL, pitch_deg=30.0), FLOOR) as other:
+            steeper = other.render(poses)
+            assert (one.render(poses) == alone).all()
+    assert (steeper != alone).any()
+    forgotten = BulletCamera(NOMINAL, FLOOR)
+    del forgotten
+    assert [pybullet.isConnected(world) for world in range(8)] == before

@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from proxytune.errors import RunError
+from proxytune.search.design import design_point
+from proxytune.search.proposer import Trial
+from proxytune.search.surrogate import NOISE, fit_surrogate, unit_array
+from proxytune.space import Interval, Space
+
+SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
+
+
+def steps(values):
+    """An integer score with its lowest step around (0.1, 0.1), like PRPV's."""
+    return float(np.floor(40 * (abs(values[0] - 0.1) + abs(values[1] - 0.1))))
+
+
+def visited(count, score=steps):
+    points = [design_point(SPACE, index, 5) for index in range(count)]
+    return [Trial(values, score(values)) for values in points]
+
+
+def test_the_posterior_is_the_same_to_the_last_bit_in_whatever_order_trials_are_given():
+    trials = visited(15)
+    there, back = fit_surrogate(SPACE, trials, 1), fit_surrogate(SPACE, trials[::-1], 1)
+    assert np.array_equal(there.predict(np.eye(2)), back.predict(np.eye(2)))
+
+
+def test_the_incumbent_is_not_the_luckiest_score():
+    """One freak zero among high scores does not win over a valley of low ones."""
+    trials = visited(40)
+    far = max(trials, key=lambda trial: trial.score)
+    lucky = Trial(tuple(value + 1e-3 for value in far.values), 0.0)
+    values, mean = fit_surrogate(SPACE, [*trials, lucky], 1).incumbent()
+    assert values != lucky.values
+    assert steps(values) <= 3
+    assert mean < 5
+
+
+def test_the_noise_never_vanishes_even_on_scores_without_any():
+    surrogate = fit_surrogate(SPACE, visited(30, lambda values: 10 * values[0]), 1)
+    assert NOISE[0] * 0.999 <= surrogate.model.noise_ <= NOISE[1] * 1.001
+
+
+def test_the_posterior_is_surer_where_trials_are():
+    trials = [trial for trial in visited(30) if trial.values[0] < 0.15]
+    surrogate = fit_surrogate(SPACE, trials, 1)
+    _, at_trials = surrogate.at_visited()
+    _, elsewhere = surrogate.predict(np.array([[1.0, 0.0], [1.0, 1.0]]))
+    assert at_trials.max() < elsewhere.min()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_few_trials_or_equal_scores_still_give_finite_predictions(count):
+    for score in (steps, lambda values: 4.0):
+        mean, deviation = fit_surrogate(SPACE, visited(count, score), 1).predict(np.array([[0.3, 0.7]]))
+        assert np.isfinite(mean).all()
+        assert np.isfinite(deviation).all()
+
+
+def test_failed_trials_are_left_out():
+    trials = visited(9)
+    assert len(fit_surrogate(SPACE, [*trials, Trial((0.1, 0.1), None)], 1).visited) == 9
+
+
+def test_without_a_single_score_it_says_so():
+    with pytest.raises(RunError, match="no trial has a score"):
+        fit_surrogate(SPACE, [Trial((0.1, 0.1), None)], 1)
+
+
+def test_points_become_rows_of_the_unit_cube():
+    assert np.allclose(unit_array(SPACE, [(0.0, -0.3), (0.3, 0.0)]), [[0.0, 0.0], [1.0, 0.5]])
+    assert unit_array(SPACE, []).shape == (0, 2)

@@ -1,0 +1,114 @@
+import sqlite3
+
+import pytest
+
+from proxytune.errors import StoreError
+from proxytune.study.database import FORMAT, connect, told
+
+
+def made(path):
+    connect(path, writable=True).close()
+    return path
+
+
+def test_a_database_is_made_with_its_format_and_plain_tables(tmp_path):
+    path = made(tmp_path / "study.db")
+    with sqlite3.connect(path) as plain:
+        assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
+        names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    assert names == {"facts", "instances", "trials", "episodes", "sweeps"}
+
+
+def test_everything_is_in_the_one_file(tmp_path):
+    connection = connect(tmp_path / "study.db", writable=True)
+    connection.execute("INSERT INTO facts VALUES ('seed', '1')")
+    assert [path.name for path in tmp_path.iterdir()] == ["study.db"]
+    connection.close()
+
+
+def test_an_empty_file_left_by_a_kill_becomes_a_database(tmp_path):
+    (tmp_path / "study.db").touch()
+    connection = connect(tmp_path / "study.db", writable=True)
+    assert connection.execute("SELECT count(*) FROM trials").fetchone() == (0,)
+    connection.close()
+
+
+def test_reading_an_empty_file_says_to_run_the_study(tmp_path):
+    (tmp_path / "study.db").touch()
+    with pytest.raises(StoreError, match="is empty; run the study first"):
+        connect(tmp_path / "study.db", writable=False)
+
+
+def refused(path, expected, writable=True):
+    before = path.read_bytes()
+    with pytest.raises(StoreError) as told_error:
+        connect(path, writable=writable)
+    assert expected in str(told_error.value)
+    assert str(path) in str(told_error.value)
+    assert "\n" not in str(told_error.value)
+    assert path.read_bytes() == before, "a refused database must stay as it was"
+
+
+def test_a_newer_format_is_refused(tmp_path):
+    path = made(tmp_path / "study.db")
+    with sqlite3.connect(path) as plain:
+        plain.execute(f"PRAGMA user_version = {FORMAT + 1}")
+    refused(path, f"has format {FORMAT + 1}, this proxytune reads up to {FORMAT}; install a newer one")
+
+
+def test_somebody_else_s_database_is_refused(tmp_path):
+    with sqlite3.connect(tmp_path / "study.db") as plain:
+        plain.execute("CREATE TABLE photos (name TEXT)")
+    refused(tmp_path / "study.db", "is not a study's database; move it away")
+
+
+def test_a_text_file_is_refused(tmp_path):
+    (tmp_path / "study.db").write_text("trial,prpv\n" * 200)
+    refused(tmp_path / "study.db", "is damaged (file is not a database); restore a copy")
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_a_truncated_database_is_refused(tmp_path, share):
+    path = tmp_path / "study.db"
+    connection = connect(path, writable=True)
+    rows = [(number, f"identity {number}", "{}") for number in range(3000)]
+    connection.execute("BEGIN")
+    connection.executemany("INSERT INTO instances VALUES (?, ?, ?)", rows)
+    connection.execute("COMMIT")
+    connection.close()
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    refused(path, "is damaged")
+    refused(path, "is damaged", writable=False)
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    with pytest.raises(StoreError, match=r"cannot be written \(unable to open database file\)"):
+        connect(tmp_path / "nowhere" / "study.db", writable=True)
+
+
+def test_a_full_disk_is_told_and_what_was_committed_stays(tmp_path):
+    path = tmp_path / "study.db"
+    connection = connect(path, writable=True)
+    (pages,) = connection.execute("PRAGMA page_count").fetchone()
+    connection.execute(f"PRAGMA max_page_count = {pages + 2}")
+    written = 0
+    with pytest.raises(StoreError, match="the disk is full; make room and run again"), told(path):
+        for number in range(10_000):
+            connection.execute("INSERT INTO instances VALUES (?, ?, '{}')", (number, f"identity {number}"))
+            written += 1
+    connection.close()
+    again = connect(path, writable=True)
+    assert again.execute("SELECT count(*) FROM instances").fetchone() == (written,)
+    assert written > 10
+    again.close()
+
+
+def test_a_database_that_another_program_writes_to_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr("proxytune.study.database.PATIENCE_S", 0.05)
+    path = made(tmp_path / "study.db")
+    other = sqlite3.connect(path, isolation_level=None)
+    other.execute("BEGIN EXCLUSIVE")
+    with pytest.raises(StoreError, match="another program holds it open"):
+        connect(path, writable=True)
+    other.close()

@@ -1,0 +1,62 @@
+import pytest
+
+from proxytune.errors import InputError
+from proxytune.study.family import load_family
+from proxytune.study.settings import read_study_settings
+
+
+def load(folder):
+    settings = read_study_settings(folder)
+    return load_family(settings, settings.proxy)
+
+
+def test_a_factory_gets_the_domain_table_and_the_model(make_study):
+    folder = make_study(domain={"version": '"7"'}, proxy='"model.toml"')
+    (folder / "model.toml").write_text("trim = 0.2\n")
+    family = load(folder)
+    assert (family.version, family.theta) == ("7", (("trim", 0.2),))
+
+
+def test_modules_in_the_study_s_folder_can_be_imported(make_study):
+    folder = make_study(family='"my_own_family:make"')
+    (folder / "my_own_family.py").write_text("from wobbly import wobbly as make\n")
+    assert load(folder).starts == 5
+
+
+BAD = {
+    "no colon": ({"family": '"wobbly"'}, "family: must be 'module:factory', got 'wobbly'"),
+    "no such module": ({"family": '"wobbli:wobbly"'}, "family: no module 'wobbli' here"),
+    "no such factory": ({"family": '"wobbly:wobly"'}, "family: wobbly has no function 'wobly'; did you mean 'wobbly'?"),
+    "a factory with a bug": ({"family": '"wobbly:broken_factory"'}, "broken_factory raised KeyError: 'robot'; mend it"),
+    "something else": ({"family": '"wobbly:not_a_family"'}, "made no domain family: it lacks identity, metrics"),
+    "a missing model": ({"proxy": '"nowhere.toml"'}, "proxy: no such file: "),
+    "an unknown parameter": (
+        {"parameters": {"trimm": "[0, 0.1]"}},
+        "parameters.trimm: unknown parameter; did you mean 'trim'?",
+    ),
+    "a box beyond the family's": (
+        {"parameters": {"trim": "[-0.5, 0.3]"}},
+        "parameters.trim: must lie within [-0.3, 0.3], got [-0.5, 0.3]",
+    ),
+    "too many starts": ({"starts": "6"}, "starts: the family has 5, got 6"),
+    "an unknown metric": ({"metrics": '["distanc:max"]'}, "unknown metric 'distanc'; did you mean 'distance'?"),
+    "an unknown agent": ({"agents": '["agent0", "agnet1"]'}, "agents: no agent 'agnet1'; did you mean 'agent1'?"),
+    "an unknown key of the domain": ({"domain": {"robt": "1"}}, "domain.robt: unknown key"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
+    changes, expected = BAD[case]
+    with pytest.raises(InputError) as told:
+        load(make_study(**changes))
+    assert expected in str(told.value)
+    assert "study.toml: " in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_a_module_that_cannot_be_imported_is_told(make_study):
+    folder = make_study(family='"falls_over:make"')
+    (folder / "falls_over.py").write_text("1 / 0\n")
+    with pytest.raises(InputError, match="importing falls_over raised ZeroDivisionError: division by zero"):
+        load(folder)

@@ -1,0 +1,98 @@
+"""What a user can type is documented, and what is documented works."""
+
+import argparse
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from proxytune.cli.main import COMMANDS, parser
+from proxytune.driving.agents import AGENTS
+from proxytune.driving.robot import UNITS
+from proxytune.driving.task import METRICS
+from proxytune.effects import CATALOGUE
+from proxytune.study.settings import KEYS
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+STUDIES = (ROOT / "studies" / "README.md").read_text(encoding="utf-8")
+ROBOTS = (ROOT / "robots" / "README.md").read_text(encoding="utf-8")
+SHELL_LINES = [
+    line.removeprefix("$ ")
+    for block in re.findall(r"```(?:sh|console)\n(.*?)```", README, flags=re.DOTALL)
+    for line in block.splitlines()
+    if line.removeprefix("$ ").startswith("python -m proxytune")
+]
+
+
+def options():
+    subcommands = next(a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
+    for name, command in subcommands.choices.items():
+        for action in command._actions:
+            yield from ((name, flag) for flag in action.option_strings if flag.startswith("--") and flag != "--help")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_is_in_the_readme(command):
+    assert f"python -m proxytune {command}" in README
+
+
+@pytest.mark.parametrize(("command", "option"), sorted(set(options())))
+def test_every_option_is_in_the_readme(command, option):
+    row = next(line for line in README.splitlines() if line.startswith(f"| `{command}"))
+    assert f"`{option}" in row or option == "--json"
+    assert "`--json`" in README
+
+
+@pytest.mark.parametrize("key", [*KEYS, "robot", "plant", "camera", "map", "seconds", "position_noise_m", "effects"])
+def test_every_study_key_is_documented(key):
+    assert re.search(rf"^\| `\[?{key}\]?` ", STUDIES, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_effect_and_its_parameters_are_documented(name):
+    row = next(line for line in STUDIES.splitlines() if line.startswith(f"| `{name}`"))
+    assert CATALOGUE[name].stage.value in row
+    assert all(f"`{parameter.name}`" in row for parameter in CATALOGUE[name].parameters)
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_every_metric_is_documented(metric):
+    assert f"`{metric}` [{METRICS[metric]}]" in STUDIES
+
+
+@pytest.mark.parametrize("figure", UNITS)
+def test_every_figure_of_a_robot_is_documented(figure):
+    assert f"`{figure}`" in ROBOTS
+
+
+@pytest.mark.parametrize("agent", AGENTS)
+def test_every_agent_is_listed_with_how_it_drives(agent):
+    listed = subprocess.run(
+        [sys.executable, "-m", "proxytune", "list", "agents"], capture_output=True, text=True, check=True, cwd=ROOT
+    ).stdout
+    assert re.search(rf"^{agent}\s+\S", listed, flags=re.MULTILINE)
+
+
+def test_every_room_is_in_the_readme_in_reading_order():
+    rooms = {path.name.removesuffix(".py") for path in (ROOT / "proxytune").iterdir() if not path.name.startswith("__")}
+    named = re.findall(r"^\| `proxytune/(\w+)", README, flags=re.MULTILINE)
+    assert rooms == set(named)
+
+
+def test_every_link_of_the_documents_leads_somewhere():
+    for document in [ROOT / "README.md", *ROOT.glob("studies/**/README.md"), *ROOT.glob("robots/**/README.md")]:
+        for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
+            assert target.startswith("http") or (document.parent / target).exists(), f"{document}: {target}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", SHELL_LINES)
+def test_the_commands_of_the_readme_run(line, tmp_path):
+    words = shlex.split(line.split(" # ")[0])
+    done = subprocess.run([sys.executable, *words[1:]], capture_output=True, text=True, cwd=tmp_path, timeout=900)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout

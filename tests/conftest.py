@@ -1,5 +1,6 @@
 """What several rooms' tests share: a study of a domain family that is a formula."""
 
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,7 @@ PARAMETERS = {"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
 TRUTH = {"trim": 0.1, "delay": 0.12}
 
 MakeStudy = Callable[..., Path]
+"""Writes a study's folder; call it again to edit the study.toml."""
 
 
 def study_text(parameters: dict[str, str], domain: dict[str, str], changes: dict[str, str | None]) -> str:
@@ -36,17 +38,16 @@ def study_text(parameters: dict[str, str], domain: dict[str, str], changes: dict
     return "\n".join(lines) + "\n"
 
 
-@pytest.fixture
-def make_study(tmp_path: Path) -> MakeStudy:
-    """Write a study's folder; call it again to edit the study.toml."""
+def study_maker(parent: Path) -> MakeStudy:
+    """What writes studies into this folder."""
 
     def make(
-        name: str = "study",
+        called: str = "study",
         parameters: dict[str, str] = PARAMETERS,
         domain: dict[str, str] | None = None,
         **changes: str | None,
     ) -> Path:
-        folder = tmp_path / name
+        folder = parent / called
         folder.mkdir(exist_ok=True)
         (folder / "study.toml").write_text(study_text(parameters, domain or {}, changes))
         if not (folder / "target.csv").exists():
@@ -54,6 +55,33 @@ def make_study(tmp_path: Path) -> MakeStudy:
         return folder
 
     return make
+
+
+@pytest.fixture
+def make_study(tmp_path: Path) -> MakeStudy:
+    """Write a study's folder; call it again to edit the study.toml."""
+    return study_maker(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished study, run once."""
+    from proxytune.search.gaussian_process import GaussianProcess
+    from proxytune.study.progress import Silent
+    from proxytune.study.run import run_study
+    from proxytune.study.store import Store
+    from proxytune.study.study import open_study
+
+    folder = study_maker(tmp_path_factory.mktemp("finished"))()
+    with Store.open(folder) as store:
+        run_study(open_study(folder), store, GaussianProcess(5), Silent())
+    return folder
+
+
+@pytest.fixture
+def finished(finished_once: Path, tmp_path: Path) -> Path:
+    """A finished study of one's own, where `make_study` edits it."""
+    return Path(shutil.copytree(finished_once, tmp_path / "study"))
 
 
 def write_target(path: Path) -> None:

@@ -7,6 +7,7 @@ import pickle
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
@@ -44,7 +45,10 @@ def running(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Ite
     try:
         yield _told(outcomes)
     finally:
-        outcomes.close()
+        with warnings.catch_warnings():
+            # joblib warns of episodes it has finished in vain; whoever leaves early knows.
+            warnings.simplefilter("ignore", UserWarning)
+            outcomes.close()
 
 
 def _here(family: DomainFamily, episodes: Sequence[Episode]) -> Generator[Outcome, None, None]:

@@ -78,7 +78,8 @@ def read_study_settings(path: Path) -> StudySettings:
     path = path / FILE_NAME if path.is_dir() else path
     read = read_settings(path)
     read.only(KEYS)
-    read.whole("format", low=1, high=FORMAT)
+    if read.whole("format", low=1) > FORMAT:
+        raise read.error("format", f"this proxytune reads up to {FORMAT}; install a newer one")
     return StudySettings(
         path=path,
         name=read.text("name", path.absolute().parent.name),

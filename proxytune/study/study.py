@@ -84,8 +84,10 @@ def facts(study: Study) -> dict[str, Any]:
 
 def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
     """Which facts differ, each as one phrase for the user."""
-    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
-    named = [key for key in keys if key != "identity"]
+    keys = [key for key in {**after, **before} if before.get(key) != after.get(key)]
+    # Other agents or metrics make it another part of the target's table; that is their doing.
+    implied = {"identity", "target"} if {"agents", "metrics"} & set(keys) else {"identity"}
+    named = [key for key in keys if key not in implied]
     if keys and not named:
         return ["the domain family (its code, its robot or the proxy's model)"]
     return [_change(key, before.get(key), after.get(key)) for key in named]

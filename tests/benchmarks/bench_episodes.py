@@ -1,4 +1,4 @@
-"""What episodes cost. Run: python -m pytest tests/benchmarks/bench_episodes.py -o addopts= --benchmark-group-by=group."""
+"""What episodes cost: `python -m pytest tests/benchmarks/bench_episodes.py -o addopts=`."""
 
 from pathlib import Path
 

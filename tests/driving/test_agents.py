@@ -135,7 +135,8 @@ def test_an_unknown_agent_is_told_with_the_nearest(tmp_path):
 
 def test_a_users_agent_is_loaded_from_its_folder(tmp_path):
     (tmp_path / "mine_agents.py").write_text(
-        "class Mine:\n    def begin(self, robot): return 0\n    def act(self, picture, memory): return (0.1, 0.1), memory\n"
+        "class Mine:\n    def begin(self, robot): return 0\n"
+        "    def act(self, picture, memory): return (0.1, 0.1), memory\n"
         "ready = Mine()\nbroken = 3\n",
         encoding="utf-8",
     )

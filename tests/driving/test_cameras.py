@@ -39,7 +39,9 @@ GRADIENT = gradient_floor()
 def on_map(points, pose):
     x, y, heading = pose
     cos, sin = math.cos(heading), math.sin(heading)
-    return np.stack((x + cos * points[..., 0] - sin * points[..., 1], y + sin * points[..., 0] + cos * points[..., 1]), -1)
+    return np.stack(
+        (x + cos * points[..., 0] - sin * points[..., 1], y + sin * points[..., 0] + cos * points[..., 1]), -1
+    )
 
 
 def loop_poses(count):
@@ -69,6 +71,7 @@ def test_channels_survive_the_way_there_and_back():
         ("field_of_view_deg", 180.0),
         ("field_of_view_deg", 0.0),
         ("rows", 0),
+        ("columns", 0),
         ("pitch_deg", math.inf),
     ],
 )

@@ -1,5 +1,7 @@
 """An episode is the same for the same seed, ends when it should, and fails loudly with the agent named."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,8 @@ def poses(domain, agent="brisk", start=1, seed=5, **theta):
 
 
 BAD_AGENTS = """
+import itertools
+
 import numpy as np
 class Bad:
     def __init__(self, answer): self.answer = answer
@@ -184,7 +188,7 @@ def test_pictures_come_at_the_cameras_rate(tmp_path):
         poses(domain)
     finally:
         module.load_agent = original
-    fresh = [not np.array_equal(a, b) for a, b in zip(seen, seen[1:], strict=False)]
+    fresh = [not np.array_equal(a, b) for a, b in itertools.pairwise(seen)]
     assert sum(fresh[20:40]) == 15
 
 

@@ -1,90 +1,162 @@
-"""A robot is found in the lane that its heading belongs to, wherever on the map it is."""
+"""Where a pose lies in its lane, held against centre lines laid out point by point."""
+
+import functools
+from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from proxytune.driving.lane import lane_position, lap_length
+from proxytune.driving.lane import lane_length, lane_pose, off_map
 from proxytune.driving.maps import SMALL_LOOP as ROAD
 
-T = ROAD.tile
-ON_MAP = st.floats(0.01, ROAD.side - 0.01)
-ANY_HEADING = st.floats(-10.0, 10.0)
+TILE = ROAD.tile
+MIDDLE = np.array([ROAD.side / 2, ROAD.side / 2])
+quick = settings(derandomize=True, max_examples=50, deadline=None)
+coordinates = st.floats(-0.5, ROAD.side + 0.5)
+points = st.tuples(coordinates, coordinates)
+headings = st.floats(-10, 10)
 
 
-def lap_of(outer, count=4000):
-    """Poses along a lane's centre line, evenly spaced, made from arcs and straights by hand."""
-    radius = T / 2 + (ROAD.lane_offset if outer else -ROAD.lane_offset)
-    centres = [(2 * T, T, -np.pi / 2), (2 * T, 2 * T, 0.0), (T, 2 * T, np.pi / 2), (T, T, np.pi)]
-    pieces = []
-    for x, y, first in centres:
-        angle = first + np.linspace(0.0, np.pi / 2, 400)
-        pieces.append(np.stack((x + radius * np.cos(angle), y + radius * np.sin(angle), angle + np.pi / 2), axis=1))
-    corners = np.concatenate([*pieces, pieces[0][:1] + (0.0, 0.0, 2 * np.pi)])
-    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(corners[:, :2], axis=0).T))))
-    at = np.linspace(0.0, along[-1], count)
-    poses = np.stack([np.interp(at, along, np.unwrap(column) if i == 2 else column) for i, column in enumerate(corners.T)], 1)
-    return poses if outer else (poses + (0.0, 0.0, np.pi))[::-1]
+def turned(points, quarters):
+    cosine, sine = round(np.cos(quarters * pi / 2)), round(np.sin(quarters * pi / 2))
+    return MIDDLE + (np.asarray(points) - MIDDLE) @ np.array([[cosine, sine], [-sine, cosine]])
 
 
-@pytest.mark.parametrize(("outer", "length"), [(True, 4.99), (False, 3.37)])
-def test_laps_are_as_long_as_the_reference_says(outer, length):
-    assert lap_length(ROAD, outer=outer) == pytest.approx(length, abs=0.005)
+def lap(counter_clockwise, spacing=0.001):
+    """A lane's centre line from the lower end of the right side's straight: points and headings."""
+    radius = TILE / 2 + ROAD.lane_offset * (1 if counter_clockwise else -1)
+    straight = np.arange(0, TILE, spacing)
+    angle = np.arange(0, pi / 2, spacing / radius)
+    x = np.concatenate((np.full(straight.size, 2 * TILE + radius), 2 * TILE + radius * np.cos(angle)))
+    y = np.concatenate((TILE + straight, 2 * TILE + radius * np.sin(angle)))
+    heading = np.concatenate((np.full(straight.size, pi / 2), pi / 2 + angle))
+    quarter = np.column_stack((x, y))
+    line = np.concatenate([turned(quarter, quarters) for quarters in range(4)])
+    directions = np.concatenate([heading + quarters * pi / 2 for quarters in range(4)])
+    return (line, directions) if counter_clockwise else (line[::-1], directions[::-1] + pi)
 
 
-@pytest.mark.parametrize("outer", [True, False])
-def test_a_lap_on_the_centre_line_is_found_there(outer):
-    lane = lane_position(ROAD, lap_of(outer))
-    assert (lane.outer == outer).all()
-    assert np.abs(lane.deviation).max() < 1e-4
-    assert np.abs(lane.heading_error).max() < 0.02
-    steps = np.remainder(np.diff(lane.along) + 1.0, lap_length(ROAD, outer=outer)) - 1.0
-    assert steps.min() > 0.0
-    assert steps.sum() == pytest.approx(lap_length(ROAD, outer=outer), abs=1e-3)
+LAPS = {True: lap(True), False: lap(False)}
+both_lanes = pytest.mark.parametrize("counter_clockwise", [True, False], ids=("outer", "inner"))
 
 
-@pytest.mark.parametrize("outer", [True, False])
-@pytest.mark.parametrize("left", [0.06, -0.06])
-def test_deviation_is_positive_to_the_left_of_travel(outer, left):
-    poses = lap_of(outer)
-    poses[:, 0] -= left * np.sin(poses[:, 2])
-    poses[:, 1] += left * np.cos(poses[:, 2])
-    np.testing.assert_allclose(lane_position(ROAD, poses).deviation, left, atol=2e-4)
+def wrapped(way, length):
+    return np.mod(way + length / 2, length) - length / 2
 
 
-def test_heading_error_is_positive_when_turned_to_the_left():
-    np.testing.assert_allclose(lane_position(ROAD, lap_of(True) + (0, 0, 0.3)).heading_error, 0.3, atol=0.02)
-    np.testing.assert_allclose(lane_position(ROAD, lap_of(False) + (0, 0, 0.3)).heading_error, 0.3, atol=0.02)
+@pytest.mark.parametrize(("counter_clockwise", "length"), [(True, 4.99), (False, 3.37)])
+def test_laps_are_as_long_as_the_design_says(counter_clockwise, length):
+    assert lane_length(ROAD, counter_clockwise) == pytest.approx(length, abs=0.005)
 
 
-def test_the_papers_starts_are_eight_outer_and_two_inner_all_in_lane():
-    starts = np.array(ROAD.starts) * (1.0, 1.0, np.pi / 180.0)
-    lane = lane_position(ROAD, starts)
-    assert lane.outer.sum() == 8
-    assert (np.abs(lane.deviation) < ROAD.lane_width / 2).all()
+@both_lanes
+def test_a_robot_on_the_centre_line_deviates_by_nothing_and_gains_what_it_drives(counter_clockwise):
+    line, directions = LAPS[counter_clockwise]
+    pose = lane_pose(ROAD, line, directions)
+    length = lane_length(ROAD, counter_clockwise)
+    assert (pose.counter_clockwise == counter_clockwise).all()
+    assert pose.deviation == pytest.approx(0, abs=1e-12)
+    assert pose.heading_error == pytest.approx(0, abs=1e-12)
+    driven = np.hypot(*np.diff(line, axis=0).T)
+    assert wrapped(np.diff(pose.along), length) == pytest.approx(driven, abs=1e-6)
+    assert ((pose.along >= 0) & (pose.along <= length)).all()
 
 
-@given(x=ON_MAP, y=ON_MAP, heading=ANY_HEADING)
-@settings(max_examples=200, derandomize=True, deadline=None)
-def test_every_pose_on_the_map_has_finite_answers_within_bounds(x, y, heading):
-    lane = lane_position(ROAD, np.array((x, y, heading)))
-    assert 0.0 <= lane.along <= lane.lap
-    assert abs(lane.heading_error) <= np.pi / 2 + 1e-9
-    assert np.isfinite(lane.deviation)
+@both_lanes
+@pytest.mark.parametrize("left", [-0.1, 0.03, 0.1])
+def test_deviation_is_positive_to_the_left_of_travel(counter_clockwise, left):
+    line, directions = LAPS[counter_clockwise]
+    aside = line + left * np.column_stack((-np.sin(directions), np.cos(directions)))
+    assert lane_pose(ROAD, aside, directions).deviation == pytest.approx(left, abs=1e-12)
 
 
-@given(x=ON_MAP, y=ON_MAP, heading=ANY_HEADING)
-@settings(max_examples=100, derandomize=True, deadline=None)
-def test_turning_the_map_a_quarter_changes_nothing_but_the_arc_length(x, y, heading):
-    here = lane_position(ROAD, np.array((x, y, heading)))
-    turned = lane_position(ROAD, np.array((ROAD.side - y, x, heading + np.pi / 2)))
-    on_a_diagonal = abs(abs(x - ROAD.side / 2) - abs(y - ROAD.side / 2)) < 1e-6
-    across_the_lanes = abs(abs(float(here.heading_error)) - np.pi / 2) < 1e-6
-    if not (on_a_diagonal or across_the_lanes):
-        assert turned.outer == here.outer
-        assert turned.deviation == pytest.approx(here.deviation, abs=1e-9)
-        assert turned.heading_error == pytest.approx(here.heading_error, abs=1e-9)
-        moved = float(np.remainder(turned.along - here.along, here.lap))
-        quarter = float(here.lap) / 4 if here.outer else 3 * float(here.lap) / 4
-        assert moved == pytest.approx(quarter, abs=1e-6)
+@both_lanes
+@pytest.mark.parametrize("error", [-1.5, -0.2, 0.7, 1.5])
+def test_heading_error_is_positive_to_the_left_whatever_full_turns_the_heading_has(counter_clockwise, error):
+    line, directions = LAPS[counter_clockwise]
+    pose = lane_pose(ROAD, line, directions + error - 6 * pi)
+    assert (pose.counter_clockwise == counter_clockwise).all()
+    assert pose.heading_error == pytest.approx(error, abs=1e-12)
+
+
+@both_lanes
+def test_a_robot_against_the_direction_of_its_lane_is_seen_from_the_other_one(counter_clockwise):
+    line, directions = LAPS[counter_clockwise]
+    pose = lane_pose(ROAD, line, directions + pi)
+    assert (pose.counter_clockwise != counter_clockwise).all()
+    assert pose.deviation == pytest.approx(2 * ROAD.lane_offset, abs=1e-12)
+
+
+@functools.lru_cache
+def lap_along(counter_clockwise):
+    return lane_pose(ROAD, *LAPS[counter_clockwise]).along
+
+
+def nearest_point(pose):
+    outer = bool(pose.counter_clockwise)
+    return LAPS[outer][0][np.argmin(np.abs(wrapped(lap_along(outer) - pose.along, lane_length(ROAD, outer))))]
+
+
+@quick
+@given(points, headings)
+def test_the_centre_lines_nearest_point_counts_wherever_the_robot_is(point, heading):
+    pose = lane_pose(ROAD, np.array(point), np.array(heading))
+    shortest = np.hypot(*(LAPS[bool(pose.counter_clockwise)][0] - point).T).min()
+    assert abs(pose.deviation) == pytest.approx(shortest, abs=0.001)
+    assert np.hypot(*(nearest_point(pose) - point)) == pytest.approx(shortest, abs=0.002)
+
+
+@quick
+@given(points, points, headings)
+def test_deviation_never_changes_by_more_than_the_robot_moves(here, there, heading):
+    poses = lane_pose(ROAD, np.array([[here, there]] * 2), np.array([[heading], [heading + pi]]))
+    for outer in (True, False):
+        first, second = (poses.deviation[:, k][poses.counter_clockwise[:, k] == outer] for k in (0, 1))
+        assert abs(first[0] - second[0]) <= np.hypot(*np.subtract(here, there)) + 1e-12
+
+
+@quick
+@given(points, headings, st.integers(1, 3))
+def test_quarter_turns_of_the_map_change_neither_lane_nor_deviation_nor_heading_error(point, heading, quarters):
+    here = lane_pose(ROAD, np.array(point), np.array(heading))
+    assume(abs(np.subtract(*np.abs(point - MIDDLE))) > 1e-6 and abs(here.heading_error) < pi / 2 - 1e-6)
+    there = lane_pose(ROAD, turned(point, quarters), np.array(heading + quarters * pi / 2))
+    gained = there.along - here.along
+    length = lane_length(ROAD, here.counter_clockwise)
+    assert there.counter_clockwise == here.counter_clockwise
+    assert there.deviation == pytest.approx(here.deviation, abs=1e-12)
+    assert there.heading_error == pytest.approx(here.heading_error, abs=1e-12)
+    quarter = quarters / 4 * (1 if here.counter_clockwise else -1) * length
+    assert wrapped(gained - quarter, length) == pytest.approx(0, abs=1e-9)
+
+
+def test_the_maps_middle_has_a_finite_answer():
+    assert np.isfinite([*lane_pose(ROAD, MIDDLE, np.array(0.3))[1:]]).all()
+
+
+def test_poses_may_have_any_shape():
+    line, directions = LAPS[True]
+    flat = lane_pose(ROAD, line[:60], directions[:60])
+    folded = lane_pose(ROAD, line[:60].reshape(3, 4, 5, 2), directions[:60].reshape(3, 4, 5))
+    assert all(
+        (one == other.ravel()).all() and other.shape == (3, 4, 5) for one, other in zip(flat, folded, strict=True)
+    )
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "off"),
+    [
+        (0.0, 0.0, False),
+        (ROAD.side, ROAD.side, False),
+        (-1e-9, 0.5, True),
+        (0.5, -1e-9, True),
+        (ROAD.side + 1e-9, 0.5, True),
+        (0.5, ROAD.side + 1e-9, True),
+        (float("nan"), 0.5, True),
+        (0.5, float("nan"), True),
+    ],
+)
+def test_off_the_map_is_beyond_its_edge_or_nowhere(x, y, off):
+    assert off_map(ROAD, x, y) is off

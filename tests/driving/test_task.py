@@ -1,174 +1,292 @@
-"""Trajectories made by hand are worth what the definitions say."""
+"""Lane following scores hand-made drives as its definitions say."""
+
+import dataclasses
+import math
+from math import pi
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.driving.lane import lap_length
+from proxytune.driving.lane import lane_length, lane_pose, off_map
 from proxytune.driving.maps import SMALL_LOOP as ROAD
-from proxytune.driving.task import METRICS, off_map, score_trajectory, start_pose
+from proxytune.driving.task import METRICS, score_trajectory, start_pose
+from proxytune.errors import EpisodeError
 
-T = ROAD.tile
-TICK_S = 1 / 60
-EAST_X, WEST_X = 2.5 * T + ROAD.lane_offset, 0.5 * T - ROAD.lane_offset
-
-
-def score(poses, seconds=60.0, tick_s=TICK_S):
-    return score_trajectory(ROAD, np.asarray(poses, dtype=float), tick_s=tick_s, seconds=seconds)
-
-
-def line(x, y, heading, end, count=121):
-    return np.stack((np.linspace(x, end[0], count), np.linspace(y, end[1], count), np.full(count, heading)), axis=1)
+TILE, OFFSET, MIDDLE = ROAD.tile, ROAD.lane_offset, ROAD.side / 2
+OUTER = (ROAD.side - TILE / 2 + OFFSET, TILE, pi / 2)  # lower end of the right side's straight, going up
+INNER = (ROAD.side - TILE / 2 - OFFSET, 2 * TILE, -pi / 2)  # its upper end, going down
+OUTER_RADIUS, INNER_RADIUS = TILE / 2 + OFFSET, TILE / 2 - OFFSET
+OUTER_LAP = ((TILE, 0.0), (OUTER_RADIUS * pi / 2, 1 / OUTER_RADIUS)) * 4
+INNER_LAP = ((TILE, 0.0), (INNER_RADIUS * pi / 2, -1 / INNER_RADIUS)) * 4
+SPEED = 0.3
+quick = settings(derandomize=True, max_examples=30, deadline=None)
 
 
-def arc(centre, radius, first, last, *, count=601, clockwise=False):
-    angle = np.linspace(first, last, count)
-    heading = angle - np.pi / 2 if clockwise else angle + np.pi / 2
-    return np.stack((centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle), heading), axis=1)
+def drive(start, pieces, rate=60.0):
+    """Poses at SPEED over pieces of (length [m], curvature [1/m]), backwards where the length is negative."""
+    poses = [np.array(start)[None]]
+    for length, curvature in pieces:
+        x, y, heading = poses[-1][-1]
+        way = np.linspace(0, length, max(1, round(abs(length) / SPEED * rate)) + 1)[1:]
+        turn = curvature * way
+        chord = way * np.sinc(turn / 2 / pi)
+        ahead = heading + turn / 2
+        poses.append(np.column_stack((x + chord * np.cos(ahead), y + chord * np.sin(ahead), heading + turn)))
+    return np.concatenate(poses)
 
 
-def test_every_metric_has_a_unit_and_is_scored():
-    assert set(score(line(EAST_X, T, np.pi / 2, (EAST_X, 2 * T)))) == set(METRICS)
+def score(poses, rate=60.0, seconds=60.0):
+    return score_trajectory(ROAD, poses, tick_s=1 / rate, seconds=seconds)
 
 
-def test_a_straight_in_lane_is_worth_its_length():
-    result = score(line(EAST_X, T, np.pi / 2, (EAST_X, 2 * T)))
-    assert result["distance"] == pytest.approx(T, abs=1e-9)
-    assert result["survival_time"] == pytest.approx(2.0)
-    assert result["time_out_of_lane"] == 0.0
-    assert result["deviation"] == pytest.approx(0.0, abs=1e-12)
+def moved_left(pose, left):
+    x, y, heading = pose
+    return x - left * math.sin(heading), y + left * math.cos(heading), heading
 
 
-@pytest.mark.parametrize("outer", [True, False])
-def test_a_curve_on_the_centre_line_is_worth_its_arc(outer):
-    radius = T / 2 + (ROAD.lane_offset if outer else -ROAD.lane_offset)
-    first, last = (0.0, np.pi / 2) if outer else (np.pi / 2, 0.0)
-    result = score(arc((2 * T, 2 * T), radius, first, last, clockwise=not outer))
-    assert result["distance"] == pytest.approx(radius * np.pi / 2, abs=1e-9)
-    assert result["time_out_of_lane"] == 0.0
+def wandering(seed, samples=400):
+    """A smooth drive at random near a start of the map, in and out of lanes."""
+    rng = np.random.default_rng(seed)
+    x, y, degrees = ROAD.starts[rng.integers(len(ROAD.starts))]
+    heading = math.radians(degrees) + np.cumsum(rng.normal(0, 0.12, samples))
+    way = rng.uniform(-0.01, 0.03) * np.column_stack((np.cos(heading), np.sin(heading)))
+    return np.column_stack(((x, y) + np.cumsum(way, axis=0), heading))
 
 
-@pytest.mark.parametrize("outer", [True, False])
-def test_a_lap_is_worth_its_length_wherever_it_begins(outer):
-    radius = T / 2 + (ROAD.lane_offset if outer else -ROAD.lane_offset)
-    far = T / 2 + radius
-    middle, h = 1.5 * T, T / 2
-    if outer:
-        lap = [
-            line(middle + far, middle, np.pi / 2, (middle + far, 2 * T)),
-            arc((2 * T, 2 * T), radius, 0, np.pi / 2),
-            line(2 * T, middle + far, np.pi, (T, middle + far)),
-            arc((T, 2 * T), radius, np.pi / 2, np.pi),
-            line(middle - far, 2 * T, 3 * np.pi / 2, (middle - far, T)),
-            arc((T, T), radius, np.pi, 3 * np.pi / 2),
-            line(T, middle - far, 2 * np.pi, (2 * T, middle - far)),
-            arc((2 * T, T), radius, 3 * np.pi / 2, 2 * np.pi),
-            line(middle + far, T, 5 * np.pi / 2, (middle + far, middle)),
-        ]
-        poses = np.concatenate(lap)
-    else:
-        lap = [
-            line(middle + far, middle, -np.pi / 2, (middle + far, middle - h)),
-            arc((2 * T, T), radius, 0, -np.pi / 2, clockwise=True),
-            line(2 * T, middle - far, -np.pi, (T, middle - far)),
-            arc((T, T), radius, -np.pi / 2, -np.pi, clockwise=True),
-            line(middle - far, T, -3 * np.pi / 2, (middle - far, 2 * T)),
-            arc((T, 2 * T), radius, -np.pi, -3 * np.pi / 2, clockwise=True),
-            line(T, middle + far, -2 * np.pi, (2 * T, middle + far)),
-            arc((2 * T, 2 * T), radius, -3 * np.pi / 2, -2 * np.pi, clockwise=True),
-            line(middle + far, 2 * T, -5 * np.pi / 2, (middle + far, middle)),
-        ]
-        poses = np.concatenate(lap)
-    assert score(poses)["distance"] == pytest.approx(lap_length(ROAD, outer=outer), abs=1e-3)
+def test_a_drive_is_scored_by_every_metric_in_order():
+    assert list(score(drive(OUTER, OUTER_LAP))) == list(METRICS)
+    assert dict(METRICS) == {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"}
 
 
-def test_the_wrong_way_is_worth_nothing_and_all_of_it_is_out_of_lane():
-    result = score(line(EAST_X, 2 * T, -np.pi / 2, (EAST_X, T)))
-    assert result["distance"] == 0.0
-    assert result["time_out_of_lane"] == pytest.approx(2.0)
-    assert result["deviation"] == pytest.approx(2 * ROAD.lane_offset)
+@pytest.mark.parametrize("start", [OUTER, INNER], ids=("outer", "inner"))
+def test_straight_on_in_the_lane_distance_is_what_was_driven(start):
+    result = score(drive(start, [(0.5, 0.0)]))
+    assert result["distance"] == pytest.approx(0.5, abs=1e-9)
+    assert result["survival_time"] == pytest.approx(0.5 / SPEED)
+    assert result["time_out_of_lane"] == 0
+    assert result["deviation"] == pytest.approx(0, abs=1e-9)
 
 
-def test_backing_up_in_lane_counts_against_the_distance():
-    forth = line(EAST_X, T, np.pi / 2, (EAST_X, 1.8 * T))
-    back = line(EAST_X, 1.8 * T, np.pi / 2, (EAST_X, 1.5 * T))
-    assert score(np.concatenate((forth, back)))["distance"] == pytest.approx(0.5 * T, abs=1e-9)
+@pytest.mark.parametrize(
+    ("start", "lap", "outer"), [(OUTER, OUTER_LAP, True), (INNER, INNER_LAP, False)], ids=("outer", "inner")
+)
+@pytest.mark.parametrize("laps", [1, 3])
+def test_laps_on_the_centre_line_count_their_length_to_a_millimetre(start, lap, outer, laps):
+    result = score(drive(start, lap * laps))
+    assert result["distance"] == pytest.approx(laps * lane_length(ROAD, outer), abs=0.001)
+    assert result["time_out_of_lane"] == 0
+    assert result["deviation"] == pytest.approx(0, abs=1e-9)
 
 
-def test_standing_still_survives_and_goes_nowhere():
-    result = score(np.tile((EAST_X, T, np.pi / 2), (301, 1)))
-    assert (result["distance"], result["time_out_of_lane"]) == (0.0, 0.0)
-    assert result["survival_time"] == pytest.approx(5.0)
+@pytest.mark.parametrize("left", [-0.08, 0.08])
+def test_a_lap_beside_the_centre_line_counts_the_centre_lines_length(left):
+    radius = OUTER_RADIUS - left
+    beside = ((TILE, 0.0), (radius * pi / 2, 1 / radius)) * 4
+    result = score(drive(moved_left(OUTER, left), beside))
+    assert result["distance"] == pytest.approx(lane_length(ROAD, True), abs=0.001)
+    assert result["deviation"] == pytest.approx(0.08, abs=1e-6)
 
 
-def test_an_episode_is_over_when_the_map_is_left():
-    result = score(line(EAST_X, 1.5 * T, 0.0, (EAST_X + 1.0, 1.5 * T), count=601))
-    to_the_edge = (ROAD.side - EAST_X) * 10.0
-    assert result["survival_time"] == pytest.approx(to_the_edge, abs=2 * TICK_S)
+@pytest.mark.parametrize(("start", "lap"), [(OUTER, OUTER_LAP), (INNER, INNER_LAP)], ids=("outer", "inner"))
+def test_the_wrong_way_round_counts_nothing_and_is_all_out_of_lane(start, lap):
+    wrong = drive(start, lap)[::-1] + (0, 0, pi)
+    result = score(wrong)
+    assert result["distance"] == 0
+    assert result["time_out_of_lane"] == pytest.approx(result["survival_time"])
+    assert result["deviation"] == pytest.approx(2 * OFFSET, abs=1e-6)
 
 
-def test_what_comes_after_leaving_the_map_counts_for_nothing():
-    away = line(EAST_X, 2 * T, 0.1, (ROAD.side + 0.1, 2 * T))
-    home = line(EAST_X, T, np.pi / 2, (EAST_X, 2 * T))
-    assert score(np.concatenate((away, home))) == score(away)
+@pytest.mark.parametrize(
+    ("start", "lap", "outer"), [(OUTER, OUTER_LAP, True), (INNER, INNER_LAP, False)], ids=("outer", "inner")
+)
+def test_driving_backwards_in_the_lane_counts_negative(start, lap, outer):
+    backwards = [(-length, curvature) for length, curvature in reversed(lap)]
+    result = score(drive(start, backwards))
+    assert result["distance"] == pytest.approx(-lane_length(ROAD, outer), abs=0.001)
+    assert result["time_out_of_lane"] == 0
 
 
-def test_outside_the_lane_there_is_no_progress():
-    beside = EAST_X + 0.6 * ROAD.lane_width
-    result = score(line(beside, T, np.pi / 2, (beside, 2 * T)))
-    assert result["distance"] == 0.0
-    assert result["time_out_of_lane"] == pytest.approx(2.0)
+def test_back_and_forth_counts_the_net_way():
+    there_and_back = [(0.4, 0.0), (-0.3, 0.0)] * 2
+    assert score(drive(OUTER, there_and_back))["distance"] == pytest.approx(0.2, abs=1e-9)
 
 
-def test_a_zig_zag_within_the_lane_is_worth_its_progress_only():
-    y = np.linspace(T, 2 * T, 600)
-    poses = np.stack((EAST_X + 0.08 * np.sin(40 * y), y, np.full(600, np.pi / 2)), axis=1)
-    result = score(poses)
-    assert result["distance"] == pytest.approx(T, abs=1e-9)
-    assert result["deviation"] > 0.04
+def test_a_stopped_robot_survives_and_gets_nowhere():
+    result = score(np.tile(moved_left(OUTER, 0.05), (3601, 1)))
+    assert result == {
+        "distance": 0,
+        "survival_time": 60,
+        "time_out_of_lane": 0,
+        "deviation": pytest.approx(0.05),
+    }
 
 
-def test_a_u_turn_is_no_leap_forward():
-    count = 60
-    heading = np.linspace(np.pi / 2, -np.pi / 2, count)
-    spin = np.stack((np.full(count, 2.5 * T), np.full(count, 1.5 * T), heading), axis=1)
-    assert abs(score(spin)["distance"]) < 1e-9
+def test_a_robot_stopped_outside_the_lane_is_out_of_it_all_the_time():
+    result = score(np.tile(moved_left(OUTER, ROAD.lane_width / 2 + 0.001), (601, 1)))
+    assert result["time_out_of_lane"] == result["survival_time"] == pytest.approx(10)
 
 
-def test_the_sample_rate_hardly_matters():
-    fine = arc((2 * T, 2 * T), T / 2 + ROAD.lane_offset, 0.0, np.pi / 2, count=1201)
-    slow = score(fine[::4], tick_s=4 * TICK_S)
-    for name, value in score(fine).items():
-        assert slow[name] == pytest.approx(value, abs=1e-3)
+def test_survival_ends_at_the_first_pose_off_the_map():
+    x, y, _ = OUTER
+    out = drive((x, y, 0.0), [(3.0, 0.0)])
+    first = next(k for k, pose in enumerate(out) if off_map(ROAD, pose[0], pose[1]))
+    result = score(out)
+    assert result["survival_time"] == pytest.approx(first / 60)
+    assert result["survival_time"] == pytest.approx((ROAD.side - x) / SPEED, abs=1.5 / 60)
 
 
-@given(cut=st.integers(1, 599))
-@settings(max_examples=20, derandomize=True, deadline=None)
-def test_the_parts_of_a_trajectory_add_up(cut):
-    y = np.linspace(0.4 * T, 2.6 * T, 601)
-    poses = np.stack((EAST_X + 0.15 * np.sin(20 * y), y, np.pi / 2 + 0.3 * np.cos(20 * y)), axis=1)
+@pytest.mark.parametrize("heading", [0.0, pi / 2, pi, -pi / 2])
+def test_what_comes_after_leaving_the_map_is_not_scored(heading):
+    out = drive((MIDDLE, MIDDLE, heading), [(1.0, 0.0)])
+    gone = next(k for k, pose in enumerate(out) if off_map(ROAD, pose[0], pose[1])) + 1
+    assert score(np.vstack((out[:gone], drive(OUTER, OUTER_LAP)))) == score(out[:gone])
+
+
+def test_nothing_after_the_time_limit_is_scored():
+    poses = drive(OUTER, OUTER_LAP * 6)
+    assert len(poses) > 3601
+    assert score(poses) == score(poses[:3601])
+    assert score(poses)["survival_time"] == 60
+
+
+@pytest.mark.parametrize("rate", [20.0, 30.0, 60.0, 100.0])
+@pytest.mark.parametrize("seconds", [0.3, 0.7, 1.1, 60.0])
+def test_a_survivor_survives_for_the_whole_duration(rate, seconds):
+    still = np.tile(OUTER, (round(seconds * rate) + 5, 1))
+    assert score(still, rate, seconds)["survival_time"] == pytest.approx(seconds)
+
+
+def test_an_episode_that_ends_at_once_has_survived_for_no_time():
+    result = score(np.array([moved_left(OUTER, 0.05)]))
+    assert result == {"distance": 0, "survival_time": 0, "time_out_of_lane": 0, "deviation": pytest.approx(0.05)}
+
+
+def zig_zag(amplitude):
+    """Ten seconds up the outer lane's right side, a sine aside."""
+    y = np.linspace(TILE, 2 * TILE, 601)
+    x = OUTER[0] - amplitude * np.sin((y - TILE) / TILE * 4 * pi)
+    return np.column_stack((x, y, np.arctan2(np.gradient(y), np.gradient(x))))
+
+
+def test_a_zig_zag_in_the_lane_counts_only_its_way_along_the_lane():
+    result = score(zig_zag(0.1))
+    assert result["distance"] == pytest.approx(TILE, abs=1e-9)
+    assert result["time_out_of_lane"] == 0
+    assert result["deviation"] == pytest.approx(0.1 * 2 / pi, abs=0.001)
+
+
+def test_a_zig_zag_across_the_lanes_edges_counts_only_what_is_in_it():
+    result = score(zig_zag(0.15))
+    inside = 1 - 2 / pi * math.acos(ROAD.lane_width / 2 / 0.15)
+    assert result["distance"] == pytest.approx(inside * TILE, abs=0.002)
+    assert result["time_out_of_lane"] == pytest.approx((1 - inside) * 10, abs=0.04)
+    assert result["deviation"] == pytest.approx(0.15 * 2 / pi, abs=0.001)
+
+
+def test_a_u_turn_counts_the_way_in_either_lane_and_no_jump():
+    poses = drive(OUTER, [(0.3, 0.0), (OFFSET * pi, 1 / OFFSET), (0.2, 0.0)], rate=600)
+    result = score(poses, rate=600)
+    leaves = math.acos(1 - ROAD.lane_width / 2 / OFFSET)
+    assert result["distance"] == pytest.approx(0.5 + 2 * OFFSET * math.sin(leaves), abs=0.001)
+    assert result["time_out_of_lane"] == pytest.approx((pi - 2 * leaves) * OFFSET / SPEED, abs=0.005)
+
+
+def test_turning_on_the_spot_counts_nothing():
+    heading = np.linspace(0, 40 * pi, 3601)
+    poses = np.column_stack((np.full(3601, OUTER[0]), np.full(3601, TILE * 1.3), heading))
+    assert score(poses)["distance"] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("middle", [0.0, 0.1])
+def test_crossing_the_middle_of_the_map_counts_nothing_there(middle):
+    way = np.linspace(TILE + 0.01, 2 * TILE - 0.01, 200)
+    poses = np.column_stack((way, np.full(200, MIDDLE + middle), np.zeros(200)))
+    assert score(poses)["distance"] == 0
+    assert score(poses)["time_out_of_lane"] == score(poses)["survival_time"]
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("rate", [20, 30])
+def test_the_sampling_rate_hardly_matters(seed, rate):
+    curvatures = 1 / OUTER_RADIUS * np.array([0, 0, 0, 1, 1, 1, 1] * 8) + np.random.default_rng(seed).normal(0, 2, 56)
+    fine = drive(OUTER, [(0.2, float(curvature)) for curvature in curvatures])
+    coarse = fine[:: 60 // rate]
+    for metric, bound in (("distance", 0.02), ("survival_time", 0.06), ("time_out_of_lane", 0.1), ("deviation", 0.002)):
+        assert score(coarse, rate)[metric] == pytest.approx(score(fine)[metric], abs=bound), metric
+
+
+@quick
+@given(st.integers(0, 10**6), st.integers(1, 3))
+def test_a_quarter_turn_of_the_map_changes_no_score(seed, quarters):
+    poses = wandering(seed)
+    angle = quarters * pi / 2
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    turned = np.column_stack(((poses[:, :2] - MIDDLE) @ turn + MIDDLE, poses[:, 2] + angle))
+    assert score(turned) == pytest.approx(score(poses), abs=1e-9)
+
+
+@quick
+@given(st.integers(0, 10**6), st.floats(0, 1))
+def test_the_parts_of_a_drive_add_up(seed, share):
+    poses = wandering(seed)
+    survived = round(score(poses)["survival_time"] * 60)
+    cut = round(share * survived)
     whole, first, second = score(poses), score(poses[: cut + 1]), score(poses[cut:])
-    for name in ("distance", "survival_time", "time_out_of_lane"):
-        assert first[name] + second[name] == pytest.approx(whole[name], abs=1e-9)
+    for metric in ("distance", "survival_time", "time_out_of_lane"):
+        assert first[metric] + second[metric] == pytest.approx(whole[metric], abs=1e-9), metric
+    areas = [part["deviation"] * part["survival_time"] for part in (first, second, whole)]
+    assert areas[0] + areas[1] == pytest.approx(areas[2], abs=1e-9)
 
 
-def test_the_edge_of_the_map_is_on_it_and_beyond_is_off():
-    assert not off_map(ROAD, 0.0, ROAD.side)
-    assert off_map(ROAD, -0.001, 0.5)
-    assert off_map(ROAD, 0.5, ROAD.side + 0.001)
+@quick
+@given(st.integers(0, 10**6))
+def test_scores_are_finite_and_time_out_of_lane_lies_within_survival(seed):
+    result = score(wandering(seed), seconds=4.0)
+    assert all(map(math.isfinite, result.values()))
+    assert 0 <= result["time_out_of_lane"] <= result["survival_time"] <= 4
+    assert result["deviation"] >= 0
 
 
-def test_a_start_without_noise_is_the_maps_own():
-    pose = start_pose(ROAD, 3, seed=9, position_noise_m=0.0, heading_noise_deg=0.0)
-    np.testing.assert_allclose(pose, (1.5755, 0.702, np.radians(101.3)))
+@pytest.mark.parametrize("column", range(3))
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_pose_that_is_not_finite_is_refused_with_its_time(column, value):
+    poses = drive(OUTER, OUTER_LAP)
+    poses[30:, column] = value
+    with pytest.raises(EpisodeError, match=r"not finite at 0\.50 s"):
+        score(poses)
 
 
-def test_the_noise_of_a_start_follows_from_seed_and_index_alone_and_is_as_wide_as_asked():
-    def one(seed, index=3):
-        return start_pose(ROAD, index, seed=seed, position_noise_m=0.01, heading_noise_deg=2.0)
+def exact_start(index, **noise):
+    return start_pose(ROAD, index, **{"seed": 1, "position_noise_m": 0.0, "heading_noise_deg": 0.0, **noise})
 
-    np.testing.assert_array_equal(one(1), one(1))
-    assert not np.array_equal(one(1), one(2))
-    spread = np.std([one(seed) for seed in range(400)], axis=0)
-    np.testing.assert_allclose(spread, (0.01, 0.01, np.radians(2.0)), rtol=0.15)
+
+def test_without_noise_a_start_is_the_papers():
+    for index, (x, y, degrees) in enumerate(ROAD.starts):
+        assert exact_start(index) == pytest.approx((x, y, math.radians(degrees)))
+
+
+def test_the_papers_ten_starts_are_in_their_lanes_eight_outer_two_inner():
+    starts = np.array([exact_start(index) for index in range(len(ROAD.starts))])
+    pose = lane_pose(ROAD, starts[:, :2], starts[:, 2])
+    assert (np.abs(pose.deviation) <= ROAD.lane_width / 2).all()
+    assert np.flatnonzero(~pose.counter_clockwise).tolist() == [0, 8]
+    assert len(starts) == 10
+
+
+def test_the_same_seed_and_index_put_the_robot_down_alike_and_others_elsewhere():
+    noise = {"position_noise_m": 0.01, "heading_noise_deg": 2.0}
+    assert exact_start(3, **noise) == exact_start(3, **noise)
+    assert exact_start(3, **noise) != exact_start(3, **noise, seed=2)
+    twice = dataclasses.replace(ROAD, starts=ROAD.starts[:1] * 2)
+    first, second = (start_pose(twice, index, seed=1, **noise) for index in (0, 1))
+    assert all(one != other for one, other in zip(first, second, strict=True))
+
+
+def test_placement_noise_has_the_spread_it_was_given():
+    noise = {"position_noise_m": 0.02, "heading_noise_deg": 3.0}
+    x, y, degrees = ROAD.starts[5]
+    errors = np.array([exact_start(5, **noise, seed=seed) for seed in range(500)]) - (x, y, math.radians(degrees))
+    assert errors.std(axis=0) == pytest.approx((0.02, 0.02, math.radians(3.0)), rel=0.1)
+    assert errors.mean(axis=0) == pytest.approx((0, 0, 0), abs=0.006)

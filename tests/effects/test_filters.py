@@ -75,6 +75,17 @@ def test_blur_is_the_mean_of_a_scene_that_changes_linearly(samples):
     np.testing.assert_allclose(blurred[10:], ramp[10:] - samples / 2.0, atol=1e-4)
 
 
+@pytest.mark.parametrize("samples", [0.3, 1.0, 2.718, 6.0, 11.9])
+def test_blur_adds_8_bit_pictures_exactly_in_any_order(samples):
+    pictures = np.random.default_rng(2).integers(0, 256, (20, 50)).astype(np.float32)
+    effect = Blur(samples / 10.0)
+    memory = effect.begin(Setting(10.0, pictures[0], NOMINAL))
+    weights = memory.weights.astype(np.float64)
+    assert weights.sum() == 1.0
+    exact = [weights @ pictures[row - len(weights) + 1 : row + 1].astype(np.float64) for row in range(13, 20)]
+    np.testing.assert_array_equal(effect.apply(pictures, memory)[0][13:], exact)
+
+
 def test_blur_is_continuous_in_its_value():
     scene = np.random.default_rng(1).uniform(0, 255, (20, 4))
     outputs = np.array([run(Blur(value), scene)[10:] for value in np.linspace(0.01, 0.4, 800)])

@@ -51,7 +51,7 @@ BAD = {
     "an unknown objective": ({"objective": '"prvp"'}, "objective: unknown value 'prvp'; did you mean 'prpv'?"),
     "an unknown rule": ({"on_failure": '"stopp"'}, "on_failure: unknown value 'stopp'; did you mean 'stop'?"),
     "no format": ({"format": None}, "format: is missing"),
-    "a later format": ({"format": "2"}, "format: must be between 1 and 1, got 2"),
+    "a later format": ({"format": "2"}, "format: this proxytune reads up to 1; install a newer one"),
     "no parameters": ({"parameters": {}}, "parameters: is missing"),
     "bounds reversed": ({"parameters": {"trim": "[0.3, -0.3]"}}, "parameters.trim: the lower bound must be below"),
     "bounds equal": ({"parameters": {"trim": "[0.3, 0.3]"}}, "parameters.trim: the lower bound must be below"),

@@ -94,5 +94,5 @@ def fit_lane(eye: Eye, *, yellow: Pixels, white: Pixels, half_lane_m: float) -> 
     mean_ahead, mean_left = float(ahead.sum()) / count, float(left.sum()) / count
     centred = ahead - mean_ahead
     # a ridge keeps a handful of pixels at one distance from spinning the line round
-    slope = float(centred @ left) / (float(centred @ centred) + 0.005 * count)
+    slope = float((centred * left).sum()) / (float((centred * centred).sum()) + 0.005 * count)
     return Lane(mean_left - slope * mean_ahead, slope, count)

@@ -1,0 +1,181 @@
+import sqlite3
+from dataclasses import replace
+
+import pytest
+
+from proxytune.errors import EpisodeError, RunError, SettingsError
+from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.study.progress import Silent
+from proxytune.study.run import as_stored, as_trials, check_facts, run_study
+from proxytune.study.store import Store, TrialRecord
+from proxytune.study.study import open_study
+
+
+def run(folder, **changes):
+    study = open_study(folder)
+    study = replace(study, settings=replace(study.settings, **changes))
+    with Store.open(folder) as store:
+        spent = run_study(study, store, GaussianProcess(study.settings.initial), Silent())
+        return spent.episodes, store.trials()
+
+
+def test_a_study_spends_its_budget_and_then_no_more(make_study):
+    folder = make_study()
+    episodes, trials = run(folder)
+    assert [trial.number for trial in trials] == [1, 2, 3, 4, 5, 6, 7]
+    assert {trial.state for trial in trials} == {"finished"}
+    assert episodes == 7 * 18
+    assert run(folder) == (0, trials)
+
+
+def test_two_jobs_give_the_trials_of_one(make_study):
+    assert run(make_study("one"), jobs=1)[1] == run(make_study("two"), jobs=2)[1]
+
+
+def test_a_raised_budget_goes_on_as_if_it_had_been_so_from_the_start(make_study):
+    short, long = make_study("short"), make_study("long")
+    run(short, budget=6)
+    assert run(short, budget=9)[1] == run(long, budget=9)[1]
+
+
+def test_a_lowered_budget_keeps_what_is_finished(finished, make_study):
+    _, trials = run(finished)
+    assert run(finished, budget=3) == (0, trials)
+
+
+class Stopping(Silent):
+    """Presses Ctrl-C after so many episodes."""
+
+    def __init__(self, episodes):
+        self.left = episodes
+
+    def episode(self):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_interrupted_study_loses_no_finished_episode_and_goes_on_to_the_same_trials(make_study, tmp_path, jobs):
+    _, whole = run(make_study("whole"))
+    journal = tmp_path / "journal"
+    folder = make_study("stopped", domain={"journal": f'"{journal}"'})
+    study = open_study(folder)
+    study = replace(study, settings=replace(study.settings, jobs=jobs))
+    for episodes in (5, 40, 40):
+        with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
+            run_study(study, store, GaussianProcess(5), Stopping(episodes))
+    with sqlite3.connect(folder / "study.db") as plain:
+        assert plain.execute("SELECT count(*) FROM episodes").fetchone() == (85,)
+    episodes, trials = run(folder, jobs=jobs)
+    assert episodes == 7 * 18 - 85
+    assert trials == whole
+    if jobs == 1:
+        lines = journal.read_text().splitlines()
+        assert len(lines) == len(set(lines)) == 7 * 18
+
+
+def test_failing_trials_are_counted_and_the_study_goes_on(make_study):
+    folder = make_study(domain={"faults": '["agent3:1:raises"]'})
+    _, trials = run(folder)
+    assert {trial.failed_episodes for trial in trials} == {1}
+    assert {trial.state for trial in trials} == {"finished"}
+
+
+def test_where_no_trial_works_it_stops_after_the_design_and_names_the_agent(make_study):
+    folder = make_study(domain={"faults": '["agent3:*:raises"]'})
+    with pytest.raises(RunError, match="all 5 trials failed; the first: agent 'agent3' failed from every start"):
+        run(folder)
+    with pytest.raises(RunError, match="all 5 trials failed"):
+        run(folder)
+
+
+def test_where_failures_stop_the_study_what_was_finished_is_kept(make_study):
+    folder = make_study(domain={"faults": '["agent5:2:raises"]'}, on_failure='"stop"')
+    with pytest.raises(EpisodeError, match="agent 'agent5'"):
+        run(folder)
+    with Store.read(folder) as store:
+        (trial,) = store.trials()
+        known = store.outcomes(open_study(folder).identity, trial.theta)
+    assert trial.state == "open"
+    assert len(known) == 18
+    assert sum(outcome.metrics is None for outcome in known.values()) == 1
+
+
+EDITS = {
+    "the seed": ({"seed": "2"}, "seed (was 1)"),
+    "the starts": ({"starts": "2"}, "starts (was 3)"),
+    "the design": ({"initial": "4"}, "initial (was 5)"),
+    "the box": ({"parameters": {"trim": "[-0.2, 0.3]", "delay": "[0, 0.3]"}}, "parameters.trim (was [-0.3, 0.3])"),
+    "another parameter": ({"parameters": {"trim": "[-0.3, 0.3]"}}, "parameters.delay (was [0.0, 0.3])"),
+    "the metrics": ({"metrics": '["distance:max"]'}, "metrics"),
+    "a tolerance": ({"metrics": '["distance:max:5%", "survival_time:max"]'}, "metrics"),
+    "the agents": ({"agents": '["agent0", "agent1"]'}, "agents"),
+    "the domain": ({"domain": {"version": '"2"'}}, "domain.version (was nothing)"),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_an_edit_that_changes_what_a_trial_means_is_refused_by_name_and_nothing_is_lost(finished, make_study, edit):
+    changes, expected = EDITS[edit]
+    _, trials = run(finished)
+    make_study(**changes)
+    with pytest.raises(SettingsError) as told:
+        run(finished)
+    assert f"changed since the first trial: {expected}" in str(told.value)
+    assert "\n" not in str(told.value)
+    make_study()
+    assert run(finished) == (0, trials)
+
+
+def test_several_edits_are_all_named(finished, make_study):
+    make_study(seed="3", starts="2")
+    with pytest.raises(SettingsError, match=r"starts \(was 3\), seed \(was 1\)"):
+        run(finished)
+
+
+def test_a_changed_target_is_refused_but_not_what_the_study_does_not_use_of_it(finished, make_study):
+    _, trials = run(finished)
+    text = (finished / "target.csv").read_text()
+    (finished / "target.csv").write_text(text + "somebody_else,0,1.0,2.0\n")
+    assert run(finished) == (0, trials)
+    (finished / "target.csv").write_text(text.replace("agent2,1,", "agent2,1,1"))
+    with pytest.raises(SettingsError, match=r"target \(its contents\)"):
+        run(finished)
+
+
+def test_changed_code_of_the_family_is_refused_but_its_old_result_can_still_be_looked_at(finished, make_study):
+    _, trials = run(finished)
+    newer = replace(open_study(finished), identity="wobbly 2 ()")
+    with Store.open(finished) as store:
+        with pytest.raises(SettingsError, match="the domain family"):
+            check_facts(newer, store)
+        assert as_stored(newer, store).identity == open_study(finished).identity
+        assert store.trials() == trials
+
+
+def test_looking_at_an_edited_study_is_refused(finished, make_study):
+    make_study(seed="3")
+    with Store.read(finished) as store, pytest.raises(SettingsError, match=r"seed \(was 1\)"):
+        as_stored(open_study(finished), store)
+
+
+def test_budget_jobs_name_and_what_failures_do_may_change(finished, make_study):
+    _, trials = run(finished)
+    make_study(jobs="2", on_failure='"stop"', name='"renamed"', budget="8")
+    assert run(finished)[1][:7] == trials
+
+
+def test_before_the_first_finished_trial_everything_may_change(make_study):
+    folder = make_study()
+    study = open_study(folder)
+    with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
+        run_study(study, store, GaussianProcess(5), Stopping(4))
+    make_study(seed="2")
+    assert len(run(folder)[1]) == 7
+
+
+def test_the_search_sees_failed_trials_without_a_score(make_study):
+    space = open_study(make_study()).settings.space
+    done = [TrialRecord(1, {"trim": 0.1, "delay": 0.2}, "failed"), TrialRecord(2, {"trim": 0, "delay": 0}, "finished", 3)]
+    assert [(trial.values, trial.score) for trial in as_trials(space, done)] == [((0.2, 0.1), None), ((0.0, 0.0), 3)]

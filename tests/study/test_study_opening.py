@@ -1,0 +1,51 @@
+import pytest
+
+from proxytune.errors import InputError
+from proxytune.study.study import changes, facts, open_study
+
+BAD = {
+    "an agent is missing": (lambda text: text.replace("agent4", "agent9"), "target.csv: has no scores of agent4; did you"),
+    "several are": (
+        lambda text: "\n".join(line for line in text.splitlines() if not line.startswith(("agent4", "agent5"))),
+        "target.csv: has no scores of agent4, agent5; add them, or take them out of the study",
+    ),
+    "a value is NaN": (lambda text: text.replace("agent2,1,", "agent2,1,nan,#"), "line"),
+    "a metric is missing": (lambda text: text.replace("survival_time", "survival"), "no column 'survival_time'"),
+    "it is empty": (lambda text: "", "target.csv: is empty"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_target_that_does_not_fit_is_refused_in_one_line(make_study, case):
+    edit, expected = BAD[case]
+    target = make_study() / "target.csv"
+    target.write_text(edit(target.read_text()))
+    with pytest.raises(InputError) as told:
+        open_study(target.parent)
+    assert expected in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_a_missing_target_is_named(make_study):
+    folder = make_study(target='"nowhere.csv"')
+    with pytest.raises(InputError, match=r"nowhere\.csv: no such file"):
+        open_study(folder)
+
+
+def test_agents_of_the_target_that_are_not_in_the_study_do_not_count(make_study):
+    folder = make_study(agents='["agent5", "agent1"]')
+    with open(folder / "target.csv", "a") as target:
+        target.write("agent77,only_its_own,1.0,2.0\n")
+    study = open_study(folder)
+    assert study.target.agents == ("agent5", "agent1")
+    assert study.target.episodes == ("0", "1", "2")
+    assert study.target.complete
+
+
+def test_the_order_of_agents_and_lines_is_no_fact(make_study):
+    one = facts(open_study(make_study()))
+    agents = '["agent5", "agent4", "agent3", "agent2", "agent1", "agent0"]'
+    metrics = '["survival_time:max", "distance:max"]'
+    other = facts(open_study(make_study(agents=agents, metrics=metrics)))
+    assert {key for key in one if one[key] != other[key]} <= {"target"}
+    assert changes(one, other) == []

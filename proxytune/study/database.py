@@ -12,13 +12,14 @@ The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_versi
                seconds                            how long it took
     sweeps     parameter, base (JSON), points (JSON), identity     the curves that have been asked for
 
-θ as JSON has its parameters sorted by name and every digit of its numbers. The journal is SQLite's rollback journal:
-everything is in the one file after a `kill -9`, and it may lie on a network folder.
+θ as JSON has its parameters sorted by name and every digit of its numbers. While a study runs, what is written goes to
+`study.db-wal` first (SQLite's write-ahead log: a commit costs no wait for the disk, and survives a `kill -9`); it belongs
+to study.db until the next clean end of a run, which leaves the one file.
 """
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from proxytune.errors import StoreError
@@ -59,12 +60,21 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
     with told(path):
         connection = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None)
         try:
-            connection.execute("PRAGMA synchronous = FULL")
             _check(connection, path, writable)
+            if writable:
+                connection.execute("PRAGMA journal_mode = WAL")
+                connection.execute("PRAGMA synchronous = NORMAL")
         except BaseException:
             connection.close()
             raise
     return connection
+
+
+def disconnect(connection: sqlite3.Connection) -> None:
+    """Close a database, leaving the one file if nobody else has it open."""
+    with suppress(sqlite3.Error):
+        connection.execute("PRAGMA journal_mode = DELETE")
+    connection.close()
 
 
 def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:

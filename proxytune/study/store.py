@@ -11,7 +11,7 @@ from typing import Any, Literal
 from proxytune.domain import Episode
 from proxytune.errors import InputError
 from proxytune.space import Theta
-from proxytune.study.database import connect, told
+from proxytune.study.database import connect, disconnect, told
 
 FILE_NAME = "study.db"
 State = Literal["open", "finished", "failed"]
@@ -87,7 +87,7 @@ class Store:
         try:
             yield cls(path, connection)
         finally:
-            connection.close()
+            disconnect(connection)
 
     @classmethod
     @contextmanager

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from proxytune.domain import DomainFamily
 from proxytune.errors import InputError
 from proxytune.scores import ScoreTable, read_scores
@@ -101,10 +99,7 @@ def _change(key: str, before: Any, after: Any) -> str:
 
 
 def _table_digest(table: ScoreTable) -> str:
-    order = np.argsort(table.agents, kind="stable")
-    text = json.dumps([sorted(table.agents), table.episodes, table.metrics, table.values[order].tolist()])
-    return _digest(text.encode())
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:16]
+    """A digest that the order of agents, episodes and metrics does not change."""
+    inner = table.select(sorted(table.metrics)).arrange(agents=sorted(table.agents), episodes=sorted(table.episodes))
+    text = json.dumps([inner.agents, inner.episodes, inner.metrics, inner.values.tolist()])
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

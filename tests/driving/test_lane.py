@@ -132,6 +132,14 @@ def test_quarter_turns_of_the_map_change_neither_lane_nor_deviation_nor_heading_
     assert wrapped(gained - quarter, length) == pytest.approx(0, abs=1e-9)
 
 
+def test_a_hair_below_the_first_side_the_way_round_closes():
+    y = TILE + np.arange(-20, 21) * 2.0**-53
+    x = np.full(y.size, 2.5 * TILE + ROAD.lane_offset)
+    pose = lane_pose(ROAD, np.column_stack((x, y)), np.full(y.size, pi / 2))
+    assert wrapped(pose.along, lane_length(ROAD, True)) == pytest.approx(0, abs=1e-12)
+    assert pose.deviation == pytest.approx(0, abs=1e-12)
+
+
 def test_the_maps_middle_has_a_finite_answer():
     assert np.isfinite([*lane_pose(ROAD, MIDDLE, np.array(0.3))[1:]]).all()
 

@@ -185,6 +185,18 @@ def test_a_zig_zag_across_the_lanes_edges_counts_only_what_is_in_it():
     assert result["deviation"] == pytest.approx(0.15 * 2 / pi, abs=0.001)
 
 
+@pytest.mark.parametrize("order", [1, -1], ids=("leaving", "entering"))
+def test_a_step_across_the_lanes_edge_counts_half(order):
+    x, y, heading = OUTER
+    poses = np.array([(x + 0.10, y, heading), (x + 0.12, y + 0.02 * order, heading)])[::order]
+    assert score(poses) == {
+        "distance": pytest.approx(0.01),
+        "survival_time": pytest.approx(1 / 60),
+        "time_out_of_lane": pytest.approx(0.5 / 60),
+        "deviation": pytest.approx(0.11),
+    }
+
+
 def test_a_u_turn_counts_the_way_in_either_lane_and_no_jump():
     poses = drive(OUTER, [(0.3, 0.0), (OFFSET * pi, 1 / OFFSET), (0.2, 0.0)], rate=600)
     result = score(poses, rate=600)
@@ -290,3 +302,4 @@ def test_placement_noise_has_the_spread_it_was_given():
     errors = np.array([exact_start(5, **noise, seed=seed) for seed in range(500)]) - (x, y, math.radians(degrees))
     assert errors.std(axis=0) == pytest.approx((0.02, 0.02, math.radians(3.0)), rel=0.1)
     assert errors.mean(axis=0) == pytest.approx((0, 0, 0), abs=0.006)
+    assert np.corrcoef(errors.T) == pytest.approx(np.eye(3), abs=0.15)

@@ -3,11 +3,11 @@ import sqlite3
 import pytest
 
 from proxytune.errors import StoreError
-from proxytune.study.database import FORMAT, connect, told
+from proxytune.study.database import FORMAT, connect, disconnect, told
 
 
 def made(path):
-    connect(path, writable=True).close()
+    disconnect(connect(path, writable=True))
     return path
 
 
@@ -19,11 +19,25 @@ def test_a_database_is_made_with_its_format_and_plain_tables(tmp_path):
     assert names == {"facts", "instances", "trials", "episodes", "sweeps"}
 
 
-def test_everything_is_in_the_one_file(tmp_path):
+def test_a_clean_end_leaves_the_one_file(tmp_path):
     connection = connect(tmp_path / "study.db", writable=True)
     connection.execute("INSERT INTO facts VALUES ('seed', '1')")
+    disconnect(connection)
     assert [path.name for path in tmp_path.iterdir()] == ["study.db"]
-    connection.close()
+    with sqlite3.connect(tmp_path / "study.db") as plain:
+        assert plain.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
+
+
+def test_it_can_be_read_while_it_is_written(tmp_path):
+    writer = connect(tmp_path / "study.db", writable=True)
+    writer.execute("INSERT INTO facts VALUES ('seed', '1')")
+    writer.execute("BEGIN IMMEDIATE")
+    writer.execute("INSERT INTO facts VALUES ('starts', '3')")
+    reader = connect(tmp_path / "study.db", writable=False)
+    assert reader.execute("SELECT key FROM facts").fetchall() == [("seed",)]
+    reader.close()
+    writer.execute("COMMIT")
+    disconnect(writer)
 
 
 def test_an_empty_file_left_by_a_kill_becomes_a_database(tmp_path):
@@ -75,7 +89,7 @@ def test_a_truncated_database_is_refused(tmp_path, share):
     connection.execute("BEGIN")
     connection.executemany("INSERT INTO instances VALUES (?, ?, ?)", rows)
     connection.execute("COMMIT")
-    connection.close()
+    disconnect(connection)
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
     refused(path, "is damaged")

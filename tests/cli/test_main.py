@@ -1,0 +1,118 @@
+"""Every command answers in one document, and every mistake in one line with its exit status."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from proxytune.cli import main as module
+from proxytune.cli.answer import Answer
+from proxytune.cli.main import COMMANDS, main
+from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
+
+
+def proxytune(*words, cwd):
+    command = [sys.executable, "-m", "proxytune", *map(str, words)]
+    path = os.pathsep.join(filter(None, (os.getcwd(), os.environ.get("PYTHONPATH"))))
+    environment = {**os.environ, "PYTHONPATH": path}
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, check=False)
+
+
+@pytest.fixture
+def failing(monkeypatch):
+    """Make `list` raise."""
+
+    def make(problem):
+        class Failing:
+            configure = staticmethod(module.listing.configure)
+
+            @staticmethod
+            def run(arguments):
+                raise problem
+
+        monkeypatch.setitem(COMMANDS, "list", (Failing, "fails"))
+
+    return make
+
+
+@pytest.mark.parametrize("kind", ["robots", "effects", "agents", "metrics"])
+def test_json_is_one_document_and_nothing_else(kind, capsys):
+    assert main(["list", kind, "--json"]) == 0
+    out = capsys.readouterr()
+    assert json.loads(out.out)[kind]
+    assert out.err == ""
+
+
+def test_people_see_a_table(capsys):
+    assert main(["list", "robots"]) == 0
+    assert "duckiebot" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("problem", "status"),
+    [(SettingsError("a: b"), 2), (ScoresError("a: b"), 2), (StoreError("a: b"), 1), (EpisodeError("a: b"), 1)],
+)
+def test_a_mistake_is_one_line_on_standard_error(failing, capsys, problem, status):
+    failing(problem)
+    assert main(["list", "robots", "--json"]) == status
+    out = capsys.readouterr()
+    assert out.out == ""
+    assert out.err == "proxytune list: a: b\n"
+
+
+def test_an_interruption_says_that_the_same_command_goes_on(failing, capsys):
+    failing(KeyboardInterrupt())
+    assert main(["list", "robots"]) == 130
+    assert "the same command goes on" in capsys.readouterr().err
+
+
+def test_what_is_not_json_is_a_defect_and_not_printed(monkeypatch):
+    class Undefined:
+        configure = staticmethod(module.listing.configure)
+        run = staticmethod(lambda arguments: Answer({"value": float("nan")}, ""))
+
+    monkeypatch.setitem(COMMANDS, "list", (Undefined, "undefined"))
+    with pytest.raises(ValueError, match="JSON"):
+        main(["list", "robots", "--json"])
+
+
+@pytest.mark.parametrize("words", [[], ["studdy"], ["list", "unicorns"], ["score"], ["study"]])
+def test_wrong_usage_exits_with_2(words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == 2
+    assert "usage: python -m proxytune" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main([command, "--help"])
+    assert caught.value.code == 0
+    assert "--json" in capsys.readouterr().out
+
+
+def test_a_closed_pipe_is_no_error(tmp_path):
+    line = f"{sys.executable} -m proxytune list effects --json | head -c 1"
+    path = os.pathsep.join(filter(None, (os.getcwd(), os.environ.get("PYTHONPATH"))))
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", line], capture_output=True, text=True, cwd=tmp_path, check=False,
+        env={**os.environ, "PYTHONPATH": path},
+    )  # fmt: skip
+    assert "Traceback" not in done.stderr
+
+
+def test_a_study_that_is_nowhere_is_one_line(tmp_path):
+    done = proxytune("study", tmp_path / "gone", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("proxytune study: ")
+
+
+def test_bullet_starts_without_a_word(tmp_path):
+    """PyBullet's own announcement of its build time would stand where people look for what went wrong."""
+    code = "import proxytune.driving.family"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "")

@@ -1,0 +1,40 @@
+import re
+from dataclasses import replace
+
+import pytest
+
+from proxytune.report.convergence import convergence
+from proxytune.report.page import page
+from proxytune.report.score_figures import save
+from proxytune.study.result import result_of
+from proxytune.study.store import Store
+from proxytune.study.study import open_study
+
+
+@pytest.fixture
+def result(finished):
+    with Store.read(finished) as store:
+        return result_of(open_study(finished), store)
+
+
+def test_the_page_needs_nothing_else_and_is_small(result, tmp_path):
+    save(convergence(result), tmp_path / "convergence.png")
+    text = page(result, [tmp_path / "convergence.png"])
+    assert not re.search(r"(src|href)=\"(?!data:)|https?://|<script|@import", text)
+    assert "data:image/png;base64," in text
+    assert len(text) < 300_000
+
+
+def test_it_has_a_row_for_every_trial_and_the_best_theta(result):
+    text = page(result, [])
+    for trial in result.trials:
+        assert f"<tr><td>{trial.number}</td>" in text
+    assert f"<td>{result.best.trial.theta['trim']:.4g}</td>" in text
+    assert f"PRPV {result.best.assessment.prpv.value} of at most 30" in text
+
+
+def test_names_are_not_taken_for_markup(result):
+    settings = replace(result.study.settings, name="<b>A & B</b>")
+    text = page(replace(result, study=replace(result.study, settings=settings)), [])
+    assert "<title>&lt;b&gt;A &amp; B&lt;/b&gt;</title>" in text
+    assert "<b>" not in text

@@ -1,0 +1,54 @@
+"""The studies that travel with the package are what their READMEs say."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from proxytune.cli.main import main
+
+STUDIES = Path(__file__).resolve().parent.parent / "studies"
+MADE_FROM = {"quickstart": "truth.toml", "known_answer": "truth.toml", "duckiebot": "twin.toml"}
+
+
+@pytest.fixture
+def study(tmp_path):
+    def copy(name):
+        kept = shutil.ignore_patterns("study.db*", "figures", "*.lock")
+        return Path(shutil.copytree(STUDIES / name, tmp_path / name, ignore=kept))
+
+    return copy
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MADE_FROM)
+def test_the_target_is_reproduced_byte_for_byte(study, name, capsys):
+    folder = study(name)
+    model, made = folder / MADE_FROM[name], folder / "again.csv"
+    assert main(["measure", str(folder), "--model", str(model), "--output", str(made)]) == 0
+    assert made.read_bytes() == (folder / "target.csv").read_bytes()
+
+
+@pytest.mark.slow
+def test_on_the_nominal_proxy_agents_spread_from_seconds_to_the_end_with_few_ties(study, capsys):
+    folder = study("duckiebot")
+    nominal, made = folder / "nominal.toml", folder / "nominal.csv"
+    nominal.write_text('format = 1\nrobot = "duckiebot"\n', encoding="utf-8")
+    assert main(["measure", str(folder), "--model", str(nominal), "--output", str(made)]) == 0
+    means = pd.read_csv(made).groupby("agent")[["distance", "survival_time"]].mean()
+    assert len(means) >= 10
+    assert means["survival_time"].min() < 6.0
+    assert means["survival_time"].max() == 60.0
+    assert means["distance"].min() < 1.0
+    assert means["distance"].max() > 10.0
+    apart = np.diff(np.sort(means["distance"]))
+    assert (apart > 0.05).sum() >= len(means) - 2, "agents tie on distance"
+
+
+@pytest.mark.parametrize("name", MADE_FROM)
+def test_targets_hold_every_agent_and_start_of_their_study(name):
+    table = pd.read_csv(STUDIES / name / "target.csv")
+    assert not table.isna().any().any()
+    assert (table.groupby("agent").size() == table["episode"].nunique()).all()

@@ -31,6 +31,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     seed = settings.seed + SEED_OFFSET if arguments.seed is None else arguments.seed
     if seed < 0:
         raise InputError(f"--seed must be at least 0, got {seed}")
+    if not arguments.model.is_file():
+        raise InputError(f"--model {arguments.model}: no such file; check the path")
     if not arguments.output.absolute().parent.is_dir():
         raise InputError(f"{arguments.output}: its folder does not exist; make it first")
     with Bars(len(settings.agents) * settings.starts) as bars:

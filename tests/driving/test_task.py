@@ -188,7 +188,7 @@ def test_a_zig_zag_across_the_lanes_edges_counts_only_what_is_in_it():
 @pytest.mark.parametrize("order", [1, -1], ids=("leaving", "entering"))
 def test_a_step_across_the_lanes_edge_counts_half(order):
     x, y, heading = OUTER
-    poses = np.array([(x + 0.10, y, heading), (x + 0.12, y + 0.02 * order, heading)])[::order]
+    poses = np.array([(x + 0.10, y + 0.2, heading), (x + 0.12, y + 0.2 + 0.02 * order, heading)])[::order]
     assert score(poses) == {
         "distance": pytest.approx(0.01),
         "survival_time": pytest.approx(1 / 60),

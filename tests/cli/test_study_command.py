@@ -1,0 +1,186 @@
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from proxytune.cli.main import main
+
+ROOT = Path(__file__).parents[2]
+FAKES = Path(__file__).parents[1] / "fakes"
+
+
+def command(*arguments, **how):
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}:{FAKES}", "OMP_NUM_THREADS": "1"}
+    told = subprocess.run(
+        [sys.executable, "-m", "proxytune", *map(str, arguments)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        **how,
+    )
+    return told.returncode, told.stdout, told.stderr
+
+
+def refused(capsys, status, *arguments):
+    """The one line on standard error of a command that is refused."""
+    assert main([str(argument) for argument in arguments]) == status
+    out, told = capsys.readouterr()
+    assert out == ""
+    assert told.count("\n") == 1
+    assert "Traceback" not in told
+    return told
+
+
+def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothing(make_study, capsys):
+    folder = make_study()
+    assert main(["study", str(folder), "--json"]) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert first["episodes"] == {"run": 126, "reused": 0, "failed": 0}
+    assert 0 < first["seconds"]["outside_episodes"] <= first["seconds"]["total"]
+    assert [Path(path).exists() for path in (*first["figures"], first["report"])] == [True, True]
+    assert main(["study", str(folder), "--json"]) == 0
+    second = json.loads(capsys.readouterr().out)
+    assert second["episodes"] == {"run": 0, "reused": 126, "failed": 0}
+    costs = ("seconds", "episodes")
+    assert {k: v for k, v in first.items() if k not in costs} == {k: v for k, v in second.items() if k not in costs}
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "figures",
+        "report.html",
+        "study.db",
+        "study.toml",
+        "target.csv",
+    ]
+
+
+def test_people_see_the_best_theta_and_where_the_figure_is(finished, capsys):
+    assert main(["study", str(finished)]) == 0
+    out, told = capsys.readouterr()
+    assert "wobbly: 7 of 7 trials" in out
+    assert "trim" in out
+    assert "0 episodes run, 126 reused" in out
+    assert "convergence.png" in out.replace("\n", "")
+    assert told == ""
+
+
+def test_failed_episodes_are_said_at_the_end(make_study, capsys):
+    assert main(["study", str(make_study(domain={"faults": '["agent3:1:raises"]'}))]) == 0
+    assert "7 of 126 episodes failed; the first:" in capsys.readouterr().out
+
+
+def test_a_failure_that_stops_the_study_is_one_line_and_exit_1(make_study, capsys):
+    folder = make_study(domain={"faults": '["agent3:1:raises"]'}, on_failure='"stop"')
+    assert "agent 'agent3' failed from start 1" in refused(capsys, 1, "study", folder)
+
+
+def test_bad_input_is_one_line_and_exit_2(make_study, capsys):
+    assert "budget: must be between" in refused(capsys, 2, "study", make_study(budget="-1"))
+    assert "agents: no agent 'agnet1'" in refused(capsys, 2, "study", make_study(agents='["agent0", "agnet1"]'))
+    assert not (make_study() / "study.db").exists()
+
+
+def test_a_folder_without_a_study_is_refused(tmp_path, capsys):
+    assert "has no study.toml; give the folder of a study" in refused(capsys, 2, "study", tmp_path)
+
+
+def test_a_corrupt_database_is_one_line_and_exit_1(finished, capsys):
+    (finished / "study.db").write_bytes(b"x" * 5000)
+    assert "study.db: is damaged" in refused(capsys, 1, "study", finished)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 300 kB, where this process may mount one."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)], capture_output=True)
+    if mounted.returncode:
+        pytest.skip("this process may not mount a file system")
+    yield disk
+    subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_a_full_disk_is_one_line_and_the_study_goes_on_when_there_is_room(make_study, small_disk, capsys):
+    whole = make_study("whole", budget="20")
+    assert main(["study", str(whole), "--json"]) == 0
+    expected = json.loads(capsys.readouterr().out)["trials"]
+    folder = small_disk / "study"
+    folder.mkdir()
+    for name in ("study.toml", "target.csv"):
+        (folder / name).write_bytes((whole / name).read_bytes())
+    ballast = small_disk / "ballast"
+    ballast.write_bytes(b"x" * 130_000)
+    told = refused(capsys, 1, "study", folder)
+    assert "disk" in told
+    assert str(folder) in told
+    ballast.unlink()
+    subprocess.run(["mount", "-o", "remount,size=3m", str(small_disk)], check=True)
+    assert main(["study", str(folder), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["trials"] == expected
+    assert document["episodes"]["reused"] > 0
+
+
+@pytest.mark.parametrize("limit", [60_000, 90_000])
+def test_a_file_that_may_not_grow_is_one_line_and_nothing_is_lost(make_study, limit):
+    folder = make_study(budget="12")
+    status, out, told = command(
+        "study", folder, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    )
+    assert (status, out) == (1, "")
+    assert told.count("\n") == 1
+    assert str(folder) in told
+    status, out, told = command("study", folder, "--json")
+    assert status == 0, told
+    assert json.loads(out)["episodes"]["reused"] > 0
+
+
+def test_a_read_only_place_is_one_line(make_study, tmp_path, capsys):
+    folder = make_study()
+    if subprocess.run(["mount", "--bind", folder, folder], capture_output=True).returncode:
+        pytest.skip("this process may not mount a file system")
+    try:
+        subprocess.run(["mount", "-o", "remount,ro,bind", folder], check=True)
+        assert "cannot be written (Read-only file system)" in refused(capsys, 1, "study", folder)
+        assert "cannot be written (Read-only file system)" in refused(capsys, 1, "study", folder / "study.toml")
+    finally:
+        subprocess.run(["umount", folder], check=True)
+
+
+@pytest.fixture
+def travelling(make_study, tmp_path, monkeypatch):
+    """A study that travels with the package."""
+    home = tmp_path / "package"
+    home.mkdir()
+    make_study("package/quickstart")
+    (home / "quickstart" / "study.db").write_text("somebody's")
+    (home / "quickstart" / "figures").mkdir()
+    monkeypatch.setattr("proxytune.cli.study_folder.shipped", lambda kind: home)
+    return home
+
+
+def test_a_study_that_travels_with_the_package_is_copied_and_that_is_said(travelling, tmp_path, capsys):
+    folder = tmp_path / "somewhere" / "quickstart"
+    assert main(["study", str(folder), "--json"]) == 0
+    out, told = capsys.readouterr()
+    assert json.loads(out)["name"] == "wobbly"
+    assert told == f"copied the study 'quickstart' that travels with proxytune to {folder}\n"
+    assert (travelling / "quickstart" / "study.db").read_text() == "somebody's"
+    assert not list(folder.parent.glob(".*"))
+    assert main(["study", str(folder / "study.toml"), "--json"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_an_unknown_study_is_refused_with_the_nearest_name(travelling, tmp_path, capsys):
+    assert "no such study; did you mean 'quickstart'?" in refused(capsys, 2, "study", tmp_path / "quickstrat")
+    assert not (tmp_path / "quickstrat").exists()
+
+
+def test_where_a_copy_cannot_be_written_it_says_so(travelling, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    told = refused(capsys, 1, "study", tmp_path / "file" / "quickstart")
+    assert "cannot be written" in told

@@ -1,0 +1,82 @@
+import json
+
+import pytest
+
+from proxytune.cli.main import main
+from proxytune.cli.sweep import read_base
+from proxytune.errors import InputError
+
+
+def test_a_sweep_writes_its_curve_as_figure_csv_and_json_and_goes_on_where_it_was(make_study, tmp_path, capsys):
+    folder, output = make_study(), tmp_path / "curves"
+    arguments = ["sweep", str(folder), "--parameter", "trim", "--points", "4", "--at", "delay=0.12,trim=0.1", "--json"]
+    assert main([*arguments, "--output", str(output)]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["episodes"] == {"run": 72}
+    assert sorted(path.name for path in output.iterdir()) == [
+        "sweep_trim_delay=0.12.csv",
+        "sweep_trim_delay=0.12.json",
+        "sweep_trim_delay=0.12.png",
+    ]
+    (curve,) = document["curves"]
+    assert json.loads((output / "sweep_trim_delay=0.12.json").read_text()) == curve
+    assert [point["prpv"] for point in curve["points"]][2] == 0
+    assert main(arguments) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["episodes"] == {"run": 0}
+    assert again["curves"] == document["curves"]
+    assert (folder / "figures" / "sweep_trim_delay=0.12.png").exists()
+
+
+def test_all_sweeps_every_parameter_of_the_study_and_draws_them_together(make_study, capsys):
+    folder = make_study()
+    assert main(["sweep", str(folder), "--parameter", "all", "--points", "2"]) == 0
+    names = sorted(path.stem for path in (folder / "figures").glob("*.png"))
+    assert names == ["sweep_all", "sweep_delay", "sweep_trim"]
+    assert "PRPV" in capsys.readouterr().out
+
+
+def test_trials_and_sweeps_share_episodes(finished, capsys):
+    assert main(["study", str(finished), "--json"]) == 0
+    theta = json.loads(capsys.readouterr().out)["trials"][0]["theta"]
+    at = ",".join(f"{name}={value!r}" for name, value in theta.items())
+    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", at, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"] == {"run": 2 * 18}
+
+
+def test_a_base_is_read_from_pairs_or_from_a_model(tmp_path):
+    assert read_base(None) == {}
+    assert read_base("trim=0.1, delay=2e-1") == {"trim": 0.1, "delay": 0.2}
+    (tmp_path / "model.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.05\n')
+    assert read_base(str(tmp_path / "model.toml")) == {"trim": 0.05}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("trim", "write NAME=VALUE"),
+        ("trim=much", "write NAME=VALUE"),
+        ("trim=0.1,trim=0.2", "twice"),
+        ("no.toml", "no such"),
+    ],
+)
+def test_a_base_that_is_neither_is_refused(text, expected):
+    with pytest.raises(InputError, match=expected):
+        read_base(text)
+
+
+BAD = {
+    "an unknown parameter": (["--parameter", "trimm"], "no parameter 'trimm' in this study's domain family; did you mean"),
+    "an unknown parameter held": (["--parameter", "trim", "--at", "dely=0.1"], "no parameter 'dely'"),
+    "a value beyond its bounds": (["--parameter", "trim", "--at", "delay=7"], "'delay': must lie within [0, 0.3], got 7"),
+    "one point": (["--parameter", "trim", "--points", "1"], "--points must be between 2 and"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line_and_exit_2(make_study, capsys, case):
+    options, expected = BAD[case]
+    assert main(["sweep", str(make_study()), *options]) == 2
+    out, told = capsys.readouterr()
+    assert expected in told
+    assert (out, told.count("\n")) == ("", 1)

@@ -61,6 +61,7 @@ class DomainFamily(Protocol):
         """Simulate one episode and score it: metric name to value.
 
         Raises:
-            EpisodeError: If the agent raises or answers with something that is not a command.
+            EpisodeError: If the agent raises or answers with something that is not a command; who runs the episode
+                adds the agent's name.
         """
         ...

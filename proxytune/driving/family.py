@@ -37,7 +37,6 @@ from proxytune.effects import (
     read_model,
     stage_chain,
 )
-from proxytune.errors import EpisodeError
 from proxytune.settings import Section, nearest
 from proxytune.space import Parameter, Theta
 
@@ -118,7 +117,7 @@ class LaneFollowing:
         """Drive one episode and score it.
 
         Raises:
-            EpisodeError: With the agent's name and the time at which it failed.
+            EpisodeError: With the time at which the agent failed.
         """
         return task.score_trajectory(
             MAPS[self.map], self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds
@@ -128,13 +127,10 @@ class LaneFollowing:
         """Drive one episode.
 
         Raises:
-            EpisodeError: With the agent's name and the time at which it failed.
+            EpisodeError: With the time at which the agent failed.
         """
         course = Course(self._start(episode), self.seconds, episode.seed, functools.partial(off_map, MAPS[self.map]))
-        try:
-            return self._drive(episode, load_agent(episode.agent, self.folder), course)
-        except EpisodeError as problem:
-            raise EpisodeError(f"agent '{episode.agent}' {problem}") from problem.__cause__
+        return self._drive(episode, load_agent(episode.agent, self.folder), course)
 
     def replay(self, episode: Episode, commands: Signal) -> Observation:
         """Drive recorded commands (steps, 2), one per control step, in place of the episode's agent.

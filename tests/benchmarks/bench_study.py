@@ -1,6 +1,7 @@
 """What a study costs: `python -m pytest tests/benchmarks/bench_study.py -o addopts= -s`. It prints and never fails."""
 
 import json
+import re
 import shutil
 import time
 from pathlib import Path
@@ -15,11 +16,10 @@ STUDIES = Path(__file__).resolve().parents[2] / "studies"
 def copy(tmp_path, name, **changes):
     folder = Path(shutil.copytree(STUDIES / name, tmp_path, ignore=shutil.ignore_patterns("study.db*", "figures")))
     path = folder / "study.toml"
-    lines = path.read_text(encoding="utf-8").splitlines()
-    edited = [
-        f"{key} = {changes[key]}" if (key := line.split(" = ")[0]) in changes and " = " in line else line for line in lines
-    ]
-    path.write_text("\n".join(edited) + "\n", encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    for key, value in changes.items():
+        text = re.sub(rf"^{key} = .*", f"{key} = {value}", text, flags=re.MULTILINE)
+    path.write_text(text, encoding="utf-8")
     return folder
 
 

@@ -1,4 +1,4 @@
-"""An episode is the same for the same seed, ends when it should, and fails loudly with the agent named."""
+"""An episode is the same for the same seed, ends when it should, and fails loudly."""
 
 import itertools
 
@@ -77,11 +77,11 @@ def test_an_episode_ends_when_the_robot_leaves_the_map(tmp_path):
         ("beginner", "raised RuntimeError before the first picture: no map"),
     ],
 )
-def test_a_failing_agent_is_named_with_the_time(tmp_path, name, says):
+def test_a_failing_agents_episode_says_what_happened_and_when(tmp_path, name, says):
     (tmp_path / "bad_agents.py").write_text(BAD_AGENTS, encoding="utf-8")
     with pytest.raises(EpisodeError) as caught:
         poses(family(tmp_path), agent=f"bad_agents:{name}")
-    assert f"agent 'bad_agents:{name}' {says}" in str(caught.value)
+    assert str(caught.value).startswith(says)
     assert "\n" not in str(caught.value)
 
 

@@ -53,7 +53,7 @@ def test_a_study_that_travels_along_is_copied_and_run(installed, tmp_path):
     assert proxytune(installed, *sweep, cwd=tmp_path).returncode == 2
     shipped = installed / "proxytune" / "studies" / "quickstart" / "study.toml"
     text = shipped.read_text(encoding="utf-8")
-    small = text.replace("budget = 25", "budget = 1").replace("seconds = 25.0", "seconds = 1.0")
+    small = text.replace("budget = 24", "budget = 1").replace("seconds = 20.0", "seconds = 1.0")
     assert small != text
     shipped.write_text(small, encoding="utf-8")
     try:

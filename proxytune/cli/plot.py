@@ -1,8 +1,8 @@
 """`plot`: draw a study's figures again from study.db; nothing is simulated."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.text import Text
 
@@ -28,13 +28,14 @@ def run(arguments: argparse.Namespace) -> Answer:
     folder = opened.settings.folder
     with Store.read(folder) as store:
         study = as_stored(opened, store)
-        result = result_of(study, store)
         curves = all_curves(study, store)
-    figures, report = draw(result, folder)
-    figures += draw_curves(curves, folder / "figures")
-    document = {**study_document(result), "figures": [str(path) for path in figures], "report": str(report)}
-    return Answer(document, _shown([*figures, report]))
-
-
-def _shown(files: Sequence[Path]) -> Text:
-    return Text("\n".join(str(path) for path in files))
+        only_swept = bool(curves) and not store.trials()
+        result = None if only_swept else result_of(study, store)
+    figures = draw_curves(curves, folder / "figures")
+    document: dict[str, Any] = {}
+    if result:
+        drawn, report = draw(result, folder)
+        figures = [*drawn, *figures]
+        document = {**study_document(result), "report": str(report)}
+    paths = [str(path) for path in figures]
+    return Answer({**document, "figures": paths}, Text("\n".join([*paths, *([document["report"]] if result else [])])))

@@ -31,7 +31,8 @@ def study_folder(path: Path) -> Path:
         return folder
     studies = {home.name: home for home in shipped("studies").iterdir() if (home / FILE_NAME).is_file()}
     if folder.name not in studies:
-        raise InputError(f"{folder}: no such study; {nearest(folder.name, studies)}, copied to where you say")
+        hint = nearest(folder.name, studies)
+        raise InputError(f"{folder}: no such folder, and no such study travels with proxytune; {hint}")
     _copy(studies[folder.name], folder)
     print(f"copied the study '{folder.name}' that travels with proxytune to {folder}", file=sys.stderr)
     return folder

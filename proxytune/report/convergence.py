@@ -54,8 +54,8 @@ def _trials(axes: Axes, result: StudyResult) -> None:
     last = result.trials[-1].number
     axes.step([*numbers, last], [*lowest, lowest[-1]], where="post", color=ORANGE, linewidth=1.5, label="lowest so far")
     best = result.best
-    ring = {"color": VERMILLION, "fillstyle": "none", "markersize": 9}
-    axes.plot(best.trial.number, best.assessment.prpv.value, "o", label="best θ", **ring)
+    (ring,) = axes.plot(best.trial.number, best.assessment.prpv.value, "o", color=VERMILLION, label="best θ")
+    ring.set(fillstyle="none", markersize=9)
 
 
 def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) -> None:

@@ -18,9 +18,12 @@ from proxytune.space import Space
 
 Array = NDArray[np.float64]
 
-LENGTH_SCALES = (0.2, 10.0)
+LENGTH_SCALES = (0.3, 3.0)
 """Bounds in widths of the box: below, a plateau of the step-like score would be taken for structure; above, the
-parameter does nothing."""
+parameter does next to nothing, and a longer scale only lets the surrogate jump to conclusions from few trials."""
+
+AMPLITUDES = (0.5, 5.0)
+"""Bounds of the variance relative to the scores' own: few trials say little of it, and they have been scaled."""
 
 NOISE = (1e-2, 1.0)
 """Bounds of the noise variance relative to the scores' own: the floor stands for the steps, which no smooth
@@ -90,4 +93,4 @@ def unit_array(space: Space, points: Sequence[Values]) -> Array:
 
 def _kernel(dimensions: int) -> ConstantKernel:
     smooth = Matern(np.full(dimensions, 0.5), length_scale_bounds=[LENGTH_SCALES] * dimensions, nu=2.5)
-    return ConstantKernel(1.0, (0.05, 20.0)) * smooth + WhiteKernel(0.1, NOISE)
+    return ConstantKernel(1.0, AMPLITUDES) * smooth + WhiteKernel(0.1, NOISE)

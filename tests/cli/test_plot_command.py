@@ -22,13 +22,20 @@ def test_every_figure_is_drawn_again_without_simulating(finished, capsys):
     assert (finished / "study.db").read_bytes() == content
 
 
+def test_sweeps_are_drawn_also_where_the_study_itself_has_not_been_run(make_study, capsys):
+    folder = make_study()
+    assert main(["sweep", str(folder), "--parameter", "trim", "--points", "2"]) == 0
+    capsys.readouterr()
+    assert main(["plot", str(folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"figures": [str(folder / "figures" / "sweep_trim.png")]}
+
+
 def test_a_study_that_has_not_been_run_is_told(make_study, capsys):
     folder = make_study()
     assert main(["plot", str(folder)]) == 2
     told = capsys.readouterr().err
-    assert told == (
-        f"proxytune plot: {folder / 'study.db'}: no such file; run the study first: python -m proxytune study {folder}\n"
-    )
+    hint = f"run the study first: python -m proxytune study {folder}"
+    assert told == f"proxytune plot: {folder / 'study.db'}: no such file; {hint}\n"
 
 
 def test_a_finished_study_can_be_drawn_when_the_family_s_code_has_changed(finished, monkeypatch, capsys):

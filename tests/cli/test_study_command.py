@@ -176,7 +176,9 @@ def test_a_study_that_travels_with_the_package_is_copied_and_that_is_said(travel
 
 
 def test_an_unknown_study_is_refused_with_the_nearest_name(travelling, tmp_path, capsys):
-    assert "no such study; did you mean 'quickstart'?" in refused(capsys, 2, "study", tmp_path / "quickstrat")
+    assert "no such study travels with proxytune; did you mean 'quickstart'?" in refused(
+        capsys, 2, "study", tmp_path / "quickstrat"
+    )
     assert not (tmp_path / "quickstrat").exists()
 
 

@@ -66,9 +66,15 @@ def test_a_base_that_is_neither_is_refused(text, expected):
 
 
 BAD = {
-    "an unknown parameter": (["--parameter", "trimm"], "no parameter 'trimm' in this study's domain family; did you mean"),
+    "an unknown parameter": (
+        ["--parameter", "trimm"],
+        "no parameter 'trimm' in this study's domain family; did you mean",
+    ),
     "an unknown parameter held": (["--parameter", "trim", "--at", "dely=0.1"], "no parameter 'dely'"),
-    "a value beyond its bounds": (["--parameter", "trim", "--at", "delay=7"], "'delay': must lie within [0, 0.3], got 7"),
+    "a value beyond its bounds": (
+        ["--parameter", "trim", "--at", "delay=7"],
+        "'delay': must lie within [0, 0.3], got 7",
+    ),
     "one point": (["--parameter", "trim", "--points", "1"], "--points must be between 2 and"),
 }
 

@@ -64,6 +64,8 @@ class Wobbly:
                 journal.write(f"{episode.agent} {episode.start} {episode.theta} {os.getpid()}\n")
         time.sleep(self.sleep)
         fault = next((f.split(":")[2] for f in self.faults if self._hits(f, episode)), "")
+        if fault == "lingers":
+            time.sleep(0.3)
         if fault == "raises":
             raise EpisodeError(f"agent '{episode.agent}' raised ValueError at 1.20 s: it lost its way")
         if fault == "crashes":

@@ -81,15 +81,27 @@ def test_a_text_file_is_refused(tmp_path):
     refused(tmp_path / "study.db", "is damaged (file is not a database); restore a copy")
 
 
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
-def test_a_truncated_database_is_refused(tmp_path, share):
-    path = tmp_path / "study.db"
+def filled(path):
     connection = connect(path, writable=True)
     rows = [(number, f"identity {number}", "{}") for number in range(3000)]
     connection.execute("BEGIN")
     connection.executemany("INSERT INTO instances VALUES (?, ?, ?)", rows)
     connection.execute("COMMIT")
     disconnect(connection)
+    return path
+
+
+def test_a_database_with_a_spoilt_page_is_refused(tmp_path):
+    path = filled(tmp_path / "study.db")
+    content = bytearray(path.read_bytes())
+    content[15 * 4096 : 16 * 4096] = b"?" * 4096
+    path.write_bytes(content)
+    refused(path, "is damaged")
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_a_truncated_database_is_refused(tmp_path, share):
+    path = filled(tmp_path / "study.db")
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
     refused(path, "is damaged")

@@ -1,4 +1,7 @@
+import os
+
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 from wobbly import Wobbly
 
 from proxytune.domain import make_episode
@@ -20,8 +23,6 @@ def test_two_processes_find_what_one_finds():
 
 
 def test_one_job_stays_in_this_process_and_two_do_not(tmp_path):
-    import os
-
     journals = {jobs: tmp_path / f"journal{jobs}" for jobs in (1, 2)}
     for jobs, journal in journals.items():
         run_all(Wobbly(journal=str(journal), sleep=0.02), jobs)
@@ -32,15 +33,14 @@ def test_one_job_stays_in_this_process_and_two_do_not(tmp_path):
 
 
 def test_each_episode_runs_on_one_thread():
-    from threadpoolctl import threadpool_info
-
     class Counting(Wobbly):
         def run(self, episode):
             counts.extend(pool["num_threads"] for pool in threadpool_info())
             return super().run(episode)
 
     counts = []
-    run_episode(Counting(), EPISODES[0])
+    with threadpool_limits(limits=2):
+        run_episode(Counting(), EPISODES[0])
     assert set(counts) == {1}
 
 

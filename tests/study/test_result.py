@@ -75,7 +75,9 @@ def test_without_a_scored_trial_it_says_so(make_study):
         study = open_study(folder)
         with pytest.raises(RunError, match="no trial is finished yet"):
             result_of(study, store)
-        store.save_trial(study.identity, TrialRecord(1, {"trim": 0.0, "delay": 0.0}, "failed", failure="agent 'x' fell"))
+        store.save_trial(
+            study.identity, TrialRecord(1, {"trim": 0.0, "delay": 0.0}, "failed", failure="agent 'x' fell")
+        )
         with pytest.raises(RunError, match="all trials failed, the first because agent 'x' fell"):
             result_of(study, store)
 

@@ -177,5 +177,8 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
 
 def test_the_search_sees_failed_trials_without_a_score(make_study):
     space = open_study(make_study()).settings.space
-    done = [TrialRecord(1, {"trim": 0.1, "delay": 0.2}, "failed"), TrialRecord(2, {"trim": 0, "delay": 0}, "finished", 3)]
+    done = [
+        TrialRecord(1, {"trim": 0.1, "delay": 0.2}, "failed"),
+        TrialRecord(2, {"trim": 0, "delay": 0}, "finished", 3),
+    ]
     assert [(trial.values, trial.score) for trial in as_trials(space, done)] == [((0.2, 0.1), None), ((0.0, 0.0), 3)]

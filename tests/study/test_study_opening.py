@@ -4,7 +4,10 @@ from proxytune.errors import InputError
 from proxytune.study.study import changes, facts, open_study
 
 BAD = {
-    "an agent is missing": (lambda text: text.replace("agent4", "agent9"), "target.csv: has no scores of agent4; did you"),
+    "an agent is missing": (
+        lambda text: text.replace("agent4", "agent9"),
+        "target.csv: has no scores of agent4; did you",
+    ),
     "several are": (
         lambda text: "\n".join(line for line in text.splitlines() if not line.startswith(("agent4", "agent5"))),
         "target.csv: has no scores of agent4, agent5; add them, or take them out of the study",

@@ -40,14 +40,9 @@ class GaussianProcess:
             return design_point(space, len(trials), seed)
         worst = max(scored)
         filled = [Trial(trial.values, worst if trial.score is None else trial.score) for trial in trials]
-        number = [seed, len(trials)]
         with threadpool_limits(limits=1):
-            surrogate = fit_surrogate(space, filled, _derived(number, 0))
-            return from_unit(space, _most_promising(surrogate, _derived(number, 1)))
-
-
-def _derived(number: list[int], purpose: int) -> int:
-    return int(np.random.SeedSequence([*number, purpose]).generate_state(1)[0])
+            cloud = int(np.random.SeedSequence([seed, len(trials)]).generate_state(1)[0])
+            return from_unit(space, _most_promising(fit_surrogate(space, filled), cloud))
 
 
 def _most_promising(surrogate: Surrogate, seed: int) -> Array:

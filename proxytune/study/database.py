@@ -13,8 +13,8 @@ The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_versi
     sweeps     parameter, base (JSON), points (JSON), identity     the curves that have been asked for
 
 θ as JSON has its parameters sorted by name and every digit of its numbers. While a study runs, what is written goes to
-`study.db-wal` first (SQLite's write-ahead log: a commit costs no wait for the disk, and survives a `kill -9`). That file
-belongs to study.db until the next clean end of a run, which leaves the one file.
+`study.db-wal` first (SQLite's write-ahead log: a commit costs no wait for the disk, and survives a `kill -9`). That
+file belongs to study.db until the next clean end of a run, which leaves the one file.
 """
 
 import sqlite3

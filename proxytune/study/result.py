@@ -75,7 +75,7 @@ def result_of(study: Study, store: Store) -> StudyResult:
 
 def _best(study: Study, store: Store, scored: list[TrialRecord]) -> Best:
     space = study.settings.space
-    surrogate = fit_surrogate(space, as_trials(space, scored), study.settings.seed)
+    surrogate = fit_surrogate(space, as_trials(space, scored))
     mean, deviation = surrogate.at_visited()
     row = int(np.argmin(mean))
     values = surrogate.visited[row].values

@@ -22,7 +22,7 @@ def visited(count, score=steps):
 
 def test_the_posterior_is_the_same_to_the_last_bit_in_whatever_order_trials_are_given():
     trials = visited(15)
-    there, back = fit_surrogate(SPACE, trials, 1), fit_surrogate(SPACE, trials[::-1], 1)
+    there, back = fit_surrogate(SPACE, trials), fit_surrogate(SPACE, trials[::-1])
     assert np.array_equal(there.predict(np.eye(2)), back.predict(np.eye(2)))
 
 
@@ -31,20 +31,29 @@ def test_the_incumbent_is_not_the_luckiest_score():
     trials = visited(40)
     far = max(trials, key=lambda trial: trial.score)
     lucky = Trial(tuple(value + 1e-3 for value in far.values), 0.0)
-    values, mean = fit_surrogate(SPACE, [*trials, lucky], 1).incumbent()
+    values, mean = fit_surrogate(SPACE, [*trials, lucky]).incumbent()
     assert values != lucky.values
     assert steps(values) <= 3
     assert mean < 5
 
 
 def test_the_noise_never_vanishes_even_on_scores_without_any():
-    surrogate = fit_surrogate(SPACE, visited(30, lambda values: 10 * values[0]), 1)
+    surrogate = fit_surrogate(SPACE, visited(30, lambda values: 10 * values[0]))
     assert surrogate.model.noise_ > 0.0099
+
+
+def test_a_few_trials_do_not_send_the_length_scales_to_their_bounds():
+    """Fitted without a prior, some of these are at 0.05 or at 20 widths of the box."""
+    for seed in range(5):
+        scores = np.random.default_rng(seed).integers(0, 30, 10).tolist()
+        trials = [Trial(design_point(SPACE, index, seed), float(score)) for index, score in enumerate(scores)]
+        scales = fit_surrogate(SPACE, trials).model.kernel_.k1.k2.length_scale
+        assert 0.1 < min(scales) <= max(scales) < 1.6
 
 
 def test_the_posterior_is_surer_where_trials_are():
     trials = [trial for trial in visited(30) if trial.values[0] < 0.15]
-    surrogate = fit_surrogate(SPACE, trials, 1)
+    surrogate = fit_surrogate(SPACE, trials)
     _, at_trials = surrogate.at_visited()
     _, elsewhere = surrogate.predict(np.array([[1.0, 0.0], [1.0, 1.0]]))
     assert at_trials.max() < elsewhere.min()
@@ -53,19 +62,19 @@ def test_the_posterior_is_surer_where_trials_are():
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_few_trials_or_equal_scores_still_give_finite_predictions(count):
     for score in (steps, lambda values: 4.0):
-        mean, deviation = fit_surrogate(SPACE, visited(count, score), 1).predict(np.array([[0.3, 0.7]]))
+        mean, deviation = fit_surrogate(SPACE, visited(count, score)).predict(np.array([[0.3, 0.7]]))
         assert np.isfinite(mean).all()
         assert np.isfinite(deviation).all()
 
 
 def test_failed_trials_are_left_out():
     trials = visited(9)
-    assert len(fit_surrogate(SPACE, [*trials, Trial((0.1, 0.1), None)], 1).visited) == 9
+    assert len(fit_surrogate(SPACE, [*trials, Trial((0.1, 0.1), None)]).visited) == 9
 
 
 def test_without_a_single_score_it_says_so():
     with pytest.raises(RunError, match="no trial has a score"):
-        fit_surrogate(SPACE, [Trial((0.1, 0.1), None)], 1)
+        fit_surrogate(SPACE, [Trial((0.1, 0.1), None)])
 
 
 def test_points_become_rows_of_the_unit_cube():

@@ -4,6 +4,7 @@ import pytest
 
 from proxytune.errors import RunError
 from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.study.evaluate import simulate
 from proxytune.study.progress import Silent
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
@@ -39,8 +40,6 @@ def test_the_best_is_the_surrogate_s_and_not_the_lowest_score(finished):
         worst = max(store.trials(), key=lambda trial: trial.prpv)
         near = {name: value + 1e-4 for name, value in worst.theta.items()}
         lucky = TrialRecord(8, near, "finished", 0.0)
-        from proxytune.study.evaluate import simulate
-
         simulate(study, store, near, Silent(), "")
         store.save_trial(study.identity, lucky)
     assert result(finished).best.trial.number not in (8, worst.number)

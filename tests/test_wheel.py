@@ -26,8 +26,8 @@ def installed(tmp_path_factory):
 
 
 def proxytune(site, *words, cwd):
-    code = f"import sys; sys.path.insert(0, {str(site)!r}); from proxytune.cli.main import main; sys.exit(main(sys.argv[1:]))"
-    command = [sys.executable, "-I", "-c", code, *words]
+    start = "from proxytune.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(site)!r}); {start}", *words]
     return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
 
 
@@ -49,8 +49,6 @@ def test_an_installed_proxytune_lists_its_robots_from_anywhere(installed, tmp_pa
 
 @pytest.mark.slow
 def test_a_study_that_travels_along_is_copied_and_run(installed, tmp_path):
-    sweep = ("sweep", "quickstart", "--parameter", "trim", "--points", "2", "--json")
-    assert proxytune(installed, *sweep, cwd=tmp_path).returncode == 2
     shipped = installed / "proxytune" / "studies" / "quickstart" / "study.toml"
     text = shipped.read_text(encoding="utf-8")
     small = text.replace("budget = 24", "budget = 1").replace("seconds = 20.0", "seconds = 1.0")

@@ -23,7 +23,9 @@ def load_agent(name: str, folder: Path) -> Agent:
     if name in AGENTS:
         return AGENTS[name]
     if ":" not in name:
-        raise SettingsError(f"agent '{name}' is unknown (your own is written module:attribute); {nearest(name, AGENTS)}")
+        raise SettingsError(
+            f"agent '{name}' is unknown (your own is written module:attribute); {nearest(name, AGENTS)}"
+        )
     found = _import(name, folder)
     made = found() if callable(found) else found
     if not (hasattr(made, "begin") and hasattr(made, "act")):

@@ -4,6 +4,7 @@ import argparse
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,12 +22,14 @@ ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 STUDIES = (ROOT / "studies" / "README.md").read_text(encoding="utf-8")
 ROBOTS = (ROOT / "robots" / "README.md").read_text(encoding="utf-8")
-SHELL_LINES = [
-    line.removeprefix("$ ")
-    for block in re.findall(r"```(?:sh|console)\n(.*?)```", README, flags=re.DOTALL)
-    for line in block.splitlines()
-    if line.removeprefix("$ ").startswith("python -m proxytune")
-]
+COMMAND_LINES = sorted(
+    {
+        line.removeprefix("$ ")
+        for block in re.findall(r"```(?:sh|console)\n(.*?)```", README, flags=re.DOTALL)
+        for line in block.splitlines()
+        if line.removeprefix("$ ").startswith("python -m proxytune")
+    }
+)
 
 
 def options():
@@ -90,9 +93,10 @@ def test_every_link_of_the_documents_leads_somewhere():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("line", SHELL_LINES)
+@pytest.mark.parametrize("line", COMMAND_LINES)
 def test_the_commands_of_the_readme_run(line, tmp_path):
-    words = shlex.split(line.split(" # ")[0])
+    shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=shutil.ignore_patterns("study.db*", "figures"))
+    words = shlex.split(line)
     done = subprocess.run([sys.executable, *words[1:]], capture_output=True, text=True, cwd=tmp_path, timeout=900)
     assert done.returncode == 0, done.stderr
     assert done.stdout

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import re
 import shlex
 import shutil
@@ -97,6 +98,7 @@ def test_every_link_of_the_documents_leads_somewhere():
 def test_the_commands_of_the_readme_run(line, tmp_path):
     shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=shutil.ignore_patterns("study.db*", "figures"))
     words = shlex.split(line)
-    done = subprocess.run([sys.executable, *words[1:]], capture_output=True, text=True, cwd=tmp_path, timeout=900)
+    here = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, *words[1:]], capture_output=True, text=True, cwd=tmp_path, env=here)
     assert done.returncode == 0, done.stderr
     assert done.stdout

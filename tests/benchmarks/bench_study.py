@@ -24,10 +24,10 @@ def copy(tmp_path, name, **changes):
 
 
 def test_two_jobs_against_one(tmp_path, capsys):
-    """24 one-minute bullet episodes, the workers' start included."""
+    """72 bullet episodes of up to a minute, the workers' start included."""
     seconds = {}
     for jobs in (1, 2):
-        folder = copy(tmp_path / str(jobs), "known_answer", jobs=jobs, starts=2)
+        folder = copy(tmp_path / str(jobs), "known_answer", jobs=jobs, starts=6)
         begun = time.perf_counter()
         main(["measure", str(folder), "--model", str(folder / "truth.toml"), "--output", str(folder / "again.csv")])
         seconds[jobs] = time.perf_counter() - begun

@@ -14,10 +14,19 @@ from proxytune.cli.study_folder import study_folder
 from proxytune.effects import read_model
 from proxytune.errors import InputError
 from proxytune.report.score_figures import save
-from proxytune.report.sweep_document import curve_csv, curve_document, curve_name, curve_table, failures
-from proxytune.report.sweep_figure import sweep_figure
+from proxytune.report.sweep_document import (
+    NO_POD,
+    curve_csv,
+    curve_document,
+    curve_lines,
+    curve_name,
+    curve_tables,
+    failures,
+)
+from proxytune.report.sweep_figure import bars_figure, panels_figure, sweep_figure
 from proxytune.report.writing import write_text
 from proxytune.space import Theta
+from proxytune.study.discrepancy import discrepancy_study
 from proxytune.study.evaluate import Spent
 from proxytune.study.lock import locked
 from proxytune.study.progress import Bars
@@ -38,6 +47,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE,…|MODEL",
         help="what the other parameters are held at, or a model.toml that says so [nominal]",
     )
+    parser.add_argument(
+        "--target-model",
+        type=Path,
+        metavar="MODEL",
+        help="the target's model.toml, where it is known; adds POD, which replays the same commands in both domains",
+    )
     parser.add_argument("--output", type=Path, metavar="DIR", help="where the curves go [the study's figures]")
 
 
@@ -46,36 +61,31 @@ def run(arguments: argparse.Namespace) -> Answer:
     folder = study_folder(arguments.path)
     study = open_study(folder)
     sweeps = _planned(study, arguments)
+    discrepancy = discrepancy_study(study, arguments.target_model) if arguments.target_model else None
+    per_point = len(study.settings.agents) + (discrepancy is not None)
     points = sum(len(sweep.points) for sweep in sweeps)
     spent = Spent()
     with locked(folder), Store.open(folder) as store:
-        with Bars(points * len(study.settings.agents) * study.settings.starts) as bars:
+        with Bars(points * per_point * study.settings.starts) as bars:
             for sweep in sweeps:
-                spent += run_sweep(study, store, sweep, bars)
-        curves = [curve for sweep in sweeps if (curve := curve_of(study, store, sweep))]
+                spent += run_sweep(study, store, sweep, bars, discrepancy)
+        curves = [curve for sweep in sweeps if (curve := curve_of(study, store, sweep, discrepancy))]
     output = arguments.output or folder / "figures"
-    figures = draw_curves(curves, output)
-    files = write_curves(curves, output)
-    document = {
-        "curves": [curve_document(curve) for curve in curves],
-        "episodes": {"run": spent.episodes},
-        "figures": [str(path) for path in figures],
-        "files": [str(path) for path in files],
-    }
-    lines = [*failures(curves), f"{spent.episodes} episodes run", *(str(path) for path in [*figures, *files])]
-    return Answer(document, Group(*map(curve_table, curves), Text("\n".join(lines))))
+    return _answer(curves, spent, draw_curves(curves, output), write_curves(curves, output))
 
 
 def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
-    """Draw one figure per curve, and one of all that hold the parameters at the same values; their paths."""
-    groups = {curve_name(curve): [curve] for curve in curves}
+    """Draw one figure per curve, and two of all that hold the parameters at the same values; their paths."""
+    figures = {curve_name(curve): panels_figure(curve) for curve in curves}
     for base, members in groupby(sorted(curves, key=_base), key=_base):
         together = list({curve.parameter: curve for curve in members}.values())
         if len(together) > 1:
-            groups["_".join(["sweep_all", *(f"{name}={value:g}" for name, value in base)])] = together
-    for name, group in groups.items():
-        save(sweep_figure(group), folder / f"{name}.png")
-    return [folder / f"{name}.png" for name in groups]
+            held = [f"{name}={value:g}" for name, value in base]
+            figures["_".join(["sweep_all", *held])] = sweep_figure(together)
+            figures["_".join(["sweep_bars", *held])] = bars_figure(together)
+    for name, figure in figures.items():
+        save(figure, folder / f"{name}.png")
+    return [folder / f"{name}.png" for name in figures]
 
 
 def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
@@ -116,6 +126,21 @@ def _planned(study: Study, arguments: argparse.Namespace) -> list[SweepRecord]:
     check_base(study, base)
     names = study.settings.space.names if arguments.parameter == "all" else (arguments.parameter,)
     return [plan_sweep(sweep_interval(study, name), base, arguments.points) for name in names]
+
+
+def _answer(curves: Sequence[Curve], spent: Spent, figures: Sequence[Path], files: Sequence[Path]) -> Answer:
+    document = {
+        "curves": [curve_document(curve) for curve in curves],
+        "episodes": {"run": spent.episodes},
+        "figures": [str(path) for path in figures],
+        "files": [str(path) for path in files],
+    }
+    parts = [
+        part for curve in curves for part in (*curve_tables(curve), Text("\n".join(["", *curve_lines(curve), ""])))
+    ]
+    hints = [] if all(curve.has_pod for curve in curves) else [NO_POD]
+    lines = [*failures(curves), *hints, f"{spent.episodes} episodes run", *(str(path) for path in [*figures, *files])]
+    return Answer(document, Group(*parts, Text("\n".join(lines))))
 
 
 def _base(curve: Curve) -> tuple[tuple[str, float], ...]:

@@ -1,16 +1,23 @@
-"""The figure of a sweep: usefulness along each parameter, with the target's noise floor."""
+"""The figures of a sweep: all measures along one parameter, an overview of several, and the bars of PRPV."""
 
 from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.study.sweep import Curve
+from proxytune.study.series import Series, series_of
+from proxytune.study.sweep import Curve, SweepPoint
 from proxytune.usefulness import Assessment
 
-BLUE, GREEN = "#0072B2", "#009E73"  # Okabe and Ito, safe for the colour-blind
+BLUE, LIGHT_BLUE, GREEN = "#0072B2", "#56B4E9", "#009E73"  # Okabe and Ito, safe for the colour-blind
+ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
+COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
+MARKERS = "osD^v"
 PANEL = (2.6, 2.0)
+SIDE = 1 / 3
+"""The bars stand at the held value and so much of the parameter's box to either side."""
 
 
 def sweep_figure(curves: Sequence[Curve]) -> Figure:
@@ -27,7 +34,7 @@ def sweep_figure(curves: Sequence[Curve]) -> Figure:
         points = [(point.value, point.assessment) for point in curve.points if point.assessment is not None]
         _prpv(upper, points)
         _ppv(lower, points)
-        lower.set_xlabel(f"{curve.parameter} [{curve.unit}]" if curve.unit else curve.parameter, fontsize=8)
+        lower.set_xlabel(_with_unit(curve), fontsize=8)
         for axes in (upper, lower):
             _dress(axes, curve)
     # Only now: a limit set earlier would hide what later columns of the shared axis hold.
@@ -38,6 +45,129 @@ def sweep_figure(curves: Sequence[Curve]) -> Figure:
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=7, frameon=False)
     return figure
+
+
+def panels_figure(curve: Curve) -> Figure:
+    """Draw PRPV, PPV, SRCC and, where it was asked for, POD along one parameter, as the paper's figure does.
+
+    Bands are 95 % bootstrap intervals; the thin vertical line is where the parameter is held when others are swept,
+    which is the truth where that is known.
+    """
+    series = series_of(curve)
+    rows, columns = (2, 2) if curve.has_pod else (1, 3)
+    figure = Figure(figsize=(PANEL[0] * columns + 0.4, PANEL[1] * rows + 0.4), layout="constrained")
+    panels = figure.subplots(rows, columns, sharex=True).ravel()
+    points = [(point.value, point.assessment) for point in curve.points if point.assessment is not None]
+    _prpv(panels[0], points)
+    _ppv(panels[1], points)
+    _srcc(panels[2], series)
+    for axes, name in zip(panels, ("PRPV [ordered pairs]", "PPV", "SRCC"), strict=False):
+        axes.set_ylabel(name, fontsize=8)
+    if curve.has_pod:
+        _pod(panels[3], series)
+    for axes in panels:
+        _dress(axes, curve)
+    for axes in panels[-columns:]:
+        axes.set_xlabel(_with_unit(curve), fontsize=8)
+    for axes in panels[:2]:
+        axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=7, frameon=False)
+    return figure
+
+
+def bars_figure(curves: Sequence[Curve]) -> Figure:
+    """Draw PRPV at three values of each parameter, with its bootstrap interval and the target's noise floor.
+
+    The values are where the parameter is held, and the grid points nearest to a third of its range below and above;
+    the held one is darker.
+    """
+    figure = Figure(figsize=(max(3.4, 1.1 * len(curves) + 1.0), 2.8), layout="constrained")
+    axes = figure.subplots()
+    ticks: list[tuple[float, str]] = []
+    for place, curve in enumerate(curves):
+        indices, held = bar_points(curve)
+        chosen = [curve.points[index] for index in indices]
+        spots = [place * 4.0 + offset for offset in range(len(chosen))]
+        ticks += [(spot, f"{point.value:.3g}") for spot, point in zip(spots, chosen, strict=True)]
+        _bars(axes, spots, chosen, curve.points[held])
+        centre = (spots[0] + spots[-1]) / 2
+        axes.annotate(
+            _with_unit(curve).replace("_", " ").replace(" [", "\n["),
+            (centre, 0), xytext=(0, -20), xycoords=("data", "axes fraction"), textcoords="offset points",
+            ha="center", va="top", fontsize=8,
+        )  # fmt: skip
+    found = [point.assessment for curve in curves for point in curve.points if point.assessment is not None]
+    if found:
+        _levels(axes, found)
+        figure.legend(loc="outside upper center", ncols=2, fontsize=7, frameon=False)
+    axes.set_xticks([spot for spot, _ in ticks], [text for _, text in ticks])
+    axes.set_xlabel(" \n ", fontsize=8)
+    axes.set_ylabel("PRPV [ordered pairs]", fontsize=8)
+    axes.tick_params(labelsize=7)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def bar_points(curve: Curve) -> tuple[list[int], int]:
+    """Which points of a curve stand for low, held and high, fewer where the held value is at an end; and the held one.
+
+    The held value is the middle of the range where none was given.
+    """
+    values = np.array([point.value for point in curve.points])
+    low, high = values[0], values[-1]
+    middle = int(np.abs(values - curve.base.get(curve.parameter, (low + high) / 2)).argmin())
+    wanted = values[middle] + SIDE * (high - low) * np.array([-1.0, 1.0])
+    below, above = range(middle), range(middle + 1, len(values))
+    sides = [
+        [min(indices, key=lambda index: abs(values[index] - goal))] if indices else []
+        for indices, goal in ((below, wanted[0]), (above, wanted[1]))
+    ]
+    return [*sides[0], middle, *sides[1]], middle
+
+
+def _bars(axes: Axes, spots: Sequence[float], chosen: Sequence[SweepPoint], held: SweepPoint) -> None:
+    for spot, point in zip(spots, chosen, strict=True):
+        if point.assessment is None:
+            axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=6)
+            continue
+        inner, score = point.assessment.prpv_interval, point.assessment.prpv.value
+        axes.bar(spot, score, width=0.85, color=BLUE if point is held else LIGHT_BLUE)
+        if inner.low is not None and inner.high is not None:
+            ends = [[score - inner.low], [inner.high - score]]
+            axes.errorbar([spot], [score], yerr=ends, fmt="none", ecolor="0.2", elinewidth=1.0, capsize=2)
+
+
+def _srcc(axes: Axes, series: Sequence[Series]) -> None:
+    chosen = [one for one in series if one.key.startswith("srcc_")]
+    for one, colour, marker in zip(chosen, cycle(COLOURS), cycle(MARKERS), strict=False):
+        _line(axes, one, colour, marker, one.key.removeprefix("srcc_").replace("_", " "))
+    axes.legend(fontsize=6, frameon=False)
+
+
+def _pod(axes: Axes, series: Sequence[Series]) -> None:
+    """Pose on the left axis, image on the right, each in the colour of its axis."""
+    by_key = {one.key: one for one in series}
+    right = axes.twinx()
+    for one, panel, colour, marker, name in (
+        (by_key["pod_pose"], axes, BLUE, "o", "POD, pose [m]"),
+        (by_key["pod_image"], right, VERMILLION, "s", "POD, image [of full scale]"),
+    ):
+        _line(panel, one, colour, marker, name)
+        panel.set_ylabel(name, fontsize=8, color=colour)
+        panel.tick_params(axis="y", labelsize=7, colors=colour)
+        panel.set_ylim(bottom=min(0.0, -0.03 * panel.get_ylim()[1]))
+    right.spines["top"].set_visible(False)
+
+
+def _line(axes: Axes, series: Series, colour: str, marker: str, label: str) -> None:
+    known = [(one.value, one.score) for one in series.estimates if one.score is not None]
+    banded = [(one.value, *one.interval) for one in series.estimates if one.interval]
+    if banded:
+        places, lows, highs = np.array(banded).T
+        axes.fill_between(places, lows, highs, color=colour, alpha=0.18, linewidth=0)
+    values, scores = [value for value, _ in known], [score for _, score in known]
+    axes.plot(values, scores, marker=marker, color=colour, ms=3, lw=1.2, label=label)
 
 
 def _prpv(axes: Axes, points: Sequence[tuple[float, Assessment]]) -> None:
@@ -78,3 +208,7 @@ def _dress(axes: Axes, curve: Curve) -> None:
         axes.axvline(curve.base[curve.parameter], color="0.6", linewidth=0.8)
     axes.tick_params(labelsize=7)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _with_unit(curve: Curve) -> str:
+    return f"{curve.parameter} [{curve.unit}]" if curve.unit else curve.parameter

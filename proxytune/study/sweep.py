@@ -1,21 +1,38 @@
 """Usefulness along one parameter of the domain family, the others held."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from proxytune.errors import InputError
 from proxytune.settings import nearest
 from proxytune.space import Interval, Theta
-from proxytune.study.evaluate import Evaluation, Spent, evaluation, simulate
+from proxytune.study.evaluate import Evaluation, Spent, evaluation, plan, simulate
 from proxytune.study.progress import Watcher
 from proxytune.study.store import Store, SweepRecord
 from proxytune.study.study import Study
 from proxytune.usefulness import Assessment, assess
+from proxytune.usefulness.resampling import interval as central_interval
 
+RESAMPLES = 1000
 DECIMALS = 12
 """Grid values are rounded to so many, that 0.1 is 0.1 and not a hair less."""
+
+
+@dataclass(frozen=True)
+class PodMean:
+    """A POD averaged over the starts.
+
+    Attributes:
+        value: In its own unit.
+        interval: Its bootstrap interval over the starts; None for a single start.
+        starts: How many starts worked.
+    """
+
+    value: float
+    interval: tuple[float, float] | None
+    starts: int
 
 
 @dataclass(frozen=True)
@@ -26,11 +43,13 @@ class SweepPoint:
         value: The parameter, in its unit.
         evaluation: What the agents scored there.
         assessment: How useful the proxy is there; None if an agent has no episode that worked.
+        pod: "pod_pose" [m] and "pod_image" [of full scale]; empty where POD was not asked for or every replay failed.
     """
 
     value: float
     evaluation: Evaluation
     assessment: Assessment | None
+    pod: Mapping[str, PodMean] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -41,13 +60,17 @@ class Curve:
         parameter: Its name.
         unit: Its unit.
         base: What the other parameters are held at; those not named are nominal.
+        metrics: How agents are compared.
         points: In rising order of the parameter.
+        has_pod: Whether POD was asked for.
     """
 
     parameter: str
     unit: str
     base: Theta
+    metrics: tuple[str, ...]
     points: tuple[SweepPoint, ...]
+    has_pod: bool = False
 
 
 def sweep_interval(study: Study, parameter: str) -> Interval:
@@ -87,23 +110,45 @@ def plan_sweep(interval: Interval, base: Theta, points: int) -> SweepRecord:
     return SweepRecord(interval.name, dict(base), tuple(sorted({*grid, *own})))
 
 
-def run_sweep(study: Study, store: Store, sweep: SweepRecord, watcher: Watcher) -> Spent:
-    """Simulate what is missing of a sweep; episodes are shared with the study's trials and other sweeps."""
+def run_sweep(
+    study: Study, store: Store, sweep: SweepRecord, watcher: Watcher, discrepancy: Study | None = None
+) -> Spent:
+    """Simulate what is missing of a sweep; episodes are shared with the study's trials and other sweeps.
+
+    With a study of the discrepancy (discrepancy.discrepancy_study), POD is simulated too.
+    """
     store.save_sweep(study.identity, sweep)
     spent = Spent()
     for number, value in enumerate(sweep.points, start=1):
         what = f"{sweep.parameter} {number} of {len(sweep.points)}"
         spent += simulate(study, store, _theta(sweep, value), watcher, what)
+        if discrepancy is not None:
+            spent += simulate(discrepancy, store, _theta(sweep, value), watcher, f"POD, {what}")
     return spent
 
 
-def curve_of(study: Study, store: Store, sweep: SweepRecord) -> Curve | None:
+def curve_of(study: Study, store: Store, sweep: SweepRecord, discrepancy: Study | None = None) -> Curve | None:
     """The curve of a sweep from what the store has; None if an episode is still missing."""
     found = [(value, evaluation(study, store, _theta(sweep, value))) for value in sweep.points]
-    points = [_point(study, value, known) for value, known in found if known is not None]
+    points = [
+        _point(study, value, known, _pod(discrepancy, store, _theta(sweep, value)) if discrepancy else {})
+        for value, known in found
+        if known is not None
+    ]
     if len(points) < len(found):
         return None
-    return Curve(sweep.parameter, study.family.parameters[sweep.parameter].unit, sweep.base, tuple(points))
+    unit = study.family.parameters[sweep.parameter].unit
+    metrics = tuple(metric.name for metric in study.settings.metrics)
+    return Curve(sweep.parameter, unit, sweep.base, metrics, tuple(points), discrepancy is not None)
+
+
+def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
+    """Average a POD over starts, with the percentile bootstrap interval of the mean."""
+    found = np.asarray(values, dtype=np.float64)
+    if len(found) < 2:
+        return PodMean(float(found.mean()), None, len(found))
+    draws = np.random.default_rng(seed).integers(len(found), size=(RESAMPLES, len(found)))
+    return PodMean(float(found.mean()), central_interval(found[draws].mean(axis=1)), len(found))
 
 
 def all_curves(study: Study, store: Store) -> Sequence[Curve]:
@@ -116,7 +161,15 @@ def _theta(sweep: SweepRecord, value: float) -> dict[str, float]:
     return {**sweep.base, sweep.parameter: value}
 
 
-def _point(study: Study, value: float, known: Evaluation) -> SweepPoint:
-    if known.proxy is None:
-        return SweepPoint(value, known, None)
-    return SweepPoint(value, known, assess(proxy=known.proxy, target=study.target, metrics=study.settings.metrics))
+def _pod(discrepancy: Study, store: Store, theta: Theta) -> dict[str, PodMean]:
+    planned = plan(discrepancy.settings, theta, discrepancy.settings.seed)
+    known = store.outcomes(discrepancy.identity, theta)
+    worked = [found.metrics for episode in planned if (found := known.get(episode)) and found.metrics is not None]
+    return {name: pod_mean([one[name] for one in worked]) for name in discrepancy.family.metrics} if worked else {}
+
+
+def _point(study: Study, value: float, known: Evaluation, pod: Mapping[str, PodMean]) -> SweepPoint:
+    found = None
+    if known.proxy is not None:
+        found = assess(proxy=known.proxy, target=study.target, metrics=study.settings.metrics)
+    return SweepPoint(value, known, found, pod)

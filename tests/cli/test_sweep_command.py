@@ -32,8 +32,22 @@ def test_all_sweeps_every_parameter_of_the_study_and_draws_them_together(make_st
     folder = make_study()
     assert main(["sweep", str(folder), "--parameter", "all", "--points", "2"]) == 0
     names = sorted(path.stem for path in (folder / "figures").glob("*.png"))
-    assert names == ["sweep_all", "sweep_delay", "sweep_trim"]
-    assert "PRPV" in capsys.readouterr().out
+    assert names == ["sweep_all", "sweep_bars", "sweep_delay", "sweep_trim"]
+    out = capsys.readouterr().out
+    assert "trim: PRPV: lowest" in out
+    assert "give --target-model" in out
+
+
+def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, capsys):
+    folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
+    model.write_text("trim = 0.1\n")
+    arguments = ["sweep", str(folder), "--parameter", "trim", "--points", "2", "--at", "trim=0.1"]
+    assert main([*arguments, "--target-model", str(model), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["episodes"] == {"run": 3 * 21}
+    assert document["curves"][0]["points"][1]["pod"]["pod_pose"]["value"] == 0
+    assert main(arguments) == 0
+    assert {path.name for path in (folder / "figures").glob("*.png")} == {"sweep_trim.png", "sweep_trim_pod.png"}
 
 
 def test_trials_and_sweeps_share_episodes(finished, capsys):
@@ -74,6 +88,11 @@ BAD = {
     "a value beyond its bounds": (
         ["--parameter", "trim", "--at", "delay=7"],
         "'delay': must lie within [0, 0.3], got 7",
+    ),
+    "no such model": (["--parameter", "trim", "--target-model", "no.toml"], "--target-model no.toml: no such file"),
+    "a family that cannot replay": (
+        ["--parameter", "trim", "--target-model", __file__],
+        "wobbly:wobbly has no `drive` and `replay`",
     ),
     "one point": (["--parameter", "trim", "--points", "1"], "--points must be between 2 and"),
 }

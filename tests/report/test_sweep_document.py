@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from proxytune.report.sweep_document import curve_csv, curve_document, curve_name, curve_table, failures
-from proxytune.report.sweep_figure import sweep_figure
+from proxytune.report.sweep_document import curve_csv, curve_document, curve_lines, curve_name, curve_tables, failures
+from proxytune.report.sweep_figure import bar_points, bars_figure, panels_figure, sweep_figure
+from proxytune.study.discrepancy import discrepancy_study
 from proxytune.study.progress import Silent
 from proxytune.study.store import Store
 from proxytune.study.study import open_study
@@ -16,12 +17,19 @@ from proxytune.study.sweep import curve_of, plan_sweep, run_sweep, sweep_interva
 TRUTH = {"trim": 0.1, "delay": 0.12}
 
 
-def curve(folder, parameter="trim", base=TRUTH):
+def curve(folder, parameter="trim", base=TRUTH, model=None):
     study = open_study(folder)
     plan = plan_sweep(sweep_interval(study, parameter), base, 4)
+    discrepancy = discrepancy_study(study, model) if model else None
     with Store.open(folder) as store:
-        run_sweep(study, store, plan, Silent())
-        return curve_of(study, store, plan)
+        run_sweep(study, store, plan, Silent(), discrepancy)
+        return curve_of(study, store, plan, discrepancy)
+
+
+@pytest.fixture
+def with_pod(make_study, tmp_path):
+    (tmp_path / "truth.toml").write_text("trim = 0.1\ndelay = 0.12\n")
+    return curve(make_study(family='"echo:echo"'), model=tmp_path / "truth.toml")
 
 
 @pytest.fixture
@@ -52,18 +60,24 @@ def test_the_name_says_what_the_others_are_held_at(swept, make_study):
 
 
 def test_people_see_a_row_per_value(swept):
-    console = Console(width=100)
+    console = Console(width=80)
     with console.capture() as captured:
-        console.print(curve_table(swept))
-    assert len(captured.get().splitlines()) == 2 + 4
+        console.print(*curve_tables(swept))
+    shown = captured.get()
+    rows = [line for line in shown.splitlines() if line.strip().startswith("0.1 ")]
+    assert len(rows) == 2, "one row in each of the two tables"
+    assert "…" not in shown, "all fits eighty columns"
+    assert all(name in shown for name in ("PRPV", "PPV", "SRCC", "Kendall", "MMRV"))
+    assert "POD" not in shown
 
 
 def test_points_without_a_score_are_empty_and_told(make_study):
     broken = curve(make_study(domain={"faults": '["agent3:*:raises"]'}))
     assert curve_document(broken)["points"][0]["prpv"] is None
-    assert curve_csv(broken).splitlines()[1] == "-0.3,,,,,3"
+    assert curve_csv(broken).splitlines()[1] == "-0.3" + "," * (3 * 8) + ",3"
     assert failures([broken])[0].startswith("trim -0.3: agent 'agent3' failed from every start")
-    sweep_figure([broken])
+    for figure in (sweep_figure([broken]), panels_figure(broken), bars_figure([broken])):
+        figure.draw_without_rendering()
 
 
 def test_the_figure_shows_every_point_of_every_curve_within_its_axes(make_study):
@@ -78,3 +92,62 @@ def test_the_figure_shows_every_point_of_every_curve_within_its_axes(make_study)
         assert low <= min(line.get_ydata()) <= max(line.get_ydata()) <= high
     assert [panel.get_xlabel() for panel in panels[1]] == ["trim", "delay [s]"]
     assert [row[0].get_ylabel() for row in panels] == ["PRPV [ordered pairs]", "PPV"]
+
+
+def test_every_measure_is_in_the_document_with_its_interval(with_pod):
+    document = curve_document(with_pod)
+    point = document["points"][2]
+    for measure in ("srcc", "kendall_tau", "mmrv"):
+        assert set(point[measure]) == set(point["intervals"][measure]) == {"distance", "survival_time"}
+    assert point["pod"]["pod_pose"] == {"value": 0.0, "interval": [0.0, 0.0], "unit": "m", "starts": 3}
+    assert document["points"][0]["pod"]["pod_image"]["value"] > 0
+    assert document["notes"] == []
+    assert document["shapes"]["pod_pose"]["best"] == (0.1,)
+    assert document["shapes"]["pod_pose"]["worsens_on_both_sides"] is True
+    assert curve_name(with_pod) == "sweep_trim_delay=0.12_pod"
+
+
+def test_without_a_target_model_the_document_says_how_to_get_pod(swept):
+    document = curve_document(swept)
+    assert document["points"][0]["pod"] is None
+    assert "--target-model" in document["notes"][0]
+    assert not any("pod" in column for column in curve_csv(swept).splitlines()[0].split(","))
+
+
+def test_the_csv_has_every_measure_with_both_ends(with_pod):
+    rows = list(csv.DictReader(io.StringIO(curve_csv(with_pod))))
+    for key in ("prpv", "ppv", "srcc_distance", "kendall_tau_distance", "mmrv_survival_time", "pod_pose", "pod_image"):
+        assert all(float(row[f"{key}_low"]) <= float(row[f"{key}_high"]) for row in rows if row[f"{key}_low"])
+        assert all(row[key] for row in rows)
+
+
+def test_a_line_per_measure_says_what_the_curve_shows(with_pod):
+    lines = curve_lines(with_pod)
+    assert len(lines) == 2 + 3 * 2 + 2
+    assert lines[0].startswith("trim: PRPV: lowest (0) at 0.1")
+    assert "worsens" in next(line for line in lines if "POD pose" in line)
+
+
+def test_the_panels_show_prpv_ppv_srcc_and_both_pods(with_pod):
+    *panels, right = panels_figure(with_pod).axes
+    assert [axes.get_ylabel() for axes in panels] == ["PRPV [ordered pairs]", "PPV", "SRCC", "POD, pose [m]"]
+    assert right.get_ylabel() == "POD, image [of full scale]"
+    assert [line.get_label() for line in panels[2].get_lines()][:2] == ["distance", "survival time"]
+    for axes, key in ((panels[3], "pod_pose"), (right, "pod_image")):
+        assert list(axes.get_lines()[0].get_ydata()) == [point.pod[key].value for point in with_pod.points]
+    assert all(0.1 in line.get_xdata() for axes in panels for line in axes.get_lines()[-1:])
+
+
+def test_without_pod_there_are_three_panels(swept):
+    assert len(panels_figure(swept).axes) == 3
+
+
+def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_study, swept):
+    values = [point.value for point in swept.points]
+    indices, held = bar_points(swept)
+    assert ([values[index] for index in indices], values[held]) == ([-0.1, 0.1, 0.3], 0.1)
+    at_the_end = curve(make_study("end"), base={"trim": -0.3})
+    assert bar_points(at_the_end) == ([0, 1], 0)
+    axes = bars_figure([swept]).axes[0]
+    scores = [swept.points[index].assessment.prpv.value for index in indices]
+    assert [patch.get_height() for patch in axes.patches if patch.get_width() == pytest.approx(0.85)] == scores

@@ -9,10 +9,9 @@ from proxytune.cli.answer import Answer
 from proxytune.cli.study_folder import study_folder
 from proxytune.report.convergence import convergence
 from proxytune.report.page import page
-from proxytune.report.score_figures import save
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import study_table
-from proxytune.report.writing import write_text
+from proxytune.report.writing import save, write_text
 from proxytune.search.gaussian_process import GaussianProcess
 from proxytune.study.evaluate import Spent
 from proxytune.study.lock import locked

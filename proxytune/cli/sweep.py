@@ -13,7 +13,6 @@ from proxytune.cli.answer import Answer
 from proxytune.cli.study_folder import study_folder
 from proxytune.effects import read_model
 from proxytune.errors import InputError
-from proxytune.report.score_figures import save
 from proxytune.report.sweep_document import (
     NO_POD,
     curve_csv,
@@ -24,7 +23,7 @@ from proxytune.report.sweep_document import (
     failures,
 )
 from proxytune.report.sweep_figure import bars_figure, panels_figure, sweep_figure
-from proxytune.report.writing import write_text
+from proxytune.report.writing import save, write_text
 from proxytune.space import Theta
 from proxytune.study.discrepancy import discrepancy_study
 from proxytune.study.evaluate import Spent

@@ -25,7 +25,7 @@ from proxytune.driving.maps import MAPS
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
 from proxytune.driving.robot import Robot, read_robot, robot_names
-from proxytune.driving.texture import Floor, draw_floor
+from proxytune.driving.texture import draw_floor
 from proxytune.effects import (
     PARAMETERS,
     Effect,
@@ -174,13 +174,8 @@ def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) ->
     nominal = figures.channels()
     memory = mounting.begin(Setting(TICK_HZ, nominal, robot.figures))
     mounted = figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
-    floor = _floor(family.map)
+    floor = draw_floor(MAPS[family.map])
     return GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)
-
-
-@functools.lru_cache
-def _floor(name: str) -> Floor:
-    return draw_floor(MAPS[name])
 
 
 @functools.lru_cache

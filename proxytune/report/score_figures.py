@@ -1,15 +1,11 @@
 """The figures of `score`: proxy against target per metric, and which pairs of agents the proxy flips."""
 
-import contextlib
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from proxytune.errors import RunError
 from proxytune.scores import Array, ScoreTable
 from proxytune.usefulness import Assessment, Comparison, Prpv
 
@@ -53,23 +49,6 @@ def flipped_pairs(prpv: Prpv) -> Figure:
     axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=9)
     axes.legend(handles=_legend(prpv), loc="upper right", fontsize=7, frameon=False)
     return figure
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG; an interrupted write leaves the old file.
-
-    Raises:
-        RunError: If the file cannot be written.
-    """
-    draft = path.with_name(f".{path.name}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(draft, format="png", dpi=200)
-        draft.replace(path)
-    except OSError as problem:
-        with contextlib.suppress(OSError):
-            draft.unlink()
-        raise RunError(f"{path}: the figure cannot be written ({problem.strerror})") from None
 
 
 def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:

@@ -120,7 +120,7 @@ def _shape(series: Series, curve: Curve) -> dict[str, Any]:
 
 def _table(curve: Curve, series: Sequence[Series], title: str | None) -> Table:
     table = Table(box=None, pad_edge=False, title=title, title_justify="left")
-    for name in (_with_unit(curve), *(_broken(one.name) for one in series)):
+    for name in (curve.label, *(_broken(one.name) for one in series)):
         table.add_column(name, justify="right", vertical="bottom")
     for row, point in enumerate(curve.points):
         table.add_row(f"{point.value:.4g}", *(_cell(one, row) for one in series))
@@ -139,7 +139,3 @@ def _cell(series: Series, row: int) -> str:
 def _broken(name: str) -> str:
     """The name with its metric on lines of their own, so that many columns fit."""
     return name.replace(" ", "\n").replace("_", "\n")
-
-
-def _with_unit(curve: Curve) -> str:
-    return f"{curve.parameter} [{curve.unit}]" if curve.unit else curve.parameter

@@ -34,7 +34,7 @@ def sweep_figure(curves: Sequence[Curve]) -> Figure:
         points = [(point.value, point.assessment) for point in curve.points if point.assessment is not None]
         _prpv(upper, points)
         _ppv(lower, points)
-        lower.set_xlabel(_with_unit(curve), fontsize=8)
+        lower.set_xlabel(curve.label, fontsize=8)
         for axes in (upper, lower):
             _dress(axes, curve)
     # Only now: a limit set earlier would hide what later columns of the shared axis hold.
@@ -68,7 +68,7 @@ def panels_figure(curve: Curve) -> Figure:
     for axes in panels:
         _dress(axes, curve)
     for axes in panels[-columns:]:
-        axes.set_xlabel(_with_unit(curve), fontsize=8)
+        axes.set_xlabel(curve.label, fontsize=8)
     for axes in panels[:2]:
         axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
     handles, labels = panels[0].get_legend_handles_labels()
@@ -93,7 +93,7 @@ def bars_figure(curves: Sequence[Curve]) -> Figure:
         _bars(axes, spots, chosen, curve.points[held])
         centre = (spots[0] + spots[-1]) / 2
         axes.annotate(
-            _with_unit(curve).replace("_", " ").replace(" [", "\n["),
+            curve.label.replace("_", " ").replace(" [", "\n["),
             (centre, 0), xytext=(0, -20), xycoords=("data", "axes fraction"), textcoords="offset points",
             ha="center", va="top", fontsize=8,
         )  # fmt: skip
@@ -208,7 +208,3 @@ def _dress(axes: Axes, curve: Curve) -> None:
         axes.axvline(curve.base[curve.parameter], color="0.6", linewidth=0.8)
     axes.tick_params(labelsize=7)
     axes.spines[["top", "right"]].set_visible(False)
-
-
-def _with_unit(curve: Curve) -> str:
-    return f"{curve.parameter} [{curve.unit}]" if curve.unit else curve.parameter

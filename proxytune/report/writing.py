@@ -1,8 +1,11 @@
-"""Writing a text file whole or not at all."""
+"""Writing a file whole or not at all."""
 
 import contextlib
 import os
+from collections.abc import Callable
 from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from proxytune.errors import RunError
 
@@ -13,12 +16,25 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         RunError: If the file cannot be written.
     """
+    _whole(path, "", lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG; an interrupted write leaves the old file.
+
+    Raises:
+        RunError: If the file cannot be written.
+    """
+    _whole(path, "the figure ", lambda draft: figure.savefig(draft, format="png", dpi=200))
+
+
+def _whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        draft.write_text(text, encoding="utf-8", newline="\n")
+        write(draft)
         draft.replace(path)
     except OSError as problem:
         with contextlib.suppress(OSError):
             draft.unlink()
-        raise RunError(f"{path}: cannot be written ({problem.strerror})") from None
+        raise RunError(f"{path}: {what}cannot be written ({problem.strerror})") from None

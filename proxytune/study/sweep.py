@@ -7,7 +7,7 @@ import numpy as np
 
 from proxytune.errors import InputError
 from proxytune.settings import nearest
-from proxytune.space import Interval, Theta
+from proxytune.space import Interval, Parameter, Theta
 from proxytune.study.evaluate import Evaluation, Spent, evaluation, plan, simulate
 from proxytune.study.progress import Watcher
 from proxytune.study.store import Store, SweepRecord
@@ -72,6 +72,11 @@ class Curve:
     points: tuple[SweepPoint, ...]
     has_pod: bool = False
 
+    @property
+    def label(self) -> str:
+        """The parameter with its unit, as axes and columns name it."""
+        return f"{self.parameter} [{self.unit}]" if self.unit else self.parameter
+
 
 def sweep_interval(study: Study, parameter: str) -> Interval:
     """Where a parameter is swept: over the study's box, or over all it may be where the study does not search it.
@@ -82,10 +87,8 @@ def sweep_interval(study: Study, parameter: str) -> Interval:
     boxes = {interval.name: interval for interval in study.settings.space.intervals}
     if parameter in boxes:
         return boxes[parameter]
-    known = study.family.parameters
-    if parameter not in known:
-        raise InputError(f"no parameter '{parameter}' in this study's domain family; {nearest(parameter, known)}")
-    return Interval(parameter, known[parameter].low, known[parameter].high)
+    known = _parameter(study, parameter)
+    return Interval(parameter, known.low, known.high)
 
 
 def check_base(study: Study, base: Theta) -> None:
@@ -94,13 +97,17 @@ def check_base(study: Study, base: Theta) -> None:
     Raises:
         InputError: With the parameter's name.
     """
-    known = study.family.parameters
     for name, value in base.items():
-        if name not in known:
-            raise InputError(f"no parameter '{name}' in this study's domain family; {nearest(name, known)}")
-        if not known[name].low <= value <= known[name].high:
-            low, high = known[name].low, known[name].high
-            raise InputError(f"parameter '{name}': must lie within [{low:g}, {high:g}], got {value:g}")
+        known = _parameter(study, name)
+        if not known.low <= value <= known.high:
+            raise InputError(f"parameter '{name}': must lie within [{known.low:g}, {known.high:g}], got {value:g}")
+
+
+def _parameter(study: Study, name: str) -> Parameter:
+    known = study.family.parameters
+    if name not in known:
+        raise InputError(f"no parameter '{name}' in this study's domain family; {nearest(name, known)}")
+    return known[name]
 
 
 def plan_sweep(interval: Interval, base: Theta, points: int) -> SweepRecord:

@@ -5,7 +5,7 @@ import pytest
 
 from proxytune.report.convergence import convergence
 from proxytune.report.page import page
-from proxytune.report.score_figures import save
+from proxytune.report.writing import save
 from proxytune.study.result import result_of
 from proxytune.study.store import Store
 from proxytune.study.study import open_study

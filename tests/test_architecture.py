@@ -8,7 +8,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parent.parent / "proxytune"
 FLOORS = (
     {"errors"},
-    {"settings", "space", "shipped", "scores"},
+    {"settings", "space", "shipped", "scores", "logs"},
     {"usefulness", "effects"},
     {"domain"},
     {"driving"},

@@ -37,7 +37,8 @@ def _cell(value: object) -> str:
 def _robots() -> list[Row]:
     robots = [read_robot(name) for name in robot_names()]
     return [
-        {"name": robot.name, "description": robot.description, "mass_kg": robot.figures["mass"]} for robot in robots
+        {"name": robot.name, "description": robot.description, "mass_kg": robot.figures.get("mass", "")}
+        for robot in robots
     ]
 
 

@@ -45,10 +45,11 @@ class Drivetrain:
         """The twists that the next chunk of duties leads to."""
         arrived, command = self.command.apply(signal, memory.command)
         wheels, actuation = self.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)
-        twists, motion = self.motion.apply(self._twists(wheels), memory.motion)
+        twists, motion = self.motion.apply(self.ideal(wheels), memory.motion)
         return twists, Progress(command, actuation, motion)
 
-    def _twists(self, wheels: Signal) -> Signal:
+    def ideal(self, wheels: Signal) -> Signal:
+        """The twists that wheel speeds (…, time, 2) ask for, nothing slipping."""
         full_speed, baseline = self.robot.figures["full_speed"], self.robot.figures["effective_baseline"]
         left, right = wheels[..., 0], wheels[..., 1]
         twists = np.zeros((*left.shape, 3))

@@ -29,12 +29,14 @@ class Instance:
         drivetrain: Command, actuation and motion effects.
         camera: Mounted as the camera effects have it.
         image: The image effects.
+        measurement: The measurement effects.
     """
 
     robot: Robot
     drivetrain: Drivetrain
     camera: Camera
     image: Chain
+    measurement: Chain
 
 
 class Drive(NamedTuple):
@@ -106,7 +108,7 @@ def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Dri
     """
     figures = instance.robot.figures
     hold = round(TICK_HZ / figures["control_rate"])
-    memory = instance.drivetrain.begin(Setting(TICK_HZ, np.zeros(2), figures, course.seed))
+    memory = instance.drivetrain.begin(Setting(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:]))
     view = _View(instance, course.start, course.seed)
     driver = _begin(agent, instance.robot)
     poses, commands, crashed = [course.start[None]], [], False
@@ -120,6 +122,12 @@ def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Dri
         if crashed or course.ended(float(moved[-1, 0]), float(moved[-1, 1])):
             break
     return Drive(np.concatenate(poses), np.array(commands), crashed, driver)
+
+
+def measured(instance: Instance, driven: Drive, seed: int) -> Signal:
+    """The poses of a drive as the measurement effects show them, (ticks + 1, 3)."""
+    setting = Setting(TICK_HZ, driven.poses[0], instance.robot.figures, seed)
+    return instance.measurement.apply(driven.poses, instance.measurement.begin(setting))[0]
 
 
 def _begin(agent: Agent, robot: Robot) -> Any:

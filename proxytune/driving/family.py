@@ -19,7 +19,7 @@ from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
-from proxytune.driving.episode import TICK_HZ, Course, Drive, Instance, drive
+from proxytune.driving.episode import TICK_HZ, Course, Drive, Instance, drive, measured
 from proxytune.driving.lane import off_map
 from proxytune.driving.maps import MAPS
 from proxytune.driving.planar import PlanarPlant
@@ -37,7 +37,9 @@ from proxytune.effects import (
     read_model,
     stage_chain,
 )
+from proxytune.errors import SettingsError
 from proxytune.settings import Section, nearest
+from proxytune.shipped import shipped
 from proxytune.space import Parameter, Theta
 
 PLANTS = ("bullet", "planar")
@@ -132,6 +134,10 @@ class LaneFollowing:
         course = Course(self._start(episode), self.seconds, episode.seed, functools.partial(off_map, MAPS[self.map]))
         return self._drive(episode, load_agent(episode.agent, self.folder), course)
 
+    def measured(self, episode: Episode, driven: Drive) -> Signal:
+        """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
+        return measured(self.instance(dict(episode.theta)), driven, episode.seed)
+
     def replay(self, episode: Episode, commands: Signal) -> Observation:
         """Drive recorded commands (steps, 2), one per control step, in place of the episode's agent.
 
@@ -163,9 +169,9 @@ class LaneFollowing:
 def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
     robot = read_robot(family.robot)
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures)
-    return Instance(
-        robot, drivetrain(robot, effects), _camera(family, robot, effects), stage_chain(effects, Stage.IMAGE)
-    )
+    camera = _camera(family, robot, effects)
+    image, measurement = (stage_chain(effects, stage) for stage in (Stage.IMAGE, Stage.MEASUREMENT))
+    return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
 
 
 def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) -> Camera:
@@ -182,7 +188,7 @@ def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) ->
 def _code_digest(robot: str) -> bytes:
     package = Path(__file__).resolve().parent.parent
     sources = [*(package / "effects").rglob("*.py"), *(package / "driving").rglob("*.py")]
-    figures = sorted(read_robot(robot).urdf.parent.iterdir())
+    figures = sorted((shipped("robots") / robot).iterdir())
     digest = hashlib.sha256()
     for path in [*sorted(sources), *figures]:
         digest.update(path.name.encode() + path.read_bytes())
@@ -203,6 +209,7 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     given = read_model(model) if model else None
     robot = _agreed(section, "robot", given.robot if given else None, "duckiebot", robot_names())
     plant = _agreed(section, "plant", given.plant if given else None, "bullet", PLANTS)
+    _check_equipment(section, read_robot(robot), plant)
     theta, _ = read_effects(section.section("effects"))
     effects = {**(given.theta if given else {}), **theta}
     return LaneFollowing(
@@ -216,6 +223,16 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
         effects=tuple(sorted(effects.items())),
         folder=section.path.resolve().parent,
     )
+
+
+def _check_equipment(section: Section, robot: Robot, plant: str) -> None:
+    """Refuse a robot that has no camera, or no body for the bullet plant, before the first episode."""
+    try:
+        robot.camera_figures()
+        if plant == "bullet":
+            robot.body()
+    except SettingsError as problem:
+        raise section.error("robot", str(problem)) from None
 
 
 def _agreed(section: Section, key: str, of_model: str | None, default: str, known: tuple[str, ...]) -> str:

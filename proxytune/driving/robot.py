@@ -34,7 +34,26 @@ UNITS: Mapping[str, str] = MappingProxyType(
         "field_of_view": "deg",
     }
 )
-"""Every figure that a robot.toml must state, with its unit."""
+"""Every figure that a robot.toml may state, with its unit."""
+
+REQUIRED = ("wheel_radius", "effective_baseline", "full_speed", "motor_time_constant", "control_rate")
+"""What every robot states: enough to drive a log on the planar plant."""
+
+BODY = ("wheel_distance", "wheel_torque")
+"""What the bullet plant needs besides the URDF."""
+
+CAMERA = (
+    "camera_rate",
+    "camera_columns",
+    "camera_rows",
+    "camera_forward",
+    "camera_height",
+    "camera_pitch",
+    "field_of_view",
+)
+"""What an agent's view needs."""
+
+WITHOUT_BODY = 'use plant = "planar"'
 
 
 @dataclass(frozen=True)
@@ -44,19 +63,35 @@ class Robot:
     Attributes:
         name: Name of its folder.
         description: What it is, in one line.
-        figures: Nominal figures by name, in the units of UNITS.
+        figures: Those nominal figures that are known, by name, in the units of UNITS; REQUIRED are among them.
         theta: Values of the effects that every instance of it has.
-        urdf: Its body for the bullet plant.
+        urdf: Its body for the bullet plant, or None.
     """
 
     name: str
     description: str
     figures: Mapping[str, float]
     theta: Mapping[str, float]
-    urdf: Path
+    urdf: Path | None
+
+    def body(self) -> Path:
+        """The URDF for the bullet plant.
+
+        Raises:
+            SettingsError: If the robot has no body.
+        """
+        if self.urdf is None:
+            raise SettingsError(f"robot '{self.name}' has no body: its robot.toml names no urdf; {WITHOUT_BODY}")
+        self._need(BODY, "body", WITHOUT_BODY)
+        return self.urdf
 
     def camera_figures(self) -> CameraFigures:
-        """The nominal camera: level, straight ahead, without distortion."""
+        """The nominal camera: level, straight ahead, without distortion.
+
+        Raises:
+            SettingsError: If the robot has no camera.
+        """
+        self._need(CAMERA, "camera", "choose a robot that has one")
         figures = self.figures
         return CameraFigures(
             columns=int(figures["camera_columns"]),
@@ -69,6 +104,13 @@ class Robot:
             field_of_view_deg=figures["field_of_view"],
             k1=0.0,
         )
+
+    def _need(self, names: tuple[str, ...], part: str, otherwise: str) -> None:
+        missing = [name for name in names if name not in self.figures]
+        if missing:
+            raise SettingsError(
+                f"robot '{self.name}' has no {part}: its robot.toml states no {', '.join(missing)}; {otherwise}"
+            )
 
 
 def robot_names() -> tuple[str, ...]:
@@ -89,22 +131,52 @@ def read_robot(name: str) -> Robot:
     settings.only(("format", "name", "description", "urdf", "figures", "effects"))
     settings.whole("format", low=1, high=1)
     theta, _ = read_effects(settings.section("effects"))
+    figures = _read_figures(settings.section("figures"))
+    description = settings.text("description")
+    return Robot(settings.text("name"), description, figures, MappingProxyType(theta), _urdf(settings))
+
+
+def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: float) -> Robot:
+    """A robot without a folder, as its log describes it: it obeys at once and has no effects.
+
+    Args:
+        name: What the log calls it.
+        geometry: Its wheel_radius and effective_baseline [m] and full_speed [m/s].
+        control_rate: How often it is sent a command [Hz].
+
+    Raises:
+        SettingsError: If the log leaves one of them out.
+    """
+    missing = [figure for figure in ("wheel_radius", "effective_baseline", "full_speed") if figure not in geometry]
+    if missing:
+        raise SettingsError(
+            f"robot '{name}' is unknown and its log states no {', '.join(missing)}; "
+            "add wheel_radius_m, baseline_m and full_speed_m_s to log.toml"
+        )
+    figures = {**geometry, "motor_time_constant": 0.0, "control_rate": control_rate}
+    return Robot(name, "as its log describes it", MappingProxyType(figures), MappingProxyType({}), None)
+
+
+def _urdf(settings: Section) -> Path | None:
+    if "urdf" not in settings.values:
+        return None
     urdf = settings.path.parent / settings.text("urdf")
     if not urdf.is_file():
         raise settings.error("urdf", f"no such file: {urdf.name}; add it beside robot.toml")
-    figures = _read_figures(settings.section("figures"))
-    return Robot(settings.text("name"), settings.text("description"), figures, MappingProxyType(theta), urdf)
+    return urdf
 
 
 def _read_figures(section: Section) -> Mapping[str, float]:
     section.only(UNITS)
-    figures = {}
-    for name, unit in UNITS.items():
-        figure = section.section(name)
-        if not figure.values:
+    for name in REQUIRED:
+        if name not in section.values:
             raise section.error(name, "is missing; add { value, unit, source }")
+    figures = {}
+    for name in section.values:
+        figure = section.section(name)
         figure.only(("value", "unit", "source"))
-        figure.text("unit", choices=(unit,))
+        figure.text("unit", choices=(UNITS[name],))
         figure.text("source")
-        figures[name] = figure.number("value", low=0.0)
+        divides = name in REQUIRED and name != "motor_time_constant"
+        figures[name] = figure.number("value", low=1e-6 if divides else 0.0)
     return MappingProxyType(figures)

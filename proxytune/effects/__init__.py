@@ -3,7 +3,7 @@
 from proxytune.effects.catalogue import CATALOGUE, DECLARED, PARAMETERS, effects_from, theta_names
 from proxytune.effects.chain import Chain, stage_chain
 from proxytune.effects.effect import CHANNELS, Effect, Setting, Signal, Stage
-from proxytune.effects.model import Model, read_effects, read_model
+from proxytune.effects.model import Model, model_text, read_effects, read_model
 
 __all__ = [
     "CATALOGUE",
@@ -17,6 +17,7 @@ __all__ = [
     "Signal",
     "Stage",
     "effects_from",
+    "model_text",
     "read_effects",
     "read_model",
     "stage_chain",

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.effects.wheels import SLIGHT_IMBALANCE, per_wheel
 from proxytune.space import Parameter
 
 
@@ -90,12 +91,18 @@ class WheelGain:
         return signal * np.array((self.left, self.right)), None
 
 
-class Spin(NamedTuple):
-    """Wheel speed at the end of the last sample, and how much of a step is left after one sample and on average."""
+class Lag(NamedTuple):
+    """How much of a step is left after one sample, and on average over it."""
 
-    speed: Signal
     remainder: float
     mean_remainder: float
+
+
+class Spin(NamedTuple):
+    """Wheel speed at the end of the last sample, and the lag of the wheels: one for both, or one for each."""
+
+    speed: Signal
+    lags: tuple[Lag, ...]
 
 
 @dataclass(frozen=True)
@@ -103,6 +110,7 @@ class MotorLag:
     """Wheels follow the speed asked of them with a first-order lag, τ dω/dt = ω* − ω."""
 
     time_constant: float
+    imbalance: float
     name: ClassVar[str] = "motor_lag"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
@@ -115,22 +123,40 @@ class MotorLag:
             (0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
             "gym-duckietown's dynamics fit: 0.20 s",
         ),
+        SLIGHT_IMBALANCE,
     )
 
     def begin(self, setting: Setting) -> Spin:
         """Wheels turn at the speed asked of them before time zero."""
-        rest = np.asarray(setting.rest, dtype=float)
-        samples = self.time_constant * setting.rate_hz
-        if samples == 0.0:
-            return Spin(rest, 0.0, 0.0)
-        remainder = float(np.exp(-1.0 / samples))
-        return Spin(rest, remainder, samples * (1.0 - remainder))
+        samples = per_wheel(self.time_constant * setting.rate_hz, self.imbalance)
+        # One filter over both wheels is faster than one for each
+        apart = samples if self.imbalance else samples[:1]
+        return Spin(np.asarray(setting.rest, dtype=float), tuple(_lag(value) for value in apart.tolist()))
 
     def apply(self, signal: Signal, memory: Spin) -> tuple[Signal, Spin]:
         """The mean speed over each sample, exact for a command that holds over it."""
-        kept = memory.remainder
-        start = memory.speed[..., None, :]
-        ends, _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-2, zi=kept * start)
-        starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)
-        mean = signal + memory.mean_remainder * (starts - signal)
-        return mean, memory._replace(speed=ends[..., -1, :])
+        if len(memory.lags) == 1:
+            mean, speed = _follow(signal, memory.speed, memory.lags[0])
+            return mean, memory._replace(speed=speed)
+        sides = [
+            _follow(signal[..., side : side + 1], memory.speed[..., side : side + 1], lag)
+            for side, lag in enumerate(memory.lags)
+        ]
+        mean, speed = (np.concatenate(parts, axis=-1) for parts in zip(*sides, strict=True))
+        return mean, memory._replace(speed=speed)
+
+
+def _lag(samples: float) -> Lag:
+    if samples == 0.0:
+        return Lag(0.0, 0.0)
+    remainder = float(np.exp(-1.0 / samples))
+    return Lag(remainder, samples * (1.0 - remainder))
+
+
+def _follow(signal: Signal, speed: Signal, lag: Lag) -> tuple[Signal, Signal]:
+    """Mean speed over each sample, and the speed after the last one."""
+    kept = lag.remainder
+    start = speed[..., None, :]
+    ends, _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-2, zi=kept * start)
+    starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)
+    return signal + lag.mean_remainder * (starts - signal), ends[..., -1, :]

@@ -5,19 +5,38 @@ from types import MappingProxyType
 
 from proxytune.effects.actuation import DriverMap, MotorLag, Trim, WheelGain
 from proxytune.effects.camera import CameraHeight, CameraPitch, CameraRoll, CameraYaw, FieldOfView, LensDistortion
-from proxytune.effects.command import Delay
+from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.effect import Effect
+from proxytune.effects.friction import Backlash, DeadBand, Stiction
 from proxytune.effects.image import Blur
+from proxytune.effects.measurement import HeadingOffset, MarkerOffset
+from proxytune.effects.messages import DelayJitter, DroppedCommands
+from proxytune.effects.motion import FloorSlope, LateralSlip, TurnSlip, YawScrub
+from proxytune.effects.power import BatterySag, Saturation
 from proxytune.errors import SettingsError
 from proxytune.settings import nearest
 from proxytune.space import Parameter, Theta
 
 _ALL: tuple[type[Effect], ...] = (
     Delay,
+    DelayJitter,
+    DroppedCommands,
+    CommandQuantisation,
     DriverMap,
+    DeadBand,
+    Stiction,
+    Saturation,
     Trim,
     WheelGain,
+    BatterySag,
     MotorLag,
+    Backlash,
+    YawScrub,
+    TurnSlip,
+    LateralSlip,
+    FloorSlope,
+    MarkerOffset,
+    HeadingOffset,
     CameraPitch,
     CameraRoll,
     CameraYaw,

@@ -52,3 +52,30 @@ class Delay:
         joined = np.concatenate((memory.samples, signal), axis=-2)
         late = (1.0 - memory.fraction) * joined[..., 1 : length + 1, :] + memory.fraction * joined[..., :length, :]
         return late, memory._replace(samples=joined[..., length:, :])
+
+
+@dataclass(frozen=True)
+class CommandQuantisation:
+    """Commands are rounded to multiples of a step on their way."""
+
+    step: float
+    name: ClassVar[str] = "command_quantisation"
+    stage: ClassVar[Stage] = Stage.COMMAND
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            "step",
+            "duty",
+            0.0,
+            0.5,
+            0.0,
+            (0.02, 0.05, 0.1, 0.2, 0.4),
+            "8 bits: 0.008; drivers with a few speed levels: 0.1 to 0.3",
+        ),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Round each sample, halves to the even multiple."""
+        return (signal if self.step == 0.0 else np.rint(signal / self.step) * self.step), None

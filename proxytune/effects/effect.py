@@ -1,10 +1,11 @@
 """What an effect is: a causal filter between a command and the pictures that come of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, ClassVar, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.space import Parameter
@@ -46,12 +47,15 @@ class Setting:
         rest: The signal before time zero, shape (…, channels).
         nominal: The robot's nominal figures by name.
         seed: Seed of everything random in the filter.
+        headings: Headings known beforehand, sample by sample (…, n) [rad]: the starting heading alone (n = 1), or the
+            measured ones.
     """
 
     rate_hz: float
     rest: Signal
     nominal: Mapping[str, float]
     seed: int = 0
+    headings: Signal = field(default_factory=lambda: np.zeros(1))
 
 
 class Effect(Protocol):

@@ -1,11 +1,12 @@
 """A domain instance as a file: robot, plant, and the effects with their values."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, theta_names
+from proxytune.logs import GEOMETRY
 from proxytune.settings import Section, nearest, read_settings
 
 
@@ -18,12 +19,14 @@ class Model:
         plant: Name of the plant, or None where the reader chooses.
         theta: Values of the effects' parameters by their names in θ.
         intervals: The interval of each value that has one.
+        geometry: Figures of a robot without a folder: wheel_radius, effective_baseline [m], full_speed [m/s].
     """
 
     robot: str
     plant: str | None
     theta: Mapping[str, float]
     intervals: Mapping[str, tuple[float, float]]
+    geometry: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_model(path: Path) -> Model:
@@ -33,11 +36,27 @@ def read_model(path: Path) -> Model:
         SettingsError: With file, key and remedy.
     """
     settings = read_settings(path)
-    settings.only(("format", "robot", "plant", "effects"))
+    settings.only(("format", "robot", "plant", "geometry", "effects"))
     settings.whole("format", 1, low=1, high=1)
     plant = settings.text("plant") if "plant" in settings.values else None
     theta, intervals = read_effects(settings.section("effects"))
-    return Model(settings.text("robot"), plant, theta, intervals)
+    return Model(settings.text("robot"), plant, theta, intervals, _read_geometry(settings.section("geometry")))
+
+
+def _read_geometry(section: Section) -> dict[str, float]:
+    section.only(GEOMETRY)
+    return {figure: section.number(key, low=0.0) for key, figure in GEOMETRY.items() if key in section.values}
+
+
+def model_text(model: Model, comments: Iterable[str] = ()) -> str:
+    """A model.toml that reads back as this model."""
+    lines = [f"# {comment}" for comment in comments]
+    lines += ["format = 1", f'robot = "{model.robot}"']
+    lines += [f'plant = "{model.plant}"'] if model.plant else []
+    keys = {figure: key for key, figure in GEOMETRY.items()}
+    lines += ["\n[geometry]"] if model.geometry else []
+    lines += [f"{keys[figure]} = {value!r}" for figure, value in model.geometry.items()]
+    return "\n".join(lines) + "\n" + effects_table(model.theta, model.intervals)
 
 
 def read_effects(section: Section) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
@@ -82,7 +101,7 @@ def effects_table(theta: Mapping[str, float], intervals: Mapping[str, tuple[floa
         lines += [f"\n[effects.{effect}]"] if named else []
         for name, parameter in named:
             interval = intervals.get(name)
-            finite = interval is not None and all(math.isfinite(bound) for bound in interval)
+            finite = interval is not None and interval[0] < interval[1] and all(map(math.isfinite, interval))
             bounds = f", interval = [{interval[0]!r}, {interval[1]!r}]" if interval and finite else ""
             lines.append(f'{parameter.name} = {{ value = {theta[name]!r}{bounds}, unit = "{parameter.unit}" }}')
     return "\n".join(lines) + "\n"

@@ -8,6 +8,7 @@ import pytest
 from proxytune.domain import make_episode
 from proxytune.driving.episode import TICK_HZ
 from proxytune.driving.family import LaneFollowing, lane_following
+from proxytune.driving.robot import read_robot
 from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, Stage, theta_names
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.settings import Section
@@ -94,12 +95,55 @@ def test_each_declared_parameter_moves_an_agents_trajectory(tmp_path, name):
     assert np.abs(low[:shared] - high[:shared]).max() > 0.01
 
 
+def strongest(theta_name):
+    parameter = PARAMETERS[theta_name]
+    neutral = parameter.neutral_value(read_robot("duckiebot").figures)
+    return max(parameter.probes, key=lambda probe: abs(probe - neutral))
+
+
+def theta_of(theta_name):
+    """Without a value and with it: an imbalance is one of something that is there."""
+    effect, *parameter = theta_name.split(".")
+    main = theta_names(CATALOGUE[effect])[0]
+    there = {main: strongest(main)} if parameter == ["imbalance"] else {}
+    weakest_is_felt = effect != "stiction"  # it is below every duty of the agent
+    probe = PARAMETERS[theta_name].probes[0] if weakest_is_felt else strongest(theta_name)
+    return there, {**there, theta_name: probe}
+
+
+def seen(domain, **theta):
+    episode = make_episode(theta, agent="brisk", start=1, seed=5)
+    return domain.measured(episode, domain.drive(episode))
+
+
 @pytest.mark.parametrize("theta_name", [n for e in CATALOGUE.values() for n in theta_names(e)])
-def test_every_effect_of_the_catalogue_moves_an_agents_trajectory(tmp_path, theta_name):
+def test_every_effect_of_the_catalogue_moves_an_agents_trajectory_as_it_is_measured(tmp_path, theta_name):
     domain = family(tmp_path, plant="planar", seconds=6.0)
-    nominal, moved = poses(domain), poses(domain, **{theta_name: PARAMETERS[theta_name].probes[0]})
-    shared = min(len(nominal), len(moved))
-    assert np.abs(nominal[:shared] - moved[:shared]).max() > 1e-3
+    without, moved = (seen(domain, **theta) for theta in theta_of(theta_name))
+    shared = min(len(without), len(moved))
+    assert np.abs(without[:shared] - moved[:shared]).max() > 1e-3
+
+
+@pytest.mark.parametrize("plant", ["bullet", "planar"])
+def test_a_marker_moves_the_measured_poses_and_not_the_true_ones(tmp_path, plant):
+    domain = family(tmp_path, plant=plant, seconds=1.0)
+    theta = {"marker_offset.forward": 0.1, "heading_offset": 10.0}
+    episode = make_episode(theta, agent="brisk", start=1, seed=5)
+    driven = domain.drive(episode)
+    shift = domain.measured(episode, driven) - driven.poses
+    np.testing.assert_array_equal(driven.poses, poses(domain))
+    np.testing.assert_allclose(np.hypot(shift[:, 0], shift[:, 1]), 0.1)
+    np.testing.assert_allclose(np.arctan2(shift[:, 1], shift[:, 0]), np.angle(np.exp(1j * driven.poses[:, 2])))
+    np.testing.assert_allclose(shift[:, 2], np.radians(10.0))
+
+
+def test_a_slope_is_felt_along_the_heading_that_the_robot_starts_with(tmp_path):
+    domain = family(tmp_path, plant="planar", seconds=1.0, position_noise_m=0.0, heading_noise_deg=0.0)
+    start = poses(domain)[0]
+    uphill = {"floor_slope.x": 0.1 * np.cos(start[2]), "floor_slope.y": 0.1 * np.sin(start[2])}
+    along = np.array((np.cos(start[2]), np.sin(start[2])))
+    level, climbed = ((poses(domain, **theta)[-1] - start)[:2] @ along for theta in ({}, uphill))
+    assert 0.05 < level - climbed < 0.1
 
 
 def test_naming_a_nominal_value_changes_nothing(tmp_path):

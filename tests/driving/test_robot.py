@@ -1,14 +1,20 @@
-"""A robot's figures are complete, sourced, and the same in robot.toml and URDF."""
+"""A robot's figures are sourced, enough to drive a log, and the same in robot.toml and URDF."""
 
 import math
 import xml.etree.ElementTree as ET
 
+import numpy as np
 import pytest
 
 from proxytune.driving import robot as module
-from proxytune.driving.robot import UNITS, read_robot, robot_names
+from proxytune.driving.bullet.plant import BulletPlant
+from proxytune.driving.drivetrain import drivetrain
+from proxytune.driving.family import lane_following
+from proxytune.driving.planar import PlanarPlant
+from proxytune.driving.robot import CAMERA, REQUIRED, UNITS, read_robot, robot_from_geometry, robot_names
+from proxytune.effects import CATALOGUE, Setting, Stage, effects_from, theta_names
 from proxytune.errors import SettingsError
-from proxytune.settings import read_settings
+from proxytune.settings import Section, read_settings
 from proxytune.shipped import shipped
 
 ROBOT = read_robot("duckiebot")
@@ -19,14 +25,143 @@ def origin(joint):
     return [float(v) for v in BODY.find(f"joint[@name='{joint}']/origin").get("xyz").split()]
 
 
-def test_the_duckiebot_is_listed():
-    assert "duckiebot" in robot_names()
+def stated(name):
+    return read_settings(shipped("robots") / name / "robot.toml").values
 
 
-def test_every_figure_has_a_source():
-    figures = read_settings(shipped("robots") / "duckiebot" / "robot.toml").values["figures"]
-    assert set(figures) == set(UNITS)
-    assert all(figure["source"] for figure in figures.values())
+def twists(robot, duties, **theta):
+    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
+    return train.apply(duties, train.begin(Setting(60.0, np.zeros(2), robot.figures)))[0]
+
+
+def copy_duckiebot(folder, before, after):
+    """The duckiebot's folder within another, with one piece of its robot.toml replaced."""
+    source, home = shipped("robots") / "duckiebot", folder / "duckiebot"
+    home.mkdir()
+    (home / "duckiebot.urdf").write_bytes((source / "duckiebot.urdf").read_bytes())
+    text = (source / "robot.toml").read_text(encoding="utf-8")
+    assert before in text
+    (home / "robot.toml").write_text(text.replace(before, after, 1), encoding="utf-8")
+    return home
+
+
+def test_the_robots_of_the_package_are_listed():
+    assert robot_names() == ("duckiebot", "husky", "irobot_create")
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_every_figure_has_a_unit_and_a_source_and_is_not_negative(name):
+    figures = stated(name)["figures"]
+    assert set(REQUIRED) <= set(figures) <= set(UNITS)
+    for figure, cell in figures.items():
+        assert cell["unit"] == UNITS[figure]
+        assert len(cell["source"]) > 10
+        assert cell["value"] >= 0
+    assert all(figures[figure]["value"] > 0 for figure in REQUIRED if figure != "motor_time_constant")
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_a_robot_is_called_as_its_folder_and_described_in_a_line(name):
+    robot = read_robot(name)
+    assert robot.name == name
+    assert robot.description.strip()
+    assert "\n" not in robot.description
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_every_effect_but_the_cameras_has_a_neutral_value_for_every_robot(name):
+    figures = read_robot(name).figures
+    seen = [e for e in CATALOGUE.values() if e.stage is not Stage.CAMERA or set(CAMERA) <= set(figures)]
+    assert len(seen) >= len(CATALOGUE) - 6
+    values = [parameter.neutral_value(figures) for effect in seen for parameter in effect.parameters]
+    assert np.isfinite(values).all()
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_neutral_drivetrain_effects_leave_every_robot_as_it_is(name):
+    robot = read_robot(name)
+    held = np.tile((0.3, 0.5), (240, 1))
+    plain = drivetrain(robot, ())
+    stages = (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
+    names = [n for e in CATALOGUE.values() if e.stage in stages and e.name != "motor_lag" for n in theta_names(e)]
+    parameters = {n: p for e in CATALOGUE.values() for n, p in zip(theta_names(e), e.parameters, strict=True)}
+    neutral = drivetrain(
+        robot, effects_from({n: parameters[n].neutral_value(robot.figures) for n in names}, robot.figures)
+    )
+    setting = Setting(60.0, np.zeros(2), robot.figures)
+    np.testing.assert_allclose(
+        neutral.apply(held, neutral.begin(setting))[0], plain.apply(held, plain.begin(setting))[0], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_every_robot_drives_straight_at_full_speed_and_turns_by_its_baseline_on_the_planar_plant(name):
+    robot = read_robot(name)
+    start = np.array((0.2, -0.1, 0.4))
+    with PlanarPlant(start, 1 / 60) as plant:
+        straight, _ = plant.move(twists(robot, np.tile((1.0, 1.0), (300, 1))))
+        turning, _ = plant.move(twists(robot, np.tile((0.0, 1.0), (300, 1))))
+    assert np.hypot(*(straight[-1] - straight[-61])[:2]) == pytest.approx(robot.figures["full_speed"], rel=1e-3)
+    rate = robot.figures["full_speed"] / robot.figures["effective_baseline"]
+    assert turning[-1, 2] - turning[-61, 2] == pytest.approx(rate, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", [name for name in robot_names() if "urdf" not in stated(name)])
+def test_a_robot_without_body_is_refused_on_bullet_in_one_line(name):
+    with pytest.raises(SettingsError) as caught:
+        BulletPlant(read_robot(name), np.zeros(3), 1 / 60)
+    assert str(caught.value) == f"robot '{name}' has no body: its robot.toml names no urdf; use plant = \"planar\""
+
+
+@pytest.mark.parametrize("plant", ["bullet", "planar"])
+@pytest.mark.parametrize("name", [name for name in robot_names() if "camera_rows" not in stated(name)["figures"]])
+def test_a_study_on_a_robot_without_camera_is_refused_before_it_starts(tmp_path, name, plant):
+    section = Section(tmp_path / "study.toml", "domain.", {"robot": name, "plant": plant})
+    with pytest.raises(SettingsError) as caught:
+        lane_following(section, model=None)
+    assert str(caught.value).startswith(f"{tmp_path / 'study.toml'}: domain.robot: robot '{name}' has no camera: ")
+    assert "camera_rate" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_robot_with_camera_but_without_body_may_be_studied_on_the_planar_plant_only(tmp_path, monkeypatch):
+    folder = copy_duckiebot(tmp_path, 'urdf = "duckiebot.urdf"\n', "")
+    monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
+    bodiless = read_robot.__wrapped__(folder.name)
+    monkeypatch.setattr("proxytune.driving.family.read_robot", lambda name: bodiless)
+    path = tmp_path / "study.toml"
+    assert lane_following(Section(path, "domain.", {"plant": "planar"}), model=None).plant == "planar"
+    with pytest.raises(SettingsError, match='domain.robot: robot .duckiebot. has no body: .* use plant = "planar"'):
+        lane_following(Section(path, "domain.", {"plant": "bullet"}), model=None)
+
+
+def test_a_body_without_its_figures_is_refused(tmp_path, monkeypatch):
+    folder = copy_duckiebot(tmp_path, "wheel_torque = {", "# wheel_torque = {")
+    monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
+    with pytest.raises(SettingsError, match=r"has no body: its robot.toml states no wheel_torque; use plant"):
+        read_robot.__wrapped__(folder.name).body()
+
+
+GEOMETRY = {"wheel_radius": 0.05, "effective_baseline": 0.3, "full_speed": 1.5}
+
+
+def test_a_robot_is_made_of_what_its_log_says():
+    robot = robot_from_geometry("tractor", GEOMETRY, 25.0)
+    assert robot.name == "tractor"
+    assert dict(robot.figures) == {**GEOMETRY, "motor_time_constant": 0.0, "control_rate": 25.0}
+    assert not robot.theta
+    np.testing.assert_allclose(twists(robot, np.array([[0.5, 1.0]])), [[1.125, 0.0, 2.5]])
+    with pytest.raises(SettingsError, match="robot 'tractor' has no body"):
+        robot.body()
+    with pytest.raises(SettingsError, match="robot 'tractor' has no camera"):
+        robot.camera_figures()
+
+
+@pytest.mark.parametrize("figure", GEOMETRY)
+def test_a_log_that_leaves_out_a_figure_of_its_robot_is_told_which(figure):
+    known = {name: value for name, value in GEOMETRY.items() if name != figure}
+    with pytest.raises(SettingsError, match=f"robot 'tractor' is unknown and its log states no {figure}; add "):
+        robot_from_geometry("tractor", known, 25.0)
 
 
 def test_masses_of_the_body_add_up_to_the_robots():
@@ -58,7 +193,8 @@ def test_every_link_has_inertia():
 
 
 def test_nominal_effects_agree_with_the_figures():
-    assert ROBOT.theta["motor_lag"] == ROBOT.figures["motor_time_constant"]
+    lag = next(effect for effect in effects_from(ROBOT.theta, ROBOT.figures) if effect.name == "motor_lag")
+    assert lag.time_constant == ROBOT.figures["motor_time_constant"]
     assert ROBOT.theta["camera_pitch"] == ROBOT.figures["camera_pitch"]
 
 
@@ -72,18 +208,15 @@ def test_an_unknown_robot_is_told_with_the_nearest():
     [
         ('unit = "kg"', 'unit = "g"', "figures.mass.unit: unknown value 'g'"),
         ("mass = {", "masss = {", "figures.masss: unknown key; did you mean 'mass'?"),
+        ("full_speed = {", "# full_speed = {", "figures.full_speed: is missing; add"),
+        ('unit = "kg", source = "DB18 with battery, weighed"', 'unit = "kg"', "figures.mass.source: is missing"),
+        ("value = 0.0318", "value = 0", "figures.wheel_radius.value: must be between 1e-06"),
         ('urdf = "duckiebot.urdf"', 'urdf = "gone.urdf"', "urdf: no such file: gone.urdf"),
         ("value = 1.05", "value = nan", "figures.mass.value: must be finite"),
     ],
 )
 def test_a_mistake_in_robot_toml_is_one_line(tmp_path, monkeypatch, before, after, says):
-    source = shipped("robots") / "duckiebot"
-    home = tmp_path / "duckiebot"
-    home.mkdir()
-    (home / "duckiebot.urdf").write_bytes((source / "duckiebot.urdf").read_bytes())
-    text = (source / "robot.toml").read_text(encoding="utf-8")
-    assert before in text
-    (home / "robot.toml").write_text(text.replace(before, after, 1), encoding="utf-8")
+    copy_duckiebot(tmp_path, before, after)
     monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
     with pytest.raises(SettingsError) as caught:
         read_robot.__wrapped__("duckiebot")

@@ -1,21 +1,36 @@
 """What every effect promises, run over the whole catalogue."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxytune.driving.robot import read_robot
-from proxytune.effects import CATALOGUE, CHANNELS, Setting, Stage, effects_from, theta_names
+from proxytune.effects import CATALOGUE, CHANNELS, PARAMETERS, Setting, Stage, effects_from, theta_names
 
 ROBOT = read_robot("duckiebot")
 RATE_HZ = 60.0
-PROBES = [
-    pytest.param(name, theta_name, value, id=f"{theta_name}={value}")
+PROBE_VALUES = [
+    (name, theta_name, value)
     for name, effect in CATALOGUE.items()
     for theta_name, parameter in zip(theta_names(effect), effect.parameters, strict=True)
     for value in parameter.probes
 ]
+PROBES = [pytest.param(*probe, id=f"{probe[1]}={probe[2]}") for probe in PROBE_VALUES]
+
+
+IMBALANCED = [name for name, effect in CATALOGUE.items() if effect.parameters[-1].name == "imbalance"]
+FLAT = [name for name, effect in CATALOGUE.items() if effect.stage not in (Stage.CAMERA, Stage.IMAGE)]
+
+
+def at(name, theta_name, value):
+    """An effect with one value of its own; an imbalance is one of an effect that is there."""
+    main = CATALOGUE[name].parameters[0]
+    there = {theta_names(CATALOGUE[name])[0]: main.probes[2]} if theta_name.endswith(".imbalance") else {}
+    (effect,) = effects_from({**there, theta_name: value}, ROBOT.figures)
+    return effect
 
 
 def a_signal(stage: Stage, seed: int, length: int = 90) -> np.ndarray:
@@ -28,9 +43,9 @@ def a_signal(stage: Stage, seed: int, length: int = 90) -> np.ndarray:
     return np.repeat(random.uniform(-1.0, 1.0, (length // 3, len(CHANNELS[stage]))), 3, axis=0)
 
 
-def run(effect, signal, cuts=()):
+def run(effect, signal, cuts=(), seed=7):
     rest = signal[0] if effect.stage in (Stage.IMAGE, Stage.CAMERA) else np.zeros(signal.shape[-1])
-    memory = effect.begin(Setting(RATE_HZ, rest, ROBOT.figures, seed=7))
+    memory = effect.begin(Setting(RATE_HZ, rest, ROBOT.figures, seed=seed))
     out = []
     for chunk in np.split(signal, sorted(cuts)):
         if len(chunk):
@@ -39,42 +54,85 @@ def run(effect, signal, cuts=()):
     return np.concatenate(out)
 
 
+def neutral(name):
+    return {
+        theta_name: parameter.neutral_value(ROBOT.figures)
+        for theta_name, parameter in zip(theta_names(CATALOGUE[name]), CATALOGUE[name].parameters, strict=True)
+    }
+
+
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_neutral_value_changes_nothing(name):
-    effect = CATALOGUE[name](*(p.neutral_value(ROBOT.figures) for p in CATALOGUE[name].parameters))
-    replaces_nominal = any(isinstance(p.neutral, str) for p in effect.parameters)
+    (effect,) = effects_from(neutral(name), ROBOT.figures)
     signal = a_signal(effect.stage, 1)
-    if replaces_nominal and effect.stage is not Stage.CAMERA:
-        nominal = effects_from({theta_names(CATALOGUE[name])[0]: ROBOT.theta[name]}, ROBOT.figures)[0]
+    of_the_robot = {theta: ROBOT.theta[theta] for theta in neutral(name) if theta in ROBOT.theta}
+    if any(isinstance(p.neutral, str) for p in effect.parameters) and of_the_robot and effect.stage is not Stage.CAMERA:
+        nominal = effects_from(of_the_robot, ROBOT.figures)[0]
         np.testing.assert_array_equal(run(effect, signal), run(nominal, signal))
     else:
         np.testing.assert_array_equal(run(effect, signal), signal)
 
 
+@pytest.mark.parametrize("name", IMBALANCED)
+@pytest.mark.parametrize("imbalance", [-1.0, 0.3, 1.0])
+def test_an_imbalance_of_nothing_changes_nothing(name, imbalance):
+    theta = neutral(name) | {f"{name}.imbalance": imbalance}
+    if name == "motor_lag":
+        theta["motor_lag.time_constant"] = 0.0
+    (effect,) = effects_from(theta, ROBOT.figures)
+    signal = a_signal(effect.stage, 1)
+    np.testing.assert_array_equal(run(effect, signal), signal)
+
+
+@pytest.mark.parametrize("name", IMBALANCED)
+@pytest.mark.parametrize(("imbalance", "wheel"), [(-1.0, "left"), (1.0, "right")])
+def test_an_imbalance_of_one_leaves_the_other_wheel_alone(name, imbalance, wheel):
+    effect = at(name, f"{name}.imbalance", imbalance)
+    signal = a_signal(effect.stage, 1)
+    moved = np.abs(run(effect, signal) - signal).max(axis=0)
+    here, there = moved if wheel == "left" else moved[::-1]
+    assert here > 0.0
+    assert there == 0.0
+
+
 @pytest.mark.parametrize(("name", "theta_name", "value"), PROBES)
 def test_every_probe_value_changes_the_signal(name, theta_name, value):
-    pairs = zip(theta_names(CATALOGUE[name]), CATALOGUE[name].parameters, strict=True)
-    neutral = {theta: parameter.neutral_value(ROBOT.figures) for theta, parameter in pairs}
-    (effect,) = effects_from(neutral | {theta_name: value}, ROBOT.figures)
-    (still,) = effects_from(neutral, ROBOT.figures)
-    signal = a_signal(effect.stage, 2)
+    effect = at(name, theta_name, value)
+    still = at(name, theta_name, neutral(name)[theta_name])
+    signal = a_signal(effect.stage, 2, length=900)
     moved = np.abs(run(effect, signal) - run(still, signal)).max()
-    assert moved == 0.0 if value == neutral[theta_name] else moved > 1e-3
+    assert moved == 0.0 if value == neutral(name)[theta_name] else moved > 1e-3
+
+
+@pytest.mark.parametrize(("name", "theta_name"), sorted({(name, theta_name) for name, theta_name, _ in PROBE_VALUES}))
+def test_every_step_over_a_parameters_range_changes_the_signal(name, theta_name):
+    parameter = PARAMETERS[theta_name]
+    signal = a_signal(CATALOGUE[name].stage, 6, length=900)
+    steps = np.linspace(parameter.low, parameter.high, 9)
+    values = [run(at(name, theta_name, value), signal) for value in steps]
+    assert all(np.abs(later - earlier).max() > 1e-3 for earlier, later in pairwise(values))
 
 
 @pytest.mark.parametrize(("name", "theta_name", "value"), PROBES)
 @given(cuts=st.lists(st.integers(1, 89), max_size=6), seed=st.integers(0, 99))
 @settings(max_examples=8, derandomize=True, deadline=None)
 def test_cutting_the_signal_into_chunks_never_changes_the_result(name, theta_name, value, cuts, seed):
-    (effect,) = effects_from({theta_name: value}, ROBOT.figures)
+    effect = at(name, theta_name, value)
     signal = a_signal(effect.stage, seed)
     tolerance = 2e-4 if effect.stage is Stage.IMAGE else 1e-12
     np.testing.assert_allclose(run(effect, signal, cuts), run(effect, signal), rtol=0, atol=tolerance)
 
 
+@pytest.mark.parametrize("name", FLAT)
+def test_a_long_signal_one_control_step_at_a_time_is_the_same(name):
+    effect = at(name, theta_names(CATALOGUE[name])[0], CATALOGUE[name].parameters[0].probes[-1])
+    signal = a_signal(effect.stage, 5, length=1800)
+    np.testing.assert_allclose(run(effect, signal, range(3, 1800, 3)), run(effect, signal), rtol=0, atol=1e-11)
+
+
 @pytest.mark.parametrize(("name", "theta_name", "value"), PROBES)
 def test_what_is_filtered_never_depends_on_what_comes_later(name, theta_name, value):
-    (effect,) = effects_from({theta_name: value}, ROBOT.figures)
+    effect = at(name, theta_name, value)
     signal = a_signal(effect.stage, 3)
     other = signal.copy()
     other[45:] = other[45:] * 0.5 + 0.1
@@ -83,19 +141,43 @@ def test_what_is_filtered_never_depends_on_what_comes_later(name, theta_name, va
 
 @pytest.mark.parametrize(("name", "theta_name", "value"), PROBES)
 def test_the_same_seed_gives_the_same_result(name, theta_name, value):
-    (effect,) = effects_from({theta_name: value}, ROBOT.figures)
+    effect = at(name, theta_name, value)
     signal = a_signal(effect.stage, 4)
     np.testing.assert_array_equal(run(effect, signal), run(effect, signal))
 
 
-@pytest.mark.parametrize("name", [n for n, e in CATALOGUE.items() if e.stage in (Stage.COMMAND, Stage.ACTUATION)])
-def test_a_batch_is_filtered_like_its_members(name):
-    first = CATALOGUE[name].parameters[0]
-    (effect,) = effects_from({theta_names(CATALOGUE[name])[0]: first.probes[-1]}, ROBOT.figures)
-    batch = np.stack([a_signal(effect.stage, seed) for seed in range(4)])
-    memory = effect.begin(Setting(RATE_HZ, np.zeros((4, 2)), ROBOT.figures, seed=7))
-    together, _ = effect.apply(batch, memory)
-    np.testing.assert_allclose(together, [run(effect, one) for one in batch], rtol=0, atol=1e-12)
+@pytest.mark.parametrize("name", FLAT)
+def test_only_effects_that_draw_depend_on_the_seed(name):
+    effect = at(name, theta_names(CATALOGUE[name])[0], CATALOGUE[name].parameters[0].probes[-1])
+    signal = a_signal(effect.stage, 4)
+    differ = not np.array_equal(run(effect, signal, seed=7), run(effect, signal, seed=8))
+    assert differ == (name in ("delay_jitter", "dropped_commands"))
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_memories_are_never_changed_in_place(name):
+    effect = at(name, theta_names(CATALOGUE[name])[0], CATALOGUE[name].parameters[0].probes[-1])
+    signal = a_signal(effect.stage, 4)
+    rest = np.zeros(signal.shape[-1])
+    memory = effect.begin(Setting(RATE_HZ, rest, ROBOT.figures, seed=7))
+    kept = signal.copy()
+    first, middle = effect.apply(signal, memory)
+    second, _ = effect.apply(signal, middle)
+    np.testing.assert_array_equal(effect.apply(signal, memory)[0], first)
+    np.testing.assert_array_equal(effect.apply(signal, middle)[0], second)
+    np.testing.assert_array_equal(signal, kept)
+
+
+@pytest.mark.parametrize(("name", "theta_name", "value"), [probe for probe in PROBES if probe.values[0] in FLAT])
+def test_a_batch_is_filtered_like_its_members(name, theta_name, value):
+    effect = at(name, theta_name, value)
+    batch = np.stack([a_signal(effect.stage, seed) for seed in range(6)]).reshape(2, 3, 90, -1)
+    memory = effect.begin(Setting(RATE_HZ, np.zeros((2, 3, batch.shape[-1])), ROBOT.figures, seed=7))
+    first, memory = effect.apply(batch[..., :50, :], memory)
+    second, _ = effect.apply(batch[..., 50:, :], memory)
+    together = np.concatenate((first, second), axis=-2)
+    alone = [[run(effect, one) for one in row] for row in batch]
+    np.testing.assert_allclose(together, alone, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

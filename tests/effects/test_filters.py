@@ -5,8 +5,9 @@ import pytest
 
 from proxytune.effects import Setting
 from proxytune.effects.actuation import DriverMap, MotorLag, Trim, WheelGain
-from proxytune.effects.command import Delay
+from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.image import Blur
+from proxytune.effects.wheels import per_wheel
 
 NOMINAL: dict[str, float] = {}
 
@@ -59,13 +60,32 @@ def test_motor_lag_gives_the_mean_of_the_exact_step_response():
     time_constant, rate_hz = 0.2, 10.0
     edges = np.arange(21) / rate_hz
     travelled = edges + time_constant * np.exp(-edges / time_constant)  # integral of 1 - exp(-t/tau), plus a constant
-    np.testing.assert_allclose(run(MotorLag(time_constant), step())[:, 0], np.diff(travelled) * rate_hz, atol=1e-12)
+    np.testing.assert_allclose(
+        run(MotorLag(time_constant, 0.0), step())[:, 0], np.diff(travelled) * rate_hz, atol=1e-12
+    )
 
 
 def test_motor_lag_does_not_depend_on_the_sample_rate():
-    coarse = run(MotorLag(0.2), step(20), rate_hz=10.0).cumsum(axis=0)[-1] / 10.0
-    fine = run(MotorLag(0.2), step(200), rate_hz=100.0).cumsum(axis=0)[-1] / 100.0
+    coarse = run(MotorLag(0.2, 0.0), step(20), rate_hz=10.0).cumsum(axis=0)[-1] / 10.0
+    fine = run(MotorLag(0.2, 0.0), step(200), rate_hz=100.0).cumsum(axis=0)[-1] / 100.0
     np.testing.assert_allclose(coarse, fine, atol=1e-12)
+
+
+def test_an_imbalance_lags_each_wheel_by_its_share():
+    uneven = run(MotorLag(0.2, -0.5), step())
+    np.testing.assert_allclose(uneven[:, 0], run(MotorLag(0.3, 0.0), step())[:, 0], atol=1e-12)
+    np.testing.assert_allclose(uneven[:, 1], run(MotorLag(0.1, 0.0), step())[:, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize(("value", "imbalance", "expected"), [(0.2, 0, (0.2, 0.2)), (0.2, 0.25, (0.15, 0.25))])
+def test_an_imbalance_gives_the_right_wheel_more(value, imbalance, expected):
+    np.testing.assert_allclose(per_wheel(value, imbalance), expected)
+
+
+def test_commands_are_rounded_to_multiples_of_the_step():
+    duties = np.array([[0.0, 0.09], [0.11, 0.31], [-0.34, 1.0]])
+    expected = [[0.0, 0.0], [0.2, 0.4], [-0.4, 1.0]]
+    np.testing.assert_allclose(run(CommandQuantisation(0.2), duties), expected)
 
 
 @pytest.mark.parametrize("samples", [0.4, 1.0, 2.0, 2.7, 5.3])

@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from proxytune.study.discrepancy import discrepancy_study
 from proxytune.study.progress import Silent
 from proxytune.study.store import Store
 from proxytune.study.study import open_study
-from proxytune.study.sweep import curve_of, plan_sweep, run_sweep, sweep_interval
+from proxytune.study.sweep import curve_of, plan_sweep, run_sweep, sweep_interval, with_target
 
 TRUTH = {"trim": 0.1, "delay": 0.12}
 
@@ -21,9 +22,11 @@ def curve(folder, parameter="trim", base=TRUTH, model=None):
     study = open_study(folder)
     plan = plan_sweep(sweep_interval(study, parameter), base, 4)
     discrepancy = discrepancy_study(study, model) if model else None
+    if discrepancy:
+        plan = with_target(plan, model, discrepancy)
     with Store.open(folder) as store:
         run_sweep(study, store, plan, Silent(), discrepancy)
-        return curve_of(study, store, plan, discrepancy)
+        return curve_of(study, store, plan)
 
 
 @pytest.fixture
@@ -151,3 +154,32 @@ def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_s
     axes = bars_figure([swept]).axes[0]
     scores = [swept.points[index].assessment.prpv.value for index in indices]
     assert [patch.get_height() for patch in axes.patches if patch.get_width() == pytest.approx(0.85)] == scores
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_every_line_band_and_bar_is_explained_once_below_the_figure(with_pod, swept, make_study):
+    both = [swept, curve(make_study(), "delay")]
+    lines = ["noise floor", "chance", "95 % interval", "held value"]
+    assert legend(panels_figure(with_pod)) == legend(sweep_figure(both)) == lines
+    assert sorted(legend(bars_figure(both))) == sorted([*lines, "lower and higher value"])
+
+
+def test_nothing_of_a_figure_is_clipped(with_pod, make_study):
+    for figure in (panels_figure(with_pod), bars_figure([with_pod]), sweep_figure([with_pod])):
+        figure.draw_without_rendering()
+        outer, inner = figure.bbox, figure.get_tightbbox().transformed(figure.dpi_scale_trans)
+        assert outer.x0 <= inner.x0
+        assert inner.x1 <= outer.x1
+        assert outer.y0 <= inner.y0
+        assert inner.y1 <= outer.y1
+
+
+def test_axes_name_parameters_in_words_and_bars_write_a_true_minus(swept):
+    assert (
+        sweep_figure([replace(swept, parameter="camera_pitch", unit="deg")]).axes[1].get_xlabel()
+        == "camera pitch [deg]"
+    )
+    assert [text.get_text() for text in bars_figure([swept]).axes[0].get_xticklabels()] == ["−0.1", "0.1", "0.3"]

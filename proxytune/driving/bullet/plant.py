@@ -1,6 +1,7 @@
 """The bullet plant: the robot's URDF with contact, friction and limited torque, in PyBullet."""
 
 import math
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -25,12 +26,13 @@ class BulletPlant:
     """
 
     def __init__(self, robot: Robot, start: Signal, tick_s: float) -> None:
+        urdf = robot.body()
         self._world = pybullet.connect(pybullet.DIRECT)
         self._tick_s = tick_s
         self._radius = robot.figures["wheel_radius"]
         self._half_distance = robot.figures["wheel_distance"] / 2.0
         self._torque = robot.figures["wheel_torque"]
-        self._body = self._build(robot, start)
+        self._body = self._build(urdf, start)
         self._heading = float(start[2])
 
     def move(self, twists: Signal) -> tuple[Signal, bool]:
@@ -44,7 +46,7 @@ class BulletPlant:
             poses[index] = self._pose()
         return poses, self._crashed()
 
-    def _build(self, robot: Robot, start: Signal) -> int:
+    def _build(self, urdf: Path, start: Signal) -> int:
         world: dict[str, Any] = {"physicsClientId": self._world}
         pybullet.setGravity(0.0, 0.0, -9.81, **world)
         pybullet.setPhysicsEngineParameter(
@@ -57,7 +59,7 @@ class BulletPlant:
         floor = pybullet.createMultiBody(0, pybullet.createCollisionShape(pybullet.GEOM_PLANE, **world), **world)
         pybullet.changeDynamics(floor, -1, lateralFriction=1.0, **world)
         turn = pybullet.getQuaternionFromEuler((0.0, 0.0, float(start[2])))
-        body: int = pybullet.loadURDF(str(robot.urdf), (0.0, 0.0, 0.0), **world)
+        body: int = pybullet.loadURDF(str(urdf), (0.0, 0.0, 0.0), **world)
         self._wheels = self._find_wheels(body)
         self._floor = floor
         self._offset = np.array(pybullet.getDynamicsInfo(body, -1, **world)[3])

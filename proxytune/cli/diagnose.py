@@ -1,0 +1,59 @@
+"""`diagnose`: close the loop from a measured log to the effect that the model lacks."""
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.console import Console, Group
+from rich.text import Text
+
+from proxytune.cli.answer import Answer
+from proxytune.diagnosis.diagnosis import Diagnosis, declared_effects, diagnose
+from proxytune.diagnosis.vehicle import robot_of
+from proxytune.errors import InputError
+from proxytune.logs import read_log
+from proxytune.report.diagnosis_document import document, model_file, shown
+from proxytune.report.diagnosis_figures import diagnosis_figures
+from proxytune.report.writing import save, write_text
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the log, what is declared and where the findings go."""
+    parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder: log.toml and samples.csv")
+    parser.add_argument(
+        "--declared", metavar="NAMES", help="effects tuned in any case, as trim,delay [those of θ that the robot has]"
+    )
+    parser.add_argument("--robot", metavar="NAME", help="the robot, instead of the one that log.toml names")
+    parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test on [a part of LOG]")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the null distributions [1]")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the findings [diagnosis_LOG]")
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Diagnose, and write diagnosis.json, model.toml and the figures."""
+    if arguments.seed < 0:
+        raise InputError(f"--seed must be at least 0, got {arguments.seed}")
+    log = read_log(arguments.log)
+    robot = robot_of(log, arguments.robot)
+    given = (
+        None if arguments.declared is None else [name.strip() for name in arguments.declared.split(",") if name.strip()]
+    )
+    declared = declared_effects(robot) if given is None else given
+    test = read_log(arguments.test) if arguments.test else None
+    with Console(stderr=True).status("reading") as status:
+        found = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=status.update)
+        folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
+        status.update("drawing")
+        files = _write(found, folder)
+    answer = document(found) | {"files": files}
+    return Answer(answer, Group(shown(found), Text("\n".join(files))))
+
+
+def _write(found: Diagnosis, folder: Path) -> list[str]:
+    write_text(folder / "diagnosis.json", json.dumps(document(found), indent=2, allow_nan=False, ensure_ascii=False))
+    write_text(folder / "model.toml", model_file(found))
+    drawn = []
+    for name, figure in diagnosis_figures(found).items():
+        save(figure, folder / f"{name}.png")
+        drawn.append(f"{name}.png")
+    return [str(folder / name) for name in ("diagnosis.json", "model.toml", *drawn)]

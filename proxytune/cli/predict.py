@@ -1,0 +1,55 @@
+"""`predict`: what a fitted model says of any log."""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from rich.text import Text
+
+from proxytune.cli.answer import Answer
+from proxytune.diagnosis.prediction import agreement, predict
+from proxytune.diagnosis.vehicle import robot_of
+from proxytune.driving.robot import Robot, robot_from_geometry, robot_names
+from proxytune.effects import Model, read_model
+from proxytune.errors import InputError
+from proxytune.logs import Log, read_log
+from proxytune.report.writing import write_text
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the model, the log and the windows."""
+    parser.add_argument("model", type=Path, metavar="MODEL", help="a model.toml")
+    parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder")
+    parser.add_argument("--horizon", type=float, default=2.0, metavar="S", help="length of the windows [2 s]")
+    parser.add_argument("--output", type=Path, required=True, metavar="CSV", help="the predicted poses to write")
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Predict every window, write the poses, and compare them with those measured."""
+    if not (np.isfinite(arguments.horizon) and arguments.horizon > 0.0):
+        raise InputError(f"--horizon must be a positive number of seconds, got {arguments.horizon}")
+    model, log = read_model(arguments.model), read_log(arguments.log)
+    table = predict(log, _robot(model, log), model.theta, arguments.horizon)
+    write_text(arguments.output, table.to_csv(index=False))
+    place, turn, compared = agreement(table, log)
+    document = {
+        "predictions": str(arguments.output),
+        "rows": len(table),
+        "windows": int(table[["episode", "start_time"]].drop_duplicates().shape[0]),
+        "horizon_s": arguments.horizon,
+        "error": {"value": place, "unit": "m", "heading": turn, "heading_unit": "rad", "poses": compared},
+    }
+    error = (
+        f"RMSE {1e3 * place:.1f} mm, {np.degrees(turn):.2f}° over {compared} poses"
+        if compared
+        else "no pose to compare"
+    )
+    return Answer(
+        document, Text(f"{document['windows']} windows of {arguments.horizon:g} s: {error}\n{arguments.output}")
+    )
+
+
+def _robot(model: Model, log: Log) -> Robot:
+    if model.robot in robot_names():
+        return robot_of(log, model.robot)
+    return robot_from_geometry(model.robot, model.geometry or log.geometry, log.rate_hz)

@@ -1,0 +1,1 @@
+"""Closing the loop: from measured logs to the effect that a model lacks."""

@@ -1,0 +1,196 @@
+"""Effects that strike at random: what they do to single commands, weighed as a mixture over all commands.
+
+A mean model cannot see them: a command that is lost now and then changes the motion after it, not on average.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from proxytune.diagnosis.drives import Drives, Floats, Whole, sum_by
+from proxytune.diagnosis.fitting import Fit
+from proxytune.diagnosis.replay import between, paths
+
+MEMORY_S = 2.5
+"""A command moves nothing any more after so long."""
+
+MOST_LOST = 4
+"""Commands lost in a row that are reckoned with."""
+
+SHIFTS = 99
+"""How often the null distribution is drawn."""
+
+
+class Responses(NamedTuple):
+    """What would have happened had a command been lost: one row per command that changed anything.
+
+    Attributes:
+        pull: Inner product of the change of the innovations with the innovations.
+        size: Inner product of the change with itself.
+        shifted: The pull after the innovations were shifted in time, which chance alone could make (shifts, commands).
+    """
+
+    pull: Floats
+    size: Floats
+    shifted: Floats
+
+
+class RandomEffect(NamedTuple):
+    """A random effect weighed.
+
+    Attributes:
+        effect: Its name in the catalogue.
+        parameter: The name of its parameter in θ.
+        value: Its likeliest size.
+        interval: Sizes that lose less than 1.92 nats, the 95 % interval of a likelihood.
+        gain: Its gain in log-likelihood beyond what chance gives on average [nats].
+        p_value: How often chance gains as much.
+    """
+
+    effect: str
+    parameter: str
+    value: float
+    interval: tuple[float, float]
+    gain: float
+    p_value: float
+
+
+def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
+    """Lost and jittering commands, weighed on what the model leaves over."""
+    answered = responses(fitted, seed)
+    if len(answered.size) == 0:
+        return ()
+    lateness = 1.0 / fitted.drives.rate_hz
+    return (
+        _weighed("dropped_commands", _lost, (1e-3, 0.6), answered),
+        _weighed("delay_jitter", lambda spread, p, s: _jitter(spread / lateness, p, s), (2e-3, 0.3), answered),
+    )
+
+
+def _lost(probability: float, pull: Floats, size: Floats) -> Floats:
+    """Log-likelihood ratio of each command: none, one or more lost in a row; their mean is fitted already."""
+    number = np.arange(MOST_LOST + 1)
+    weight = np.log1p(-probability) + number * np.log(probability)
+    return _mixture(number - probability / (1.0 - probability), weight, pull, size)
+
+
+def _jitter(spread: float, pull: Floats, size: Floats) -> Floats:
+    """Log-likelihood ratio of each command: late by a time from 0 to the spread, in commands."""
+    late = spread * (np.linspace(0.0, 1.0, 9) - 0.5)
+    return _mixture(late, np.full(len(late), -np.log(len(late))), pull, size)
+
+
+def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats:
+    """Log-likelihood ratio of being late by one of these times, in commands, with these log-weights."""
+    ratios = [w - step * pull - 0.5 * step**2 * size for step, w in zip(late, weight, strict=True)]
+    return np.asarray(np.logaddexp.reduce(ratios, axis=0))
+
+
+Ratio = Callable[[float, Floats, Floats], Floats]
+"""Log-likelihood ratio of each command, given the size of an effect, the command's pull and its size."""
+
+
+def _weighed(effect: str, ratio: Ratio, bounds: tuple[float, float], answered: Responses) -> RandomEffect:
+    low, high = np.log(bounds)
+    grid = np.exp(np.linspace(low, high, 25))
+
+    def total(value: float) -> float:
+        return float(ratio(value, answered.pull, answered.size).sum())
+
+    here = int(np.argmax([total(value) for value in grid]))
+    around = (float(np.log(grid[max(0, here - 1)])), float(np.log(grid[min(len(grid) - 1, here + 1)])))
+    best = float(np.exp(minimize_scalar(lambda log: -total(np.exp(log)), bounds=around, method="bounded").x))
+    chance = np.max([ratio(value, answered.shifted, answered.size).sum(axis=1) for value in grid], axis=0)
+    gain = total(best)
+    likely = [value for value in grid if total(value) > gain - 1.92] + [best]
+    p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
+    return RandomEffect(
+        effect, effect, best, (float(min(likely)), float(max(likely))), gain - max(0.0, float(chance.mean())), p_value
+    )
+
+
+def responses(fitted: Fit, seed: int) -> Responses:
+    """What the loss of each command would have changed.
+
+    Commands far apart are lost together, so that one replay tells of many.
+    """
+    drives = fitted.drives
+    rows, ticks = _changed(drives)
+    reach = round(MEMORY_S * drives.rate_hz)
+    here = between(drives, paths(drives, fitted.theta))
+    shifts = _shifts(len(drives.episode), seed)
+    z = fitted.innovations.reshape(-1, 3)
+    moved = np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1)
+    found = [
+        _lost_together(fitted, _without(drives, rows, phase, reach, ticks), here, moved)
+        for phase in range(reach)
+        if (rows[:, 1] % reach == phase).any()
+    ]
+    if not found:
+        return Responses(np.empty(0), np.empty(0), np.empty((SHIFTS, 0)))
+    pull, size, shifted = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
+    kept = size > 1e-3
+    return Responses(pull[kept], size[kept], shifted[:, kept])
+
+
+def _changed(drives: Drives) -> tuple[Whole, int]:
+    """Episode and row of every command that differs from the one before it, and ticks per row."""
+    ticks = round(drives.tick_hz / drives.rate_hz)
+    commands = drives.duties[:, ::ticks]
+    before = np.concatenate((drives.rest[:, None], commands[:, :-1]), axis=1)
+    return np.argwhere(np.any(commands != before, axis=-1)), ticks
+
+
+def _without(drives: Drives, rows: Whole, phase: int, reach: int, ticks: int) -> tuple[Floats, Whole, int]:
+    """Duties in which every command of a phase is lost."""
+    lost = rows[rows[:, 1] % reach == phase]
+    duties = drives.duties.copy()
+    for episode, row in lost:
+        start = row * ticks
+        before = drives.rest[episode] if row == 0 else drives.duties[episode, start - 1]
+        duties[episode, start : start + ticks] = before
+    return duties, lost, reach * ticks
+
+
+def _lost_together(
+    fitted: Fit, without: tuple[Floats, Whole, int], here: Floats, moved: Floats
+) -> tuple[Floats, Floats, Floats]:
+    drives = fitted.drives
+    duties, lost, reach = without
+    other = replace(drives, duties=duties)
+    change = fitted.whiten.whiten(here - between(other, paths(other, fitted.theta)))
+    label = np.repeat(_label(drives, lost, reach), 3)
+    size = sum_by(label, change**2, len(lost))
+    both = np.concatenate((fitted.innovations[:, None], moved), axis=1)
+    pulls = sum_by(label, change[:, None] * both, len(lost))
+    pulls /= _loudness(label, change, both, pulls / (size[:, None] + 1e-12))
+    return pulls[:, 0], size, pulls[:, 1:].T
+
+
+def _loudness(label: Whole, change: Floats, innovations: Floats, share: Floats) -> Floats:
+    """Standard deviation of what the loss of a command does not explain, where it acts, at least 1 (commands, columns).
+
+    After a command all motion may be harder to predict: only what points its way speaks for its loss.
+    """
+    weight = np.abs(change)
+    count = len(share)
+    total = sum_by(label, weight, count)[:, None] + 1e-12
+    along = sum_by(label, (weight * change)[:, None] * innovations, count)
+    cubes = sum_by(label, weight * change**2, count)[:, None]
+    energy = sum_by(label, weight[:, None] * innovations**2, count) - 2.0 * share * along + share**2 * cubes
+    return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
+
+
+def _label(drives: Drives, lost: Whole, reach: int) -> Whole:
+    """Which lost command each increment comes after, −1 where none (N,)."""
+    length = drives.duties.shape[1]
+    keys = lost[:, 0] * length + lost[:, 1] * (reach // round(MEMORY_S * drives.rate_hz))
+    at = np.searchsorted(keys, drives.episode * length + drives.last - 1, side="right") - 1
+    return np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
+
+
+def _shifts(length: int, seed: int) -> Whole:
+    return np.random.default_rng(seed).integers(length // 20 + 1, length - length // 20, size=SHIFTS)

@@ -1,0 +1,189 @@
+"""Fitting a model's free parameters, drive noise and pose noise to the innovations, together."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from proxytune.diagnosis.drives import Drives, Floats, sum_by
+from proxytune.diagnosis.innovations import (
+    FIRST_GUESS,
+    HUBER,
+    Noise,
+    Whitener,
+    clipped,
+    fit_noise,
+    huber,
+    whitener,
+)
+from proxytune.diagnosis.replay import increments
+from proxytune.effects import PARAMETERS
+from proxytune.space import Theta
+
+ROUNDS = 3
+"""Parameters and noise are fitted in turn so often."""
+
+STEP = 1e-3
+"""Finite differences step by this fraction of a coordinate's range."""
+
+ROUGH_EFFECTS = ("stiction", "command_quantisation")
+"""Effects whose parameters change the motion by steps: no slope leads to their best value, so it is scanned for."""
+
+SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(0.99, 1.01, 11))
+"""Where a scan looks in each round, as multiples of the value it starts from."""
+
+Coordinate = tuple[str, ...]
+"""Parameters of θ that share one value."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to drives.
+
+    Attributes:
+        drives: What it was fitted to.
+        theta: All its values besides the robot's nominal ones, fitted or fixed.
+        free: The coordinates that were fitted.
+        noise: Drive and pose noise.
+        whiten: The whitener of that noise.
+        innovations: What the model leaves over, white if it is right (3N,).
+        slopes: Their change per unit of each coordinate, as a fraction of its range (3N, coordinates).
+    """
+
+    drives: Drives
+    theta: Mapping[str, float]
+    free: tuple[Coordinate, ...]
+    noise: Noise
+    whiten: Whitener
+    innovations: Floats
+    slopes: Floats
+
+
+def span(coordinate: Coordinate) -> tuple[float, float]:
+    """Lowest and highest value of a coordinate."""
+    return PARAMETERS[coordinate[0]].low, PARAMETERS[coordinate[0]].high
+
+
+def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise = FIRST_GUESS) -> Fit:
+    """Fit free coordinates from where θ has them, in rounds of parameters and noise.
+
+    Within a round the filter's gains are frozen: otherwise flat gains would pass for evidence.
+    """
+    for number in range(ROUNDS):
+        whiten = whitener(drives, noise)
+        theta = _scanned(drives, theta, tuple(filter(_is_rough, free)), whiten, SCANS[min(number, len(SCANS) - 1)])
+        smooth = tuple(coordinate for coordinate in free if not _is_rough(coordinate))
+        theta = _fit_theta(drives, theta, smooth, whiten)
+        noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
+    return seen(drives, theta, free, noise)
+
+
+def seen(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise) -> Fit:
+    """A model with its noise as these drives show it, nothing fitted."""
+    whiten = whitener(drives, noise)
+    left = whiten.whiten(drives.measured - increments(drives, theta))
+    return Fit(drives, theta, free, noise, whiten, left, slopes(drives, theta, free, whiten))
+
+
+def renoised(fitted: Fit, noise: Noise) -> Fit:
+    """The same model with another noise."""
+    return seen(fitted.drives, fitted.theta, fitted.free, noise)
+
+
+def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:
+    if not free:
+        return theta
+    low, high = np.array([span(coordinate) for coordinate in free]).T
+
+    def left(fractions: Floats) -> Floats:
+        moved = placed(theta, free, low + fractions * (high - low))
+        return whiten.whiten(drives.measured - increments(drives, moved))
+
+    def slope(fractions: Floats) -> Floats:
+        return slopes(drives, placed(theta, free, low + fractions * (high - low)), free, whiten)
+
+    start = (np.array([theta[coordinate[0]] for coordinate in free]) - low) / (high - low)
+    found = least_squares(
+        left, np.clip(start, 1e-6, 1.0 - 1e-6), slope, (0.0, 1.0), loss="huber", f_scale=HUBER, ftol=1e-7, max_nfev=30
+    )
+    return placed(theta, free, low + np.clip(found.x, 0.0, 1.0) * (high - low))
+
+
+def _scanned(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats) -> Theta:
+    """The best value of each coordinate in which the motion changes by steps, all others held."""
+    for coordinate in rough:
+        low, high = span(coordinate)
+        here = theta[coordinate[0]]
+        values = np.clip(here * np.concatenate(([1.0], multiples)), low, high)
+        losses = [loss_of(drives, placed(theta, (coordinate,), np.array([value])), whiten) for value in values]
+        theta = placed(theta, (coordinate,), values[[int(np.argmin(losses))]])
+    return theta
+
+
+def _is_rough(coordinate: Coordinate) -> bool:
+    return coordinate[0].split(".")[0] in ROUGH_EFFECTS
+
+
+def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
+    """The loss of a model under frozen gains [nats]."""
+    return float(huber(whiten.whiten(drives.measured - increments(drives, theta))).sum())
+
+
+def placed(theta: Theta, free: tuple[Coordinate, ...], values: Floats) -> dict[str, float]:
+    """θ with its free coordinates at these values."""
+    given = {name: float(value) for names, value in zip(free, values, strict=True) for name in names}
+    return {**theta, **given}
+
+
+def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Floats:
+    """Change of the innovations per coordinate, as a fraction of its range (3N, coordinates)."""
+    if not free:
+        return np.empty((3 * len(drives.episode), 0))
+    here = increments(drives, theta)
+    columns = []
+    for coordinate in free:
+        low, high = span(coordinate)
+        step = STEP if theta[coordinate[0]] + STEP * (high - low) <= high else -STEP
+        there = placed(theta, (coordinate,), np.array([theta[coordinate[0]] + step * (high - low)]))
+        columns.append((here - increments(drives, there)) / step)
+    return whiten.whiten(np.stack(columns, axis=-1))
+
+
+def by_block(drives: Drives, values: Floats) -> Floats:
+    """Sums over the innovations of each block, (3N, …) to (blocks, …)."""
+    return sum_by(np.repeat(drives.block, 3), values, int(drives.block.max()) + 1)
+
+
+def predictive(fitted: Fit) -> Floats:
+    """Each block's log-likelihood under the model fitted to all others (blocks,), in nats.
+
+    Leaving a block out moves the parameters by one Newton step.
+    """
+    z, slope = fitted.innovations, fitted.slopes
+    inner = np.abs(z) < HUBER
+    pull = by_block(fitted.drives, slope * clipped(z)[:, None])
+    curve = by_block(fitted.drives, slope[:, :, None] * (slope * inner[:, None])[:, None, :])
+    rest = curve.sum(axis=0) - curve + 1e-6 * np.eye(slope.shape[1])
+    moved = -np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
+    shifted = z + np.einsum("nc,nc->n", slope, np.repeat(moved[fitted.drives.block], 3, axis=0))
+    loss = huber(shifted).reshape(-1, 3).sum(axis=1) + fitted.whiten.log_determinant
+    return -by_block(fitted.drives, np.repeat(loss / 3.0, 3))
+
+
+def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
+    """Intervals of the fitted parameters: 95 %, from the spread between blocks (sandwich)."""
+    z, slope = fitted.innovations, fitted.slopes
+    curve = slope.T @ (slope * (np.abs(z) < HUBER)[:, None]) + 1e-6 * np.eye(slope.shape[1])
+    pull = by_block(fitted.drives, slope * clipped(z)[:, None])
+    inverse = np.linalg.inv(curve)
+    blocks = len(pull)
+    spread = inverse @ (pull.T @ pull) @ inverse * blocks / max(1, blocks - slope.shape[1])
+    found = {}
+    for coordinate, variance in zip(fitted.free, np.diag(spread), strict=True):
+        low, high = span(coordinate)
+        half = 1.96 * float(np.sqrt(variance)) * (high - low)
+        for name in coordinate:
+            value = fitted.theta[name]
+            found[name] = (max(low, value - half), min(high, value + half))
+    return found

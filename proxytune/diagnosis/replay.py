@@ -1,0 +1,124 @@
+"""What a model says of the recorded commands: the planar plant over whole batches of drives."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
+from proxytune.driving.drivetrain import Drivetrain, drivetrain
+from proxytune.driving.planar import integrate
+from proxytune.effects import PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.space import Theta
+
+RANDOM_EFFECTS = ("delay_jitter", "dropped_commands")
+"""Effects that draw; to first order they make commands late by their mean lateness."""
+
+
+def lateness(theta: Theta, rate_hz: float) -> float:
+    """How late random effects make commands on average [s], at this many commands per second."""
+    lost = theta.get("dropped_commands", 0.0)
+    return theta.get("delay_jitter", 0.0) / 2.0 + lost / (1.0 - lost) / rate_hz
+
+
+def expected(theta: Theta, rate_hz: float) -> dict[str, float]:
+    """θ without random effects, their mean lateness added to the delay."""
+    late = lateness(theta, rate_hz)
+    calm = {name: value for name, value in theta.items() if name not in RANDOM_EFFECTS}
+    if late > 0.0:
+        calm["delay"] = min(PARAMETERS["delay"].high, calm.get("delay", 0.0) + late)
+    return calm
+
+
+def paths(drives: Drives, theta: Theta) -> Floats:
+    """The measured poses that a model expects from the origin (E, T + 1, 3), each episode in one go.
+
+    Args:
+        drives: The commands.
+        theta: Values of effects besides the robot's nominal ones.
+
+    Raises:
+        SettingsError: If a value is out of its parameter's bounds.
+    """
+    train, measurement = _model(drives, theta)
+    twists, _ = train.apply(drives.duties, train.begin(_setting(drives)))
+    return _seen(drives, twists, measurement)
+
+
+def increments(drives: Drives, theta: Theta) -> Floats:
+    """The motion between the measured poses (N, 3): forward, left [m], turn [rad], in the body frame."""
+    return between(drives, paths(drives, theta))
+
+
+def between(drives: Drives, walked: Floats) -> Floats:
+    """The increments of paths (E, T + 1, 3) between the measured poses."""
+    return relative(walked[drives.episode, drives.first], walked[drives.episode, drives.last])
+
+
+def disturbed(drives: Drives, theta: Theta, extra: Floats) -> Floats:
+    """The increments when something adds to the twist of every tick (E, T, 3)."""
+    train, measurement = _model(drives, theta)
+    twists, _ = train.apply(drives.duties, train.begin(_setting(drives)))
+    return between(drives, _seen(drives, twists + extra, measurement))
+
+
+def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
+    """Measured poses from windows' beginnings on, each from the origin (W, length + 1, 3).
+
+    A window starts from the measured pose, and from measured wheel speeds where there are any. The commands before it
+    count; nothing measured after it does.
+
+    Args:
+        drives: The commands.
+        theta: Values of effects besides the robot's nominal ones.
+        begin: The increments at whose beginnings the windows start (W,).
+        length: Ticks to go on for; commands after an episode's end are those at its end.
+    """
+    train, measurement = _model(drives, theta)
+    setting = _setting(drives)
+    memory = train.begin(setting)
+    arrived = np.clip(train.command.apply(drives.duties, memory.command)[0], -1.0, 1.0)
+    episode, start = drives.episode[begin], drives.first[begin]
+    ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
+    if drives.wheels is None:
+        wheels = train.actuation.apply(arrived, memory.actuation)[0][episode[:, None], ticks]
+    else:
+        turning = replace(setting, rest=drives.wheels[episode, start])
+        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.begin(turning).actuation)[0]
+    ahead = replace(setting, rest=np.zeros((len(begin), 2)), headings=drives.poses[begin, 0, 2:])
+    twists, _ = train.motion.apply(train.ideal(wheels), train.begin(ahead).motion)
+    return _seen(drives, twists, measurement)
+
+
+def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
+    """The wheel speeds that a model says (E, T, 2), as fractions of full speed."""
+    train, _ = _model(drives, theta)
+    memory = train.begin(_setting(drives))
+    arrived, _ = train.command.apply(drives.duties, memory.command)
+    return np.asarray(train.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)[0])
+
+
+def arrived_commands(drives: Drives, theta: Theta) -> Floats:
+    """The commands that reach the motors (E, T, 2)."""
+    train, _ = _model(drives, theta)
+    return np.asarray(train.command.apply(drives.duties, train.begin(_setting(drives)).command)[0])
+
+
+def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
+    robot = drives.robot
+    effects = effects_from(expected({**robot.theta, **theta}, drives.rate_hz), robot.figures)
+    return drivetrain(robot, effects), stage_chain(effects, Stage.MEASUREMENT)
+
+
+def _setting(drives: Drives) -> Setting:
+    nominal: Mapping[str, float] = {**drives.robot.figures, "control_rate": drives.rate_hz}
+    return Setting(drives.tick_hz, drives.rest, nominal, headings=drives.headings)
+
+
+def _seen(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
+    start = np.zeros((len(twists), 1, 3))
+    walked = np.concatenate((start, integrate(start[:, 0], twists, 1.0 / drives.tick_hz)), axis=1)
+    if not measurement.effects:
+        return walked
+    rest = replace(_setting(drives), rest=start[:, 0])
+    return np.asarray(measurement.apply(walked, measurement.begin(rest))[0])

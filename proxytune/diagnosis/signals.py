@@ -1,0 +1,250 @@
+"""What a residual may depend on: signals of the drives, and flexible motion as curves over each of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.signal import lfilter
+
+from proxytune.diagnosis.drives import Drives, Floats, relative
+from proxytune.diagnosis.fitting import Fit
+from proxytune.diagnosis.replay import arrived_commands, wheel_speeds
+
+KNOTS = 6
+"""Corners of a curve over a signal."""
+
+PATCH_M = 0.3
+MOST_PATCHES = 14
+"""Over a position, corners lie this far apart [m], but there are no more than so many."""
+
+
+@dataclass(frozen=True)
+class SignalGroup:
+    """Flexible motion that depends on one signal.
+
+    Attributes:
+        name: What people call the signal.
+        effects: Effects that act through it.
+        signal: The signal over time, for drawing (E, T).
+        unit: Its unit.
+        twists: Motion added to that of the model, per basis function (E, T, 3, columns): [m/s], [m/s], [rad/s].
+    """
+
+    name: str
+    effects: tuple[str, ...]
+    signal: Floats
+    unit: str
+    twists: Floats
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """What the basis functions are made of, all (E, T)."""
+
+    drives: Drives
+    left: Floats
+    right: Floats
+    forward: Floats
+    yaw: Floats
+    commands: Floats
+
+
+def signal_groups(fitted: Fit) -> tuple[SignalGroup, ...]:
+    """Every signal group of these drives, seen with the fitted model."""
+    motion = _motion(fitted)
+    made = [
+        _command_level(motion),
+        _wheel_difference(motion),
+        _transients(motion),
+        _after_reversal(motion),
+        _time(motion),
+        _use(motion),
+        _turning(motion),
+        _heading(motion),
+        _position(motion),
+        _wheel_angle(motion, 0, "left wheel angle"),
+        _wheel_angle(motion, 1, "right wheel angle"),
+        _direction(motion),
+    ]
+    return tuple(group for group in made if np.abs(group.twists).max() > 1e-9)
+
+
+def _motion(fitted: Fit) -> _Motion:
+    drives, figures = fitted.drives, fitted.drives.robot.figures
+    speeds = wheel_speeds(drives, fitted.theta) * figures["full_speed"]
+    left, right = speeds[..., 0], speeds[..., 1]
+    yaw = (right - left) / figures["effective_baseline"]
+    return _Motion(drives, left, right, (left + right) / 2.0, yaw, arrived_commands(drives, fitted.theta))
+
+
+def hats(signal: Floats, knots: int = KNOTS) -> Floats:
+    """Piecewise-linear functions of a signal (…, columns), corners at its quantiles; together they are 1."""
+    corners = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, knots)))
+    if len(corners) < 2:
+        return np.ones((*signal.shape, 1))
+    return np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))], axis=-1)
+
+
+def _twists(forward: Floats | None = None, sideways: Floats | None = None, yaw: Floats | None = None) -> Floats:
+    """Columns of forward, sideways and yaw motion side by side (E, T, 3, columns)."""
+    parts = []
+    for channel, columns in enumerate((forward, sideways, yaw)):
+        if columns is not None:
+            block = np.zeros((*columns.shape[:2], 3, columns.shape[2]))
+            block[:, :, channel] = columns
+            parts.append(block)
+    return np.concatenate(parts, axis=-1)
+
+
+def _of_wheels(motion: _Motion, left: Floats | None, right: Floats | None) -> Floats:
+    """Motion that extra speeds of the wheels [m/s] make (E, T, 3, columns)."""
+    baseline = motion.drives.robot.figures["effective_baseline"]
+    parts = []
+    for columns, side in ((left, -1.0), (right, 1.0)):
+        if columns is not None:
+            parts.append(np.stack((columns / 2.0, np.zeros_like(columns), side * columns / baseline), axis=2))
+    return np.concatenate(parts, axis=-1)
+
+
+def _command_level(motion: _Motion) -> SignalGroup:
+    full = motion.drives.robot.figures["full_speed"]
+    lagged = [side / full for side in (motion.left, motion.right)]
+    columns = [hats(side, 9) * full for side in lagged]
+    effects = ("dead_band", "saturation", "driver_map", "stiction", "wheel_gain", "command_quantisation", "motor_lag")
+    return SignalGroup("wheel command", effects, lagged[0], "duty", _of_wheels(motion, *columns))
+
+
+def _wheel_difference(motion: _Motion) -> SignalGroup:
+    signal = motion.commands[..., 1] - motion.commands[..., 0]
+    columns = hats(signal)
+    return SignalGroup(
+        "difference of the wheel commands", ("yaw_scrub", "turn_slip"), signal, "duty", _twists(columns, yaw=columns)
+    )
+
+
+def _transients(motion: _Motion) -> SignalGroup:
+    rate = motion.drives.tick_hz
+    parts = []
+    for side in range(2):
+        command = motion.commands[..., side]
+        slow = [_smoothed(command, seconds * rate) for seconds in (0.05, 0.15, 0.45, 1.2)]
+        parts.append(np.stack([command - slow[0]] + [a - b for a, b in pairwise(slow)], axis=-1))
+    full = motion.drives.robot.figures["full_speed"]
+    signal = parts[0].sum(axis=-1)
+    effects = ("motor_lag", "delay", "delay_jitter", "dropped_commands", "backlash")
+    return SignalGroup("command transients", effects, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
+
+
+def _smoothed(signal: Floats, ticks: float) -> Floats:
+    kept = np.exp(-1.0 / ticks)
+    return np.asarray(lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=kept * signal[:, :1])[0])
+
+
+def _after_reversal(motion: _Motion) -> SignalGroup:
+    columns = []
+    for speed in (motion.left, motion.right):
+        gone = _since_reversal(speed) / motion.drives.tick_hz
+        columns.append(np.stack([np.exp(-gone / reach) for reach in (0.005, 0.015, 0.04, 0.12)], -1) * speed[..., None])
+    signal = _since_reversal(motion.left) / motion.drives.tick_hz
+    return SignalGroup("distance since reversal", ("backlash", "stiction"), signal, "m", _of_wheels(motion, *columns))
+
+
+def _since_reversal(speed: Floats) -> Floats:
+    """Distance since the wheel last changed direction, times ticks per second (E, T)."""
+    sign = np.sign(np.where(np.abs(speed) < 1e-3, 0.0, speed))
+    index = np.arange(speed.shape[1])
+    moving = np.maximum.accumulate(np.where(sign != 0, index, 0), axis=1)
+    held = np.take_along_axis(sign, moving, axis=1)
+    turned = np.concatenate((np.ones((len(speed), 1), bool), held[:, 1:] != held[:, :-1]), axis=1)
+    way = np.cumsum(np.abs(speed), axis=1)
+    start = np.maximum.accumulate(np.where(turned, index, 0), axis=1)
+    return np.asarray(way - np.take_along_axis(way, start, axis=1))
+
+
+def _time(motion: _Motion) -> SignalGroup:
+    signal = np.broadcast_to(np.arange(motion.left.shape[1]) / motion.drives.tick_hz, motion.left.shape)
+    columns = hats(signal)[..., 1:]
+    wheels = _of_wheels(motion, columns * motion.left[..., None], columns * motion.right[..., None])
+    return SignalGroup("time in the episode", ("battery_sag",), signal, "s", wheels)
+
+
+def _use(motion: _Motion) -> SignalGroup:
+    use = np.cumsum(np.abs(motion.commands).mean(axis=-1), axis=1) / motion.drives.tick_hz
+    columns = hats(use)[..., 1:]
+    twists = _twists(columns * motion.forward[..., None], yaw=columns * motion.yaw[..., None])
+    return SignalGroup("cumulated use", ("battery_sag",), use, "s at full duty", twists)
+
+
+def _turning(motion: _Motion) -> SignalGroup:
+    columns = hats(motion.yaw)
+    bend = hats(motion.forward * motion.yaw)
+    twists = _twists(columns * motion.forward[..., None], bend[..., :-1] - bend[..., 1:], columns)
+    effects = ("turn_slip", "yaw_scrub", "lateral_slip", "marker_offset", "heading_offset")
+    return SignalGroup("turn rate", effects, motion.yaw, "rad/s", twists)
+
+
+def _heading(motion: _Motion) -> SignalGroup:
+    angle = motion.drives.headings
+    waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1)
+    moving = np.minimum(1.0, np.abs(motion.forward) / 0.02)[..., None]
+    twists = _twists(waves * moving, waves * motion.forward[..., None], waves * np.abs(motion.forward)[..., None])
+    return SignalGroup("heading", ("floor_slope",), np.mod(angle, 2.0 * np.pi), "rad", twists)
+
+
+def _position(motion: _Motion) -> SignalGroup:
+    places = _places(motion.drives)
+    columns = np.concatenate([_patches(places[..., axis]) for axis in range(2)], axis=-1)
+    forward, yaw = columns * motion.forward[..., None], columns * motion.yaw[..., None]
+    twists = _twists(forward, yaw=np.concatenate((yaw, columns * np.abs(motion.forward)[..., None]), axis=-1))
+    return SignalGroup("position", (), places[..., 0], "m", twists)
+
+
+def _patches(signal: Floats) -> Floats:
+    """Hats a patch apart over the whole range of a coordinate [m], the first left out (…, columns)."""
+    low, high = float(signal.min()), float(signal.max())
+    corners = np.linspace(low, high, int(np.clip(np.ceil((high - low) / PATCH_M), 1, MOST_PATCHES)) + 1)
+    return np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))[1:]], axis=-1)
+
+
+def _wheel_angle(motion: _Motion, side: int, name: str) -> SignalGroup:
+    angle = wheel_angles(motion.drives)[..., side]
+    speed = (motion.left, motion.right)[side]
+    waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1) * speed[..., None]
+    own: Mapping[int, Floats] = {side: waves}
+    return SignalGroup(name, (), np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
+
+
+def _direction(motion: _Motion) -> SignalGroup:
+    back = (motion.forward < 0.0)[..., None]
+    twists = _twists(
+        back * motion.forward[..., None], yaw=np.concatenate((back * motion.yaw[..., None], back), axis=-1)
+    )
+    return SignalGroup("direction of travel", (), np.sign(motion.forward), "", twists)
+
+
+def _places(drives: Drives) -> Floats:
+    """Measured position at each tick (E, T, 2), interpolated."""
+    return _interpolated(drives, drives.poses[:, 0, :2])
+
+
+def wheel_angles(drives: Drives) -> Floats:
+    """How far each wheel has turned by the measured motion (E, T, 2) [rad], left and right."""
+    figures = drives.robot.figures
+    moved = relative(drives.poses[:, 0], drives.poses[:, 1])
+    turn = moved[:, 2] * figures["effective_baseline"] / 2.0
+    wheels = np.stack((moved[:, 0] - turn, moved[:, 0] + turn), axis=1) / figures["wheel_radius"]
+    total = np.cumsum(wheels, axis=0) - wheels
+    return _interpolated(drives, total)
+
+
+def _interpolated(drives: Drives, values: Floats) -> Floats:
+    """Values at the beginnings of the increments (N, channels) at every tick (E, T, channels)."""
+    length = drives.duties.shape[1]
+    out = np.zeros((len(drives.duties), length, values.shape[1]))
+    for episode in range(len(out)):
+        own = drives.episode == episode
+        if own.any():
+            for channel in range(values.shape[1]):
+                out[episode, :, channel] = np.interp(np.arange(length), drives.first[own], values[own, channel])
+    return out

@@ -1,0 +1,135 @@
+"""Windows of prediction: how far a model that starts from a measured pose strays from what was measured."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
+from proxytune.diagnosis.fitting import Fit
+from proxytune.diagnosis.replay import increments, window_paths
+from proxytune.space import Theta
+
+SHORTEST = 0.6
+"""Windows that cover less of the horizon than this are left out."""
+
+DRAWS = 20
+"""How often the noise floor is drawn."""
+
+
+class Windows(NamedTuple):
+    """Windows (W,) over measured increments, and the increments in them (M,).
+
+    Attributes:
+        begin: The increment at whose beginning each window starts (W,).
+        window: The window of each entry (M,).
+        increment: The increment whose end is compared (M,).
+    """
+
+    begin: Whole
+    window: Whole
+    increment: Whole
+
+
+def cut(drives: Drives, horizon_s: float) -> Windows:
+    """Windows one after another, each within an unbroken run of poses."""
+    ticks = horizon_s * drives.tick_hz
+    run = np.cumsum(~drives.linked) - 1
+    start = drives.first[np.flatnonzero(~drives.linked)][run]
+    number = np.ceil((drives.last - start) / ticks - 1e-9).astype(int) - 1
+    _, label = np.unique(run * (number.max() + 1) + number, return_inverse=True)
+    begin = np.flatnonzero(np.concatenate(([True], label[1:] != label[:-1])))
+    covered = np.maximum.reduceat(drives.last, begin) - drives.first[begin]
+    long = covered >= SHORTEST * ticks
+    kept = np.flatnonzero(long[label])
+    renumbered = np.cumsum(long) - 1
+    return Windows(begin[long], renumbered[label[kept]], kept)
+
+
+def strays(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """How far the model's pose is from the measured one (M, 2): distance [m], heading [rad]."""
+    begin = windows.begin
+    length = int((drives.last[windows.increment] - drives.first[begin][windows.window]).max())
+    walked = window_paths(drives, theta, begin, length)
+    tick = drives.last[windows.increment] - drives.first[begin][windows.window]
+    predicted = relative(walked[windows.window, 0], walked[windows.window, tick])
+    measured = relative(drives.poses[begin, 0][windows.window], drives.poses[windows.increment, 1])
+    return _apart(predicted, measured)
+
+
+def _apart(one: Floats, other: Floats) -> Floats:
+    difference = one - other
+    return np.stack((np.hypot(difference[:, 0], difference[:, 1]), np.abs(difference[:, 2])), axis=1)
+
+
+def floor(fitted: Fit, windows: Windows, seed: int) -> tuple[float, float]:
+    """The error that a perfect model would have with the fitted noise: RMSE of position [m] and heading [rad]."""
+    said = increments(fitted.drives, fitted.theta)
+    random = np.random.default_rng(seed)
+    squares = [
+        _noise_alone(fitted.drives, said, fitted.whiten.colour(random.standard_normal(said.size)), windows) ** 2
+        for _ in range(DRAWS)
+    ]
+    place, turn = np.sqrt(np.mean(squares, axis=(0, 1))).tolist()
+    return place, turn
+
+
+def _noise_alone(drives: Drives, said: Floats, noise: Floats, windows: Windows) -> Floats:
+    still, moved = _chained(drives, said), _chained(drives, said + noise)
+    begin = windows.begin[windows.window]
+    return _apart(
+        relative(still[begin, 0], still[windows.increment, 1]), relative(moved[begin, 0], moved[windows.increment, 1])
+    )
+
+
+def _chained(drives: Drives, steps: Floats) -> Floats:
+    """Poses before and after each increment when all are put one after another (N, 2, 3)."""
+    heading = np.cumsum(steps[:, 2])
+    before = heading - steps[:, 2]
+    cosine, sine = np.cos(before), np.sin(before)
+    x = np.cumsum(cosine * steps[:, 0] - sine * steps[:, 1])
+    y = np.cumsum(sine * steps[:, 0] + cosine * steps[:, 1])
+    after = np.stack((x, y, heading), axis=1)
+    return np.stack((np.concatenate((np.zeros((1, 3)), after[:-1])), after), axis=1)
+
+
+class Rmse(NamedTuple):
+    """A root mean square with its 95 % interval."""
+
+    value: float
+    interval: tuple[float, float]
+
+
+def rmse(squares: Floats, blocks: Whole) -> Rmse:
+    """The root mean square, with a t-interval on its logarithm from leaving blocks out in turn."""
+    value, half = _log_mean(squares, blocks)
+    return Rmse(float(np.exp(value / 2.0)), (float(np.exp((value - half) / 2)), float(np.exp((value + half) / 2))))
+
+
+def ratio(after: Floats, before: Floats, blocks: Whole) -> Rmse:
+    """The ratio of two root mean squares over the same windows, with its interval."""
+    logs = _left_out(after, blocks) - _left_out(before, blocks)
+    centre = float(np.log(after.mean() / before.mean()))
+    half = _half_width(logs)
+    return Rmse(float(np.exp(centre / 2)), (float(np.exp((centre - half) / 2)), float(np.exp((centre + half) / 2))))
+
+
+def _log_mean(squares: Floats, blocks: Whole) -> tuple[float, float]:
+    return float(np.log(squares.mean())), _half_width(_left_out(squares, blocks))
+
+
+def _left_out(squares: Floats, blocks: Whole) -> Floats:
+    """Logarithm of the mean without each block."""
+    _, label = np.unique(blocks, return_inverse=True)
+    sums, counts = np.bincount(label, squares), np.bincount(label)
+    if len(counts) < 2:
+        return np.log(sums / counts)
+    return np.asarray(np.log((sums.sum() - sums) / (counts.sum() - counts)))
+
+
+def _half_width(logs: Floats) -> float:
+    count = len(logs)
+    if count < 2:
+        return float("inf")
+    spread = np.sqrt((count - 1) / count * ((logs - logs.mean()) ** 2).sum())
+    return float(student.ppf(0.975, count - 1) * spread)

@@ -1,0 +1,95 @@
+"""Effects of the battery and the motor's limits on how fast wheels can turn."""
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.effects.wheels import IMBALANCE, per_wheel
+from proxytune.space import Parameter
+
+SMALLEST_LIMIT = 0.05
+"""A wheel keeps so much of its duty, however the lost part is shared out."""
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """Wheels turn no faster than at a duty of `limit`; the lost part, 1 − limit, is what the wheels share."""
+
+    limit: float
+    imbalance: float
+    name: ClassVar[str] = "saturation"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            "limit",
+            "duty",
+            0.1,
+            1.0,
+            1.0,
+            (0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
+            "drivers that cap the duty, batteries run down: 0.5 to 1",
+        ),
+        IMBALANCE,
+    )
+
+    def begin(self, setting: Setting) -> Signal:
+        """The limit of each wheel (2,)."""
+        return np.maximum(SMALLEST_LIMIT, 1.0 - per_wheel(1.0 - self.limit, self.imbalance))
+
+    def apply(self, signal: Signal, memory: Signal) -> tuple[Signal, Signal]:
+        """Clip at ± limit."""
+        return np.clip(signal, -memory, memory), memory
+
+
+class Charge(NamedTuple):
+    """Minutes at full duty since the start (…,), and how many of them a sample at full duty lasts."""
+
+    use: Signal
+    minutes: float
+
+
+@dataclass(frozen=True)
+class BatterySag:
+    """Both wheels turn slower under load, and the slower the more has been driven since the start.
+
+    Their speed is multiplied by (1 − load · mean |u|) · exp(−fade · use), use being the integral of mean |u|.
+    """
+
+    load: float
+    fade: float
+    name: ClassVar[str] = "battery_sag"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            "load",
+            "",
+            0.0,
+            0.8,
+            0.0,
+            (0.03, 0.06, 0.12, 0.25, 0.5),
+            "inner resistance of small batteries: some hundredths at full load, old ones some tenths",
+        ),
+        Parameter(
+            "fade",
+            "1/min",
+            0.0,
+            1.0,
+            0.0,
+            (0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+            "a battery that lasts minutes to an hour at full duty",
+        ),
+    )
+
+    def begin(self, setting: Setting) -> Charge:
+        """With the battery as it is at the start."""
+        return Charge(np.zeros(np.shape(setting.rest)[:-1]), 1.0 / (60.0 * setting.rate_hz))
+
+    def apply(self, signal: Signal, memory: Charge) -> tuple[Signal, Charge]:
+        """Slow both wheels by one factor, its fading taken at the middle of each sample."""
+        mean = (np.abs(signal[..., 0]) + np.abs(signal[..., 1])) / 2.0
+        used = memory.use[..., None] + np.cumsum(mean, axis=-1) * memory.minutes
+        faded = np.exp(-self.fade * (used - mean * (memory.minutes / 2.0)))
+        factor = np.maximum(0.0, 1.0 - self.load * mean) * faded
+        return signal * factor[..., None], memory._replace(use=used[..., -1])

@@ -1,0 +1,190 @@
+"""A diagnosis as one JSON document, as model.toml, and as tables for people."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Group
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, HorizonError
+from proxytune.diagnosis.search import Adopted
+from proxytune.driving.robot import robot_names
+from proxytune.effects import CATALOGUE, Model, model_text, theta_names
+from proxytune.logs import GEOMETRY
+
+HORIZON_S = 2.0
+"""The horizon of the one error that stands for all."""
+
+MEANINGS = {
+    "nothing missing": "what is left over is no more than noise",
+    "explained": "named effects explain what the declared model left over",
+    "partly explained": "named effects explain a part; the rest depends on something that no named effect accounts for",
+    "unexplained": "something is missing, and no named effect accounts for it",
+}
+
+
+def document(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Everything that `diagnose --json` prints."""
+    return {
+        "log": diagnosis.log,
+        "robot": diagnosis.robot.name,
+        "verdict": diagnosis.verdict,
+        "declared": {name: _estimate(estimate) for name, estimate in diagnosis.declared.items()},
+        "effects": [_effect(effect, diagnosis.theta) for effect in diagnosis.effects],
+        "extended": {name: _estimate(estimate) for name, estimate in diagnosis.theta.items()},
+        "candidates": [
+            {"name": tried.effect, "form": tried.form, "held_out_gain": tried.gain, "p_value": tried.p_value}
+            for tried in diagnosis.found.tried
+        ],
+        "signals": [{"name": curve.group.name, "held_out_gain": curve.gain} for curve in diagnosis.found.curves],
+        "residual_depends_on": list(diagnosis.residual_depends_on),
+        "error": _error(_main_error(diagnosis)),
+        "errors": [_error(error) for error in diagnosis.errors],
+        "noise": {"drive": list(diagnosis.noise.drive), "pose": list(diagnosis.noise.pose)},
+        "could_not_be_seen": list(diagnosis.could_not_be_seen),
+        "next_manoeuvre": _manoeuvre(diagnosis),
+        "fitted_s": diagnosis.parts.fitted.seconds,
+        "tested_s": diagnosis.parts.tested.seconds,
+    }
+
+
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    return {"value": estimate.value, "interval": list(estimate.interval), "unit": estimate.unit}
+
+
+def _effect(effect: Adopted, theta: Mapping[str, Estimate]) -> dict[str, Any]:
+    kind = CATALOGUE[effect.effect]
+    names = dict(zip(theta_names(kind), (parameter.name for parameter in kind.parameters), strict=True))
+    return {
+        "name": effect.effect,
+        "form": effect.form,
+        "parameters": {names[name]: _estimate(theta[name]) for name in effect.names if name in theta},
+        "held_out_gain": effect.gain,
+        "p_value": effect.p_value,
+        "indistinguishable_from": [rival.effect for rival in effect.rivals],
+    }
+
+
+def _main_error(diagnosis: Diagnosis) -> HorizonError:
+    return min(diagnosis.errors, key=lambda error: abs(error.horizon_s - HORIZON_S))
+
+
+def _error(error: HorizonError) -> dict[str, Any]:
+    return {
+        "horizon_s": error.horizon_s,
+        "windows": error.windows,
+        "before": error.before.value,
+        "before_interval": list(error.before.interval),
+        "after": error.after.value,
+        "after_interval": list(error.after.interval),
+        "ratio": error.ratio.value,
+        "ratio_interval": list(error.ratio.interval),
+        "noise_floor": error.noise_floor,
+        "removable_left": error.removable_left,
+        "unit": "m",
+        "heading": {
+            "before": error.heading_before.value,
+            "after": error.heading_after.value,
+            "noise_floor": error.heading_floor,
+            "unit": "rad",
+        },
+    }
+
+
+def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    found = diagnosis.manoeuvre
+    if found is None:
+        return None
+    return {
+        "name": found.name,
+        "description": found.description,
+        "tells_apart": list(found.between),
+        "nats_per_minute": found.nats_per_minute,
+    }
+
+
+def model_file(diagnosis: Diagnosis) -> str:
+    """The extended model as model.toml."""
+    theta = {name: estimate.value for name, estimate in diagnosis.theta.items()}
+    bounds = {name: estimate.interval for name, estimate in diagnosis.theta.items()}
+    known = diagnosis.robot.name in robot_names()
+    geometry = {} if known else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
+    added = ", ".join(effect.effect for effect in diagnosis.effects) or "nothing"
+    comments = (f"{diagnosis.verdict}: fitted to {diagnosis.log}; added to what was declared: {added}",)
+    return model_text(Model(diagnosis.robot.name, None, theta, bounds, geometry), comments)
+
+
+def shown(diagnosis: Diagnosis) -> Group:
+    """What a person reads."""
+    lines = [Text(f"{diagnosis.log}: {diagnosis.verdict}: {MEANINGS[diagnosis.verdict]}", style="bold")]
+    parts = [_parameters(diagnosis), _errors(diagnosis), _candidates(diagnosis)]
+    return Group(*lines, *parts, *(Text(note) for note in _notes(diagnosis)))
+
+
+def _parameters(diagnosis: Diagnosis) -> Table:
+    table = _table(
+        "Parameters, fitted", ("parameter", "declared alone", "with what was found", "95 % interval", "unit")
+    )
+    for name, after in diagnosis.theta.items():
+        before = diagnosis.declared.get(name)
+        interval = f"{after.interval[0]:.4g} … {after.interval[1]:.4g}" if after.interval[0] < after.interval[1] else ""
+        old = f"{before.value:.4g}" if before else ""
+        table.add_row(name, old, f"{after.value:.4g}", interval, after.unit)
+    return table
+
+
+def _errors(diagnosis: Diagnosis) -> Table:
+    table = _table(
+        "Error on drives that were not fitted, RMSE of position [mm] (heading [deg])",
+        ("window", "before", "after", "after / before", "noise floor"),
+    )
+    for error in diagnosis.errors:
+        table.add_row(
+            f"{error.horizon_s:g} s",
+            _millimetres(error.before.value, error.before.interval, error.heading_before.value),
+            _millimetres(error.after.value, error.after.interval, error.heading_after.value),
+            f"{error.ratio.value:.2f} ({error.ratio.interval[0]:.2f} … {error.ratio.interval[1]:.2f})",
+            f"{1e3 * error.noise_floor:.1f} ({57.2958 * error.heading_floor:.2f})",
+        )
+    return table
+
+
+def _millimetres(value: float, interval: tuple[float, float], heading: float) -> str:
+    return f"{1e3 * value:.1f} [{1e3 * interval[0]:.1f} … {1e3 * interval[1]:.1f}] ({57.2958 * heading:.2f})"
+
+
+def _candidates(diagnosis: Diagnosis) -> Table:
+    table = _table("Effects tried, best first", ("effect", "form", "evidence [nats]", "p"))
+    for tried in diagnosis.found.tried[:8]:
+        table.add_row(tried.effect, tried.form, f"{tried.gain:.1f}", f"{tried.p_value:.3f}")
+    return table
+
+
+def _table(title: str, columns: tuple[str, ...]) -> Table:
+    table = Table(title=escape(title), title_justify="left", title_style="bold", box=None, pad_edge=False)
+    for column in columns:
+        text = column in ("parameter", "unit", "window", "effect", "form")
+        table.add_column(escape(column), justify="left" if text else "right")
+    return table
+
+
+def _notes(diagnosis: Diagnosis) -> list[str]:
+    notes = []
+    for effect in diagnosis.effects:
+        rivals = ", ".join(rival.label for rival in effect.rivals)
+        beside = f"; these drives cannot tell it from {rivals}" if rivals else ""
+        form = f" ({effect.form})" if effect.form else ""
+        notes.append(f"added {effect.effect}{form}: {effect.gain:.0f} nats, p = {effect.p_value:.3f}{beside}")
+    if diagnosis.residual_depends_on:
+        notes.append(f"not explained by any named effect; it depends on: {', '.join(diagnosis.residual_depends_on)}")
+    if diagnosis.could_not_be_seen:
+        notes.append(f"could not have been seen in these drives: {', '.join(diagnosis.could_not_be_seen)}")
+    if diagnosis.manoeuvre is not None:
+        found = diagnosis.manoeuvre
+        apart = " from ".join(found.between)
+        notes.append(
+            f"to tell {apart}, drive {found.name} ({found.nats_per_minute:.0f} nats a minute): {found.description}"
+        )
+    return notes

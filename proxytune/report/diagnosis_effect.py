@@ -1,0 +1,163 @@
+"""The figure of the first effect that was added, or of the signal that no named effect accounts for."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from proxytune.diagnosis.diagnosis import Diagnosis
+from proxytune.diagnosis.drives import Drives, Floats
+from proxytune.diagnosis.flexible import Curve
+from proxytune.diagnosis.replay import RANDOM_EFFECTS, wheel_speeds
+from proxytune.driving.drivetrain import drivetrain
+from proxytune.effects import Setting, effects_from
+from proxytune.report.diagnosis_means import ANY, GROUPS, MOTIONS, draw_means, means_figure, rates_of, retuned
+from proxytune.report.diagnosis_style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
+from proxytune.space import Theta
+
+HELD_S = 5.0
+"""A command is held so long before the wheel speed counts as steady."""
+
+STEP_S, STEPS_S = 1.5, 3.0
+"""A step response is followed so long before the command is reversed, and altogether."""
+
+DRAWS = 40
+"""Step responses that are drawn of a random effect."""
+
+STATIC = (
+    "trim",
+    "dead_band",
+    "saturation",
+    "driver_map",
+    "stiction",
+    "wheel_gain",
+    "battery_sag",
+    "command_quantisation",
+)
+TRANSIENT = ("delay", "motor_lag", "backlash", *RANDOM_EFFECTS)
+
+
+def effect_curve(diagnosis: Diagnosis) -> Figure | None:
+    """Draw the first effect that was added, or the signal that explains more than any; nothing if there is neither.
+
+    Points are means of what was measured on the drives that were fitted, beyond what the declared model says.
+    """
+    found = diagnosis.found
+    if not found.adopted:
+        return (
+            means_figure(diagnosis, found.remainder[0], GROUPS[found.remainder[0].group.name])
+            if found.remainder
+            else None
+        )
+    first = found.adopted[0]
+    if first.effect in TRANSIENT:
+        return _steps_figure(diagnosis)
+    if first.effect in STATIC and first.form != "fade":
+        return _wheels_figure(diagnosis)
+    name, panels = MOTIONS[first.effect]
+    return means_figure(diagnosis, _curve(found.curves, name), panels)
+
+
+def _curve(curves: Sequence[Curve], name: str) -> Curve | None:
+    return next((curve for curve in curves if curve.group.name == name), None)
+
+
+def _wheels_figure(diagnosis: Diagnosis) -> Figure:
+    """Steady wheel speed against command above, what is added to the declared model beneath."""
+    found, drives = diagnosis.found, diagnosis.found.declared.drives
+    figure = Figure(figsize=(5.4, 4.2), layout="constrained")
+    panels = figure.subplots(2, 2, sharex="col", sharey="row")
+    curve = _curve(found.curves, "wheel command")
+    rates = rates_of(diagnosis, curve)
+    commands = np.linspace(float(drives.duties.min()), float(drives.duties.max()), 201)
+    declared, extended = (_steady(drives, theta, commands) for theta in (found.declared.theta, found.model.theta))
+    for column, side in enumerate(("left", "right")):
+        upper, lower = panels[:, column]
+        before = declared[:, column]
+        upper.plot(commands, before, color=VERMILLION, lw=1.2, label=BEFORE)
+        upper.plot(commands, extended[:, column], color=BLUE, lw=1.4, label=after(diagnosis))
+        if curve is not None and curve.gain > 0.0:
+            speeds, extra = _flexible(diagnosis, curve, column)
+            tuned = _steady(drives, retuned(found.declared, curve), commands)[:, column]
+            upper.plot(commands, tuned + np.interp(before, speeds, extra), "--", color=PURPLE, lw=1.2, label=ANY)
+        place = np.interp(rates.declared[side], before, commands)
+        draw_means(lower, rates, place, GROUPS["wheel command"][column])
+        dress(upper)
+        upper.set_title(f"{side} wheel", fontsize=8)
+        lower.set_xlabel("command [duty]", fontsize=8)
+        lower.set_ylabel("")
+    panels[0, 0].set_ylabel("steady speed [m/s]", fontsize=8)
+    panels[1, 0].set_ylabel("added speed on the drives [mm/s]", fontsize=8)
+    legend_below(figure, *panels.ravel())
+    return figure
+
+
+def _steady(drives: Drives, theta: Theta, commands: Floats) -> Floats:
+    """Wheel speeds (commands, 2) [m/s] that a model comes to from rest when both wheels get the same command."""
+    ticks = round(HELD_S * drives.tick_hz)
+    duties = np.broadcast_to(commands[:, None, None], (len(commands), ticks, 2))
+    return wheel_speeds(_driven(drives, duties), theta)[:, -1] * drives.robot.figures["full_speed"]
+
+
+def _driven(drives: Drives, duties: Floats) -> Drives:
+    """The same robot from rest under other commands (E, T, 2)."""
+    still = np.zeros((len(duties), 2))
+    return replace(drives, duties=duties, rest=still, headings=np.zeros(duties.shape[:2]), wheels=None)
+
+
+def _flexible(diagnosis: Diagnosis, curve: Curve, column: int) -> tuple[Floats, Floats]:
+    """The flexible wheel curve: speeds of the declared model in order and what is added to them, both [m/s]."""
+    drives, figures = diagnosis.found.declared.drives, diagnosis.robot.figures
+    speeds = wheel_speeds(drives, diagnosis.found.declared.theta)[..., column].ravel() * figures["full_speed"]
+    twists = curve.group.twists @ curve.weights
+    side = (-1.0, 1.0)[column] * figures["effective_baseline"] / 2.0
+    speeds, where = np.unique(speeds, return_index=True)
+    return speeds, (twists[..., 0] + side * twists[..., 2]).ravel()[where]
+
+
+def _steps_figure(diagnosis: Diagnosis) -> Figure:
+    """Wheel speed after a step of the command and, for backlash, after its reversal."""
+    found, drives = diagnosis.found, diagnosis.found.declared.drives
+    figure = Figure(figsize=(5.2, 2.8), layout="constrained")
+    axes = figure.subplots()
+    lasts = STEPS_S if any(one.effect == "backlash" for one in found.adopted) else STEP_S
+    times = np.arange(round(lasts * drives.tick_hz)) / drives.tick_hz
+    size = min(0.5, float(np.abs(drives.duties).max()))
+    duties = np.repeat(np.where(times < STEP_S, size, -size)[None, :, None], 2, axis=2)
+    column = int(found.adopted[0].form.startswith("right"))
+    full = drives.robot.figures["full_speed"]
+    axes.plot(times, duties[0, :, 0] * full, color=GREY, lw=0.8, ls=":", label="command")
+    before, later = (found.declared.theta, VERMILLION, BEFORE), (found.model.theta, BLUE, after(diagnosis))
+    for theta, colour, name in (before, later):
+        draws = full * _responses(_driven(drives, duties), theta)[..., column]
+        _draw_responses(axes, times, draws, colour, name)
+    axes.set_xlabel("time since the command [s]", fontsize=8)
+    axes.set_ylabel(f"speed of the {('left', 'right')[column]} wheel [m/s]", fontsize=8)
+    dress(axes)
+    legend_below(figure, axes)
+    return figure
+
+
+def _draw_responses(axes: Axes, times: Floats, draws: Floats, colour: str, name: str) -> None:
+    """The median, and single draws where there are several."""
+    if len(draws) > 1:
+        axes.plot(times, draws.T, color=colour, lw=0.4, alpha=0.4)
+        name += " (thin: single draws)"
+    axes.plot(times, np.median(draws, axis=0), color=colour, lw=1.4, label=name)
+
+
+def _responses(drives: Drives, theta: Theta) -> Floats:
+    """Wheel speeds (draws, T, 2) as fractions of full speed: one draw unless the model has a random effect."""
+    if not any(theta.get(name, 0.0) > 0.0 for name in RANDOM_EFFECTS):
+        return wheel_speeds(drives, theta)
+    robot = drives.robot
+    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
+    nominal = {**robot.figures, "control_rate": drives.rate_hz}
+    draws = []
+    for seed in range(DRAWS):
+        memory = train.begin(Setting(drives.tick_hz, drives.rest, nominal, seed=seed, headings=drives.headings))
+        arrived, _ = train.command.apply(drives.duties, memory.command)
+        draws.append(train.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)[0][0])
+    return np.stack(draws)

@@ -1,0 +1,107 @@
+"""Dead band, stiction and backlash against what they should do by hand."""
+
+import numpy as np
+import pytest
+
+from proxytune.effects import Setting
+from proxytune.effects.friction import Backlash, DeadBand, Stiction
+
+NOMINAL = {"full_speed": 0.6, "wheel_radius": 0.03}
+FULL_RAD_S = 20.0
+RATE_HZ = 10.0
+
+
+def run(effect, left, right=None, rest=0.0):
+    signal = np.stack((left, left if right is None else right), axis=-1).astype(float)
+    memory = effect.begin(Setting(RATE_HZ, np.full(2, rest), NOMINAL))
+    return effect.apply(signal, memory)[0]
+
+
+def test_a_dead_band_swallows_small_duties_and_shortens_larger_ones():
+    duties = [0.0, 0.05, 0.1, 0.3, -0.05, -0.1, -1.0]
+    np.testing.assert_allclose(run(DeadBand(0.1, 0.0), duties)[:, 0], [0, 0, 0, 0.2, 0, 0, -0.9], atol=1e-12)
+
+
+def test_a_dead_band_of_one_wheel_is_its_share():
+    np.testing.assert_allclose(run(DeadBand(0.1, -0.5), [0.5]), [[0.35, 0.45]])
+
+
+@pytest.mark.parametrize(
+    ("duties", "expected"),
+    [
+        ([0.1, 0.19, 0.2, 0.19, 0.1, 0.09, 0.19], [0, 0, 0.2, 0.19, 0.1, 0, 0]),  # starts at 0.2, stops below 0.1
+        ([0.3, -0.15, -0.15, 0.15], [0.3, 0, 0, 0]),  # reversed below breakaway: rests until broken away
+        ([0.3, -0.25, -0.15, -0.05], [0.3, -0.25, -0.15, 0]),  # reversed at breakaway: goes on
+        ([-0.2, -0.1, -0.09], [-0.2, -0.1, 0]),
+        ([0.15, 0.0, 0.15], [0, 0, 0]),
+    ],
+)
+def test_a_resting_wheel_breaks_away_and_a_moving_one_goes_on_to_half_of_it(duties, expected):
+    np.testing.assert_array_equal(run(Stiction(0.2, 0.0), duties)[:, 0], expected)
+
+
+def test_stiction_of_one_wheel_leaves_the_other_free():
+    np.testing.assert_array_equal(run(Stiction(0.2, 1.0), [0.1, 0.39, 0.4]), [[0.1, 0.0], [0.39, 0.0], [0.4, 0.4]])
+
+
+@pytest.mark.parametrize(("rest", "first"), [(0.3, 0.15), (0.12, 0.15), (-0.3, 0.0), (0.05, 0.0)])
+def test_a_wheel_that_turned_before_the_start_goes_on(rest, first):
+    assert run(Stiction(0.2, 0.0), [0.15], rest=rest)[0, 0] == first
+
+
+def schmitt(duties, breakaway):
+    moving, before, out = False, 0.0, []
+    for duty in duties:
+        if abs(duty) >= breakaway:
+            moving = True
+        elif abs(duty) < breakaway / 2 or duty * before < 0:
+            moving = False
+        out.append(duty if moving else 0.0)
+        before = duty
+    return out
+
+
+def test_stiction_is_the_trigger_written_as_a_loop():
+    duties = np.repeat(np.random.default_rng(3).normal(0.0, 0.3, (400, 2)), 2, axis=0)
+    expected = np.stack([schmitt(duties[:, side], width) for side, width in ((0, 0.12), (1, 0.36))], axis=-1)
+    np.testing.assert_array_equal(run(Stiction(0.24, 0.5), *duties.T), expected)
+
+
+def test_a_gear_turns_half_its_gap_before_the_wheel_starts_and_all_of_it_when_it_reverses():
+    # 0.05 of full speed for 0.1 s is 0.1 rad
+    duties = np.array([0.05] * 4 + [-0.05] * 6)
+    turned = run(Backlash(0.4, 0.0), duties)[:, 0].cumsum() * FULL_RAD_S / RATE_HZ
+    np.testing.assert_allclose(turned, [0, 0, 0.1, 0.2, 0.2, 0.2, 0.2, 0.2, 0.1, 0.0], atol=1e-12)
+
+
+def test_the_play_may_end_within_a_sample():
+    turned = run(Backlash(0.5, 0.0), [0.05] * 4)[:, 0].cumsum() * FULL_RAD_S / RATE_HZ
+    np.testing.assert_allclose(turned, [0, 0, 0.05, 0.15], atol=1e-12)
+
+
+def test_a_gap_of_one_wheel_is_its_share():
+    turned = run(Backlash(0.2, 1.0), [0.05] * 4).cumsum(axis=0) * FULL_RAD_S / RATE_HZ
+    np.testing.assert_allclose(turned, [[0.1, 0], [0.2, 0], [0.3, 0.1], [0.4, 0.2]], atol=1e-12)
+
+
+def test_to_and_fro_within_the_play_moves_nothing():
+    moved = run(Backlash(0.4, 0.0), [0.05, 0.04, -0.1, -0.05, 0.1, 0.02])
+    np.testing.assert_allclose(moved, 0.0, atol=1e-15)
+
+
+def play(speeds, gap):
+    gear = wheel = 0.0
+    out = []
+    for speed in speeds * FULL_RAD_S / RATE_HZ:
+        gear += speed
+        after = min(max(wheel, gear - gap / 2), gear + gap / 2)
+        out.append((after - wheel) * RATE_HZ / FULL_RAD_S)
+        wheel = after
+    return out
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 63, 64, 65, 500])
+def test_backlash_is_the_play_operator_written_as_a_loop(length):
+    speeds = np.random.default_rng(length).normal(0.02, 0.2, (length, 2))
+    expected = np.stack([play(speeds[:, side], gap) for side, gap in ((0, 0.9), (1, 0.3))], axis=-1)
+    np.testing.assert_allclose(run(Backlash(0.6, -0.5), *speeds.T), expected, atol=1e-12)

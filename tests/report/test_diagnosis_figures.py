@@ -1,0 +1,302 @@
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+import hidden
+
+from proxytune.diagnosis.candidates import MOTION_EFFECTS, candidates
+from proxytune.diagnosis.diagnosis import diagnose
+from proxytune.diagnosis.replay import RANDOM_EFFECTS, increments
+from proxytune.diagnosis.search import LEAST_GAIN, Adopted
+from proxytune.diagnosis.signals import signal_groups
+from proxytune.diagnosis.windows import cut, strays
+from proxytune.driving.robot import read_robot
+from proxytune.effects import theta_names
+from proxytune.effects.catalogue import CATALOGUE
+from proxytune.report.diagnosis_effect import STATIC, TRANSIENT, effect_curve
+from proxytune.report.diagnosis_figures import SHOWN, diagnosis_figures
+from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, MOTIONS
+from proxytune.report.diagnosis_residual import MANY_WINDOWS, residual_map, residual_over_time, strayed
+from proxytune.report.diagnosis_style import BEFORE
+
+WIDTH = 0.12
+AFTER = "with dead band"
+
+
+@pytest.fixture(scope="module")
+def diagnosis():
+    case = next(case for case in hidden.IN_FORM if case.effects == (("dead_band", {"width": WIDTH}),))
+    found = diagnose(hidden.make_log(case, episodes=6, seconds=20.0), read_robot("duckiebot"), ("trim", "delay"))
+    assert [effect.effect for effect in found.effects] == ["dead_band"]
+    return found
+
+
+@pytest.fixture(scope="module")
+def clean(diagnosis):
+    return without_effects(diagnosis)
+
+
+@pytest.fixture(scope="module")
+def figures(diagnosis):
+    return diagnosis_figures(diagnosis)
+
+
+def without_effects(diagnosis, remainder=()):
+    """The same drives, as if nothing had been added, and these signals were left over."""
+    found = replace(diagnosis.found, model=diagnosis.found.declared, adopted=(), remainder=remainder)
+    return replace(diagnosis, effects=(), found=found)
+
+
+def with_effect(diagnosis, effect, form, theta):
+    """The same drives, as if this effect had been added instead."""
+    adopted = (Adopted(effect, form, tuple(theta), (), 100.0, 0.001, (), None),)
+    model = replace(diagnosis.found.declared, theta={**diagnosis.found.declared.theta, **theta})
+    return replace(diagnosis, effects=adopted, found=replace(diagnosis.found, model=model, adopted=adopted))
+
+
+def line(axes, label):
+    return next(line for line in axes.get_lines() if line.get_label() == label)
+
+
+def values(axes, label):
+    drawn = line(axes, label)
+    return np.asarray(drawn.get_xdata()), np.asarray(drawn.get_ydata())
+
+
+def test_every_figure_is_drawn_without_a_warning(diagnosis):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figures = diagnosis_figures(diagnosis)
+        for figure in figures.values():
+            figure.draw_without_rendering()
+    assert set(figures) == {"residual_over_time", "residual_map", "ranking", "effect_curve", "error"}
+
+
+def test_figures_are_made_for_a_column(figures):
+    assert all(3.4 <= figure.get_figwidth() <= 9.0 for figure in figures.values())
+
+
+def test_the_legend_lies_within_its_figure(figures):
+    for figure in figures.values():
+        figure.draw_without_rendering()
+        for legend in figure.legends:
+            box = legend.get_window_extent()
+            assert box.x0 >= 0
+            assert box.x1 <= figure.bbox.x1
+
+
+def test_axes_say_what_they_show_in_which_unit(figures):
+    labels = {name: [(a.get_xlabel(), a.get_ylabel()) for a in figure.axes] for name, figure in figures.items()}
+    assert labels["residual_over_time"] == [("time in the episode [s]", "distance to prediction\nin 2-s windows [mm]")]
+    assert labels["residual_map"][-1][1] == "distance to prediction\nin 2-s windows [mm]"
+    assert "[nats]" in labels["ranking"][1][0]
+    assert [y for _, y in labels["error"]] == ["error of position, RMS [mm]", "error of heading, RMS [deg]"]
+    assert all(x == "length of the prediction [s]" for x, _ in labels["error"])
+    assert [y for _, y in labels["effect_curve"]][::2] == ["steady speed [m/s]", "added speed on the drives [mm/s]"]
+    assert [x for x, _ in labels["effect_curve"]][2:] == ["command [duty]"] * 2
+
+
+def test_the_error_figure_holds_the_errors_in_millimetres_and_degrees(diagnosis, figures):
+    place, heading = figures["error"].axes
+    for axes, factor, kinds in (
+        (place, 1e3, ("before", "after")),
+        (heading, 180.0 / np.pi, ("heading_before", "heading_after")),
+    ):
+        for container, kind in zip(axes.containers, kinds, strict=True):
+            told = [getattr(error, kind) for error in diagnosis.errors]
+            points, _, (bars,) = container
+            assert points.get_ydata() == pytest.approx([factor * one.value for one in told])
+            ends = [sorted(segment[:, 1]) for segment in bars.get_segments()]
+            assert np.ravel(ends) == pytest.approx(factor * np.ravel([one.interval for one in told]))
+    floors = [segment[0, 1] for segment in place.collections[-1].get_segments()]
+    assert floors == pytest.approx([1e3 * error.noise_floor for error in diagnosis.errors])
+
+
+def test_an_interval_without_end_is_not_drawn(diagnosis):
+    endless = [replace(e, before=e.before._replace(interval=(0.0, np.inf))) for e in diagnosis.errors]
+    figure = diagnosis_figures(replace(diagnosis, errors=tuple(endless)))["error"]
+    _, _, (bars,) = figure.axes[0].containers[0]
+    assert all(np.ptp(segment[:, 1]) == 0.0 for segment in bars.get_segments())
+
+
+def test_residuals_over_time_are_the_root_mean_squares_of_the_windows(diagnosis, figures):
+    drives = diagnosis.parts.tested
+    windows = cut(drives, 2.0)
+    squares = strays(drives, diagnosis.found.model.theta, windows)[:, 0] ** 2
+    expected = 1e3 * np.sqrt([squares[windows.window == w].mean() for w in range(len(windows.begin))])
+    (axes,) = figures["residual_over_time"].axes
+    drawn = [one.get_ydata() for one in axes.get_lines() if one.get_color() == line(axes, AFTER).get_color()]
+    assert np.concatenate(drawn) == pytest.approx(expected)
+
+
+def test_many_episodes_become_a_median_with_a_band(diagnosis):
+    drives, both = (
+        diagnosis.parts.fitted,
+        strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=diagnosis.parts.fitted))),
+    )
+    (axes,) = residual_over_time(drives, both).axes
+    _, middle = values(axes, BEFORE)
+    first = np.unique(both[BEFORE].window, return_index=True)[1]
+    start = drives.first[both[BEFORE].increment[first]] / drives.tick_hz
+    assert middle[0] == pytest.approx(np.median(both[BEFORE].rms[start < 1.0]))
+    bands = [band for band in axes.collections if len(band.get_paths()[0].vertices) > 3]
+    assert len(bands) == 2
+
+
+def test_the_maps_share_one_scale_and_equal_axes(diagnosis, figures):
+    before, after, _ = figures["residual_map"].axes
+    one, other = before.collections[0], after.collections[0]
+    assert one.norm is other.norm
+    assert before.get_aspect() == after.get_aspect() == 1.0
+    assert (before.get_title(), after.get_title()) == (BEFORE, AFTER)
+    both = strayed(diagnosis)
+    assert list(one.get_array()) == pytest.approx(both[BEFORE].rms)
+    assert list(other.get_array()) == pytest.approx(both[AFTER].rms)
+
+
+def test_a_path_on_the_map_is_where_the_window_was_measured(diagnosis, figures):
+    drives = diagnosis.parts.tested
+    windows = cut(drives, 2.0)
+    path = figures["residual_map"].axes[0].collections[0].get_segments()[3]
+    rows = windows.increment[windows.window == 3]
+    assert path[0] == pytest.approx(drives.poses[windows.begin[3], 0, :2])
+    assert path[1:] == pytest.approx(drives.poses[rows, 1, :2])
+
+
+def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monkeypatch):
+    monkeypatch.setattr("proxytune.report.diagnosis_residual.MANY_WINDOWS", 3)
+    both = {BEFORE: strayed(diagnosis)[BEFORE]}
+    mesh = residual_map(diagnosis.parts.tested, both).axes[0].collections[0]
+    shown = mesh.get_array().compressed()
+    assert 0 < len(shown) <= len(both[BEFORE].increment)
+    assert both[BEFORE].rms.min() <= shown.min() <= shown.max() <= both[BEFORE].rms.max()
+    assert MANY_WINDOWS > 3
+
+
+def test_the_ranking_holds_every_gain_best_first(diagnosis, figures):
+    upper, lower = figures["ranking"].axes
+    for axes, gains in (
+        (upper, [tried.gain for tried in diagnosis.found.tried[:SHOWN]]),
+        (lower, [curve.gain for curve in diagnosis.found.curves[:6]]),
+    ):
+        dots = [one for one in axes.get_lines() if one.get_marker() == "o"]
+        assert [float(one.get_xdata()[0]) for one in dots] == gains
+        assert [float(one.get_ydata()[0]) for one in dots] == list(range(len(gains)))
+        low, high = axes.get_xlim()
+        assert low <= min(gains) <= max(gains) <= high
+    assert upper.get_yticklabels()[0].get_text() == "dead band"
+    assert [one.get_label() for one in upper.get_lines() if one.get_marker() == "o"].count("adopted") == 1
+    threshold = [one for one in upper.get_lines() if one.get_linestyle() == ":"]
+    assert list(threshold[0].get_xdata()) == [LEAST_GAIN, LEAST_GAIN]
+
+
+def test_rivals_are_marked_in_the_ranking(diagnosis):
+    rival = next(
+        c for c in candidates(diagnosis.robot.figures, diagnosis.found.declared.theta, ()) if c.effect == "stiction"
+    )
+    adopted = (replace(diagnosis.found.adopted[0], rivals=(rival,)),)
+    figure = diagnosis_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
+    upper = figure.axes[0]
+    dots = [one for one in upper.get_lines() if one.get_marker() == "o"]
+    names = [tick.get_text() for tick in upper.get_yticklabels()]
+    marked = {name.split(" (")[0] for name, dot in zip(names, dots, strict=True) if dot.get_label().startswith("rival")}
+    assert marked == {"stiction"}
+
+
+def test_the_effect_curve_shows_the_dead_band_that_was_fitted(diagnosis, figures):
+    upper = figures["effect_curve"].axes[0]
+    commands, speeds = values(upper, AFTER)
+    width = diagnosis.theta["dead_band.width"].value
+    assert width == pytest.approx(WIDTH, rel=0.1)
+    still = commands[np.abs(speeds) < 1e-9]
+    assert np.abs(still).max() == pytest.approx(width, abs=0.015)
+    trim = diagnosis.declared["trim"].value
+    commands, speeds = values(upper, BEFORE)
+    assert speeds == pytest.approx(commands * 0.6 * (1.0 - trim), abs=1e-6)
+
+
+def test_the_curve_over_the_signal_and_the_measured_means_agree_with_the_effect(figures):
+    lower = figures["effect_curve"].axes[2]
+    _, effect = values(lower, AFTER)
+    for label in (MEASURED, ANY):
+        _, other = values(lower, label)
+        assert np.abs(other - effect).max() < 0.35 * np.ptp(effect), label
+
+
+def test_measured_means_weigh_every_increment_once(diagnosis):
+    slip = with_effect(diagnosis, "yaw_scrub", "", {"yaw_scrub": 0.2})
+    (axes,) = effect_curve(slip).axes
+    places, means = values(axes, MEASURED)
+    drives = diagnosis.found.declared.drives
+    extra = (drives.measured - increments(drives, diagnosis.found.declared.theta))[:, 2]
+    rates = np.degrees(extra * drives.tick_hz / (drives.last - drives.first))
+    assert len(places) == 20
+    assert means.mean() == pytest.approx(rates.mean(), abs=0.05 * np.abs(means).max())
+
+
+def test_every_motion_effect_has_a_curve():
+    assert set(MOTION_EFFECTS) == {*STATIC, *TRANSIENT, *MOTIONS}
+    assert all(name in GROUPS for name, _ in MOTIONS.values())
+
+
+FORMS = [
+    candidate for candidate in candidates(read_robot("duckiebot").figures, {}, ("trim", "delay")) if candidate.probes
+]
+
+
+@pytest.mark.parametrize("candidate", FORMS, ids=lambda candidate: candidate.label)
+def test_each_form_of_an_effect_bends_its_curve(diagnosis, candidate):
+    theta = dict(candidate.fixed)
+    for coordinate, probe in zip(candidate.free, candidate.probes[-2], strict=True):
+        theta |= dict.fromkeys(coordinate, probe)
+    figure = effect_curve(with_effect(diagnosis, candidate.effect, candidate.form, theta))
+    figure.draw_without_rendering()
+    label = f"with {candidate.effect.replace('_', ' ')}"
+    bent = 0.0
+    for axes in figure.axes:
+        flat = (
+            np.zeros_like(values(axes, label)[1])
+            if len(line(axes, BEFORE).get_ydata()) == 2
+            else values(axes, BEFORE)[1]
+        )
+        bent = max(bent, float(np.abs(values(axes, label)[1] - flat).max()))
+    assert bent > 1e-3
+
+
+@pytest.mark.parametrize("effect", RANDOM_EFFECTS)
+def test_a_random_effect_shows_single_draws_that_differ(diagnosis, effect):
+    (name,) = theta_names(CATALOGUE[effect])
+    figure = effect_curve(with_effect(diagnosis, effect, "", {name: 0.3}))
+    thin = [one.get_ydata() for one in figure.axes[0].get_lines() if one.get_linewidth() < 0.5]
+    assert len(thin) > 10
+    assert max(np.abs(one - thin[0]).max() for one in thin) > 0.01
+
+
+def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
+    figures = diagnosis_figures(clean)
+    assert "effect_curve" not in figures
+    assert len(figures["error"].axes[0].containers) == 1
+    assert len(figures["residual_map"].axes) == 2
+    assert {one.get_color() for one in figures["residual_over_time"].axes[0].get_lines()} == {"#D55E00"}
+
+
+def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnosis):
+    names = {group.name for group in signal_groups(diagnosis.found.declared)}
+    assert names <= set(GROUPS)
+    for curve in diagnosis.found.curves:
+        figure = effect_curve(without_effects(diagnosis, (curve,)))
+        figure.draw_without_rendering()
+        for axes, panel in zip(figure.axes, GROUPS[curve.group.name], strict=True):
+            assert axes.get_xlabel() == panel.label
+            assert np.isfinite(values(axes, ANY)[1]).all()
+            assert {one.get_label() for one in axes.get_lines()} == {BEFORE, MEASURED, ANY}
+
+
+def test_without_a_candidate_there_is_no_ranking(diagnosis):
+    assert "ranking" not in diagnosis_figures(replace(diagnosis, found=replace(diagnosis.found, tried=())))

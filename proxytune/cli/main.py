@@ -9,7 +9,7 @@ from types import ModuleType
 
 from rich.console import Console
 
-from proxytune.cli import diagnose, listing, measure, plot, predict, score, study, sweep
+from proxytune.cli import diagnose, listing, measure, plot, predict, record, score, study, sweep
 from proxytune.errors import InputError, ProxytuneError
 
 COMMANDS: dict[str, tuple[ModuleType, str]] = {
@@ -17,6 +17,7 @@ COMMANDS: dict[str, tuple[ModuleType, str]] = {
     "score": (score, "usefulness of proxies from tables of scores"),
     "sweep": (sweep, "usefulness along one parameter"),
     "measure": (measure, "score a study's agents in the domain of a model file"),
+    "record": (record, "drive a model file through manoeuvres and write the log"),
     "diagnose": (diagnose, "close the loop: from measured drives to the effect that the model lacks"),
     "predict": (predict, "what a fitted model says of any log"),
     "plot": (plot, "draw a study's figures again"),

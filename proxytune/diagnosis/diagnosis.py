@@ -1,11 +1,12 @@
 """From a log to a verdict: what the declared model leaves over, which effect explains it, and what that is worth."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS
+from proxytune.diagnosis.confirmation import bullet_strays, has_body
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit, intervals, seen
 from proxytune.diagnosis.innovations import Noise
@@ -14,15 +15,19 @@ from proxytune.diagnosis.plausible import check_clocks, check_motion
 from proxytune.diagnosis.search import Adopted, Found, Told, search
 from proxytune.diagnosis.split import Parts, split
 from proxytune.diagnosis.visibility import unseen
-from proxytune.diagnosis.windows import Rmse, cut, floor, ratio, rmse, strays
+from proxytune.diagnosis.windows import Rmse, Windows, cut, floor, ratio, rmse, strays
 from proxytune.driving.robot import Robot
 from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, theta_names
 from proxytune.errors import LogError
 from proxytune.logs import Log
 from proxytune.settings import nearest
+from proxytune.space import Theta
 
 HORIZONS_S = (1.0, 2.0, 5.0)
 """Horizons at which the error is told."""
+
+CONFIRMED_S = 2.0
+"""The horizon at which it is confirmed on the bullet plant."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,8 @@ class Diagnosis:
         theta: All parameters of the extended model, by name in θ.
         effects: The effects that were added.
         residual_depends_on: Signals that explain what no named effect does.
-        errors: By horizon, shortest first.
+        errors: On the planar plant, by horizon, shortest first.
+        confirmed: The error over 2 s on the bullet plant, None where the robot has no body for it.
         could_not_be_seen: Effects that these drives could not have shown.
         manoeuvre: What to drive to tell rivals apart, or None.
         parts: The drives that were fitted and tested.
@@ -95,6 +101,7 @@ class Diagnosis:
     effects: tuple[Adopted, ...]
     residual_depends_on: tuple[str, ...]
     errors: tuple[HorizonError, ...]
+    confirmed: HorizonError | None
     could_not_be_seen: tuple[str, ...]
     manoeuvre: Manoeuvre | None
     parts: Parts
@@ -148,6 +155,7 @@ def diagnose(
         effects=found.adopted,
         residual_depends_on=tuple(curve.group.name for curve in found.remainder),
         errors=errors,
+        confirmed=_confirmed(found, parts.tested, seed, told),
         could_not_be_seen=unseen(found.model, _names(names) | {effect.effect for effect in found.adopted}),
         manoeuvre=next_manoeuvre(found),
         parts=parts,
@@ -196,12 +204,23 @@ def _verdict(found: Found) -> str:
     return "explained" if found.adopted else "nothing missing"
 
 
-def _error(found: Found, drives: Drives, horizon_s: float, seed: int) -> HorizonError | None:
+def _confirmed(found: Found, drives: Drives, seed: int, told: Told) -> HorizonError | None:
+    if not has_body(drives):
+        return None
+    told("confirming on the bullet plant")
+    return _error(found, drives, CONFIRMED_S, seed, bullet_strays)
+
+
+Strays = Callable[[Drives, Theta, Windows], Floats]
+"""How far a model's poses are from measured ones (M, 2): [m], [rad]."""
+
+
+def _error(found: Found, drives: Drives, horizon_s: float, seed: int, how: Strays = strays) -> HorizonError | None:
     windows = cut(drives, horizon_s)
     if len(windows.begin) < 2:
         return None
     blocks = drives.block[windows.begin][windows.window]
-    before, after = (strays(drives, fitted.theta, windows) ** 2 for fitted in (found.declared, found.model))
+    before, after = (how(drives, fitted.theta, windows) ** 2 for fitted in (found.declared, found.model))
     place, turn = floor(seen(drives, found.model.theta, (), found.model.noise), windows, seed)
     return HorizonError(
         horizon_s=horizon_s,

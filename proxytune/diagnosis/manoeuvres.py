@@ -8,7 +8,7 @@ import numpy as np
 from proxytune.diagnosis.candidates import Candidate
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit, seen
-from proxytune.diagnosis.search import Adopted, Found
+from proxytune.diagnosis.search import NATS_APART, Adopted, Found
 from proxytune.diagnosis.visibility import trace_of
 
 SECONDS = 60.0
@@ -89,12 +89,13 @@ LIBRARY: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
 
 
 def next_manoeuvre(found: Found) -> Manoeuvre | None:
-    """The manoeuvre that tells the adopted effect with a rival from that rival best, None where there are no rivals."""
+    """The manoeuvre that tells the adopted effect with a rival from that rival best, None where nothing would."""
     pairs = [(effect, rival) for effect in found.adopted for rival in effect.rivals]
     if not pairs:
         return None
     offers = [_offer(found.model, name, text, shape, *pairs[0]) for name, text, shape in LIBRARY]
-    return max(offers, key=lambda offer: offer.nats_per_minute)
+    best = max(offers, key=lambda offer: offer.nats_per_minute)
+    return best if best.nats_per_minute > NATS_APART else None
 
 
 def _offer(

@@ -40,9 +40,18 @@ def paths(drives: Drives, theta: Theta) -> Floats:
     Raises:
         SettingsError: If a value is out of its parameter's bounds.
     """
-    train, measurement = _model(drives, theta)
-    twists, _ = train.apply(drives.duties, train.begin(_setting(drives)))
-    return _seen(drives, twists, measurement)
+    return _seen(drives, twists_of(drives, theta), _model(drives, theta)[1])
+
+
+def twists_of(drives: Drives, theta: Theta) -> Floats:
+    """The motion that a model asks of the plant, tick by tick (E, T, 3): [m/s], [m/s], [rad/s]."""
+    train, _ = _model(drives, theta)
+    return np.asarray(train.apply(drives.duties, train.begin(_setting(drives)))[0])
+
+
+def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
+    """Poses after each tick (E, T, 3) from the origin on, as a model's tracker sees them (E, T + 1, 3)."""
+    return _tracked(drives, poses, _model(drives, theta)[1])
 
 
 def increments(drives: Drives, theta: Theta) -> Floats:
@@ -57,9 +66,7 @@ def between(drives: Drives, walked: Floats) -> Floats:
 
 def disturbed(drives: Drives, theta: Theta, extra: Floats) -> Floats:
     """The increments when something adds to the twist of every tick (E, T, 3)."""
-    train, measurement = _model(drives, theta)
-    twists, _ = train.apply(drives.duties, train.begin(_setting(drives)))
-    return between(drives, _seen(drives, twists + extra, measurement))
+    return between(drives, _seen(drives, twists_of(drives, theta) + extra, _model(drives, theta)[1]))
 
 
 def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
@@ -116,8 +123,12 @@ def _setting(drives: Drives) -> Setting:
 
 
 def _seen(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
-    start = np.zeros((len(twists), 1, 3))
-    walked = np.concatenate((start, integrate(start[:, 0], twists, 1.0 / drives.tick_hz)), axis=1)
+    return _tracked(drives, integrate(np.zeros((len(twists), 3)), twists, 1.0 / drives.tick_hz), measurement)
+
+
+def _tracked(drives: Drives, poses: Floats, measurement: Chain) -> Floats:
+    start = np.zeros((len(poses), 1, 3))
+    walked = np.concatenate((start, poses), axis=1)
     if not measurement.effects:
         return walked
     rest = replace(_setting(drives), rest=start[:, 0])

@@ -57,6 +57,16 @@ def strays(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     return _apart(predicted, measured)
 
 
+def strays_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
+    """The same for paths that were driven in one go (E, T + 1, 3)."""
+    begin = windows.begin[windows.window]
+    predicted = relative(
+        walked[drives.episode[begin], drives.first[begin]],
+        walked[drives.episode[windows.increment], drives.last[windows.increment]],
+    )
+    return _apart(predicted, relative(drives.poses[begin, 0], drives.poses[windows.increment, 1]))
+
+
 def _apart(one: Floats, other: Floats) -> Floats:
     difference = one - other
     return np.stack((np.hypot(difference[:, 0], difference[:, 1]), np.abs(difference[:, 2])), axis=1)

@@ -154,14 +154,15 @@ class LaneFollowing:
 
     def _drive(self, episode: Episode, agent: Agent, course: Course) -> Drive:
         instance = self.instance(dict(episode.theta))
-        with self._plant(instance.robot, course.start) as plant:
+        with self.plant_at(instance.robot, course.start) as plant:
             return drive(instance, plant, agent, course)
 
     def instance(self, theta: Theta) -> Instance:
         """The domain instance S_θ: nominal effects, then the family's, then θ."""
         return _instance(self, tuple(sorted(theta.items())))
 
-    def _plant(self, robot: Robot, start: Signal) -> Plant:
+    def plant_at(self, robot: Robot, start: Signal) -> Plant:
+        """The plant with the robot at a starting pose."""
         return BulletPlant(robot, start, 1.0 / TICK_HZ) if self.plant == "bullet" else PlanarPlant(start, 1.0 / TICK_HZ)
 
 

@@ -18,10 +18,10 @@ from proxytune.settings import nearest
 from proxytune.space import Parameter, Theta
 
 _ALL: tuple[type[Effect], ...] = (
-    Delay,
     DelayJitter,
     DroppedCommands,
     CommandQuantisation,
+    Delay,
     DriverMap,
     DeadBand,
     Stiction,

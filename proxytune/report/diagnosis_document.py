@@ -42,6 +42,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "residual_depends_on": list(diagnosis.residual_depends_on),
         "error": _error(_main_error(diagnosis)),
         "errors": [_error(error) for error in diagnosis.errors],
+        "error_on_bullet": _error(diagnosis.confirmed) if diagnosis.confirmed else None,
         "noise": {"drive": list(diagnosis.noise.drive), "pose": list(diagnosis.noise.pose)},
         "could_not_be_seen": list(diagnosis.could_not_be_seen),
         "next_manoeuvre": _manoeuvre(diagnosis),
@@ -128,6 +129,8 @@ def _parameters(diagnosis: Diagnosis) -> Table:
         "Parameters, fitted", ("parameter", "declared alone", "with what was found", "95 % interval", "unit")
     )
     for name, after in diagnosis.theta.items():
+        if name.endswith(".imbalance") and after.value == 0.0:
+            continue
         before = diagnosis.declared.get(name)
         interval = f"{after.interval[0]:.4g} … {after.interval[1]:.4g}" if after.interval[0] < after.interval[1] else ""
         old = f"{before.value:.4g}" if before else ""
@@ -140,9 +143,10 @@ def _errors(diagnosis: Diagnosis) -> Table:
         "Error on drives that were not fitted, RMSE of position [mm] (heading [deg])",
         ("window", "before", "after", "after / before", "noise floor"),
     )
-    for error in diagnosis.errors:
+    confirmed = [(diagnosis.confirmed, ", bullet")] if diagnosis.confirmed else []
+    for error, plant in [*((error, "") for error in diagnosis.errors), *confirmed]:
         table.add_row(
-            f"{error.horizon_s:g} s",
+            f"{error.horizon_s:g} s{plant}",
             _millimetres(error.before.value, error.before.interval, error.heading_before.value),
             _millimetres(error.after.value, error.after.interval, error.heading_after.value),
             f"{error.ratio.value:.2f} ({error.ratio.interval[0]:.2f} … {error.ratio.interval[1]:.2f})",
@@ -177,6 +181,9 @@ def _notes(diagnosis: Diagnosis) -> list[str]:
         beside = f"; these drives cannot tell it from {rivals}" if rivals else ""
         form = f" ({effect.form})" if effect.form else ""
         notes.append(f"added {effect.effect}{form}: {effect.gain:.0f} nats, p = {effect.p_value:.3f}{beside}")
+    worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
+    if worse:
+        notes.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; look at the heading")
     if diagnosis.residual_depends_on:
         notes.append(f"not explained by any named effect; it depends on: {', '.join(diagnosis.residual_depends_on)}")
     if diagnosis.could_not_be_seen:

@@ -1,6 +1,6 @@
 """The figure of the first effect that was added, or of the signal that no named effect accounts for."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +19,9 @@ from proxytune.space import Theta
 
 HELD_S = 5.0
 """A command is held so long before the wheel speed counts as steady."""
+
+COMMANDS = 201
+"""So many commands along a curve of steady speeds."""
 
 STEP_S, STEPS_S = 1.5, 3.0
 """A step response is followed so long before the command is reversed, and altogether."""
@@ -46,11 +49,8 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
     """
     found = diagnosis.found
     if not found.adopted:
-        return (
-            means_figure(diagnosis, found.remainder[0], GROUPS[found.remainder[0].group.name])
-            if found.remainder
-            else None
-        )
+        best = next(iter(found.remainder), None)
+        return None if best is None else means_figure(diagnosis, best, GROUPS[best.group.name])
     first = found.adopted[0]
     if first.effect in TRANSIENT:
         return _steps_figure(diagnosis)
@@ -66,32 +66,42 @@ def _curve(curves: Sequence[Curve], name: str) -> Curve | None:
 
 def _wheels_figure(diagnosis: Diagnosis) -> Figure:
     """Steady wheel speed against command above, what is added to the declared model beneath."""
-    found, drives = diagnosis.found, diagnosis.found.declared.drives
+    drives = diagnosis.found.declared.drives
     figure = Figure(figsize=(5.4, 4.2), layout="constrained")
     panels = figure.subplots(2, 2, sharex="col", sharey="row")
-    curve = _curve(found.curves, "wheel command")
-    rates = rates_of(diagnosis, curve)
-    commands = np.linspace(float(drives.duties.min()), float(drives.duties.max()), 201)
-    declared, extended = (_steady(drives, theta, commands) for theta in (found.declared.theta, found.model.theta))
+    rates = rates_of(diagnosis, _curve(diagnosis.found.curves, "wheel command"))
+    commands = np.linspace(float(drives.duties.min()), float(drives.duties.max()), COMMANDS)
+    models = _steady_models(diagnosis, commands)
     for column, side in enumerate(("left", "right")):
-        upper, lower = panels[:, column]
-        before = declared[:, column]
-        upper.plot(commands, before, color=VERMILLION, lw=1.2, label=BEFORE)
-        upper.plot(commands, extended[:, column], color=BLUE, lw=1.4, label=after(diagnosis))
-        if curve is not None and curve.gain > 0.0:
-            speeds, extra = _flexible(diagnosis, curve, column)
-            tuned = _steady(drives, retuned(found.declared, curve), commands)[:, column]
-            upper.plot(commands, tuned + np.interp(before, speeds, extra), "--", color=PURPLE, lw=1.2, label=ANY)
-        place = np.interp(rates.declared[side], before, commands)
-        draw_means(lower, rates, place, GROUPS["wheel command"][column])
-        dress(upper)
-        upper.set_title(f"{side} wheel", fontsize=8)
-        lower.set_xlabel("command [duty]", fontsize=8)
-        lower.set_ylabel("")
-    panels[0, 0].set_ylabel("steady speed [m/s]", fontsize=8)
-    panels[1, 0].set_ylabel("added speed on the drives [mm/s]", fontsize=8)
+        _draw_steady(panels[0, column], commands, {name: steady[:, column] for name, steady in models.items()})
+        place = np.interp(rates.declared[side], models[BEFORE][:, column], commands)
+        draw_means(panels[1, column], rates, place, GROUPS["wheel command"][column])
+        panels[0, column].set_title(f"{side} wheel", fontsize=8)
+        panels[1, column].set_xlabel("command [duty]", fontsize=8)
+    for row, label in enumerate(("steady speed [m/s]", "added speed [mm/s]")):
+        panels[row, 0].set_ylabel(label, fontsize=8)
+        panels[row, 1].set_ylabel("")
     legend_below(figure, *panels.ravel())
     return figure
+
+
+def _steady_models(diagnosis: Diagnosis, commands: Floats) -> dict[str, Floats]:
+    """Steady wheel speeds (commands, 2) [m/s] of every model, by name: declared, extended, with the flexible curve."""
+    found, drives = diagnosis.found, diagnosis.found.declared.drives
+    before = _steady(drives, found.declared.theta, commands)
+    models = {BEFORE: before, after(diagnosis): _steady(drives, found.model.theta, commands)}
+    curve = _curve(found.curves, "wheel command")
+    if curve is not None and curve.gain > 0.0:
+        extra = [np.interp(before[:, side], *_flexible(diagnosis, curve, side)) for side in (0, 1)]
+        models[ANY] = _steady(drives, retuned(found.declared, curve), commands) + np.stack(extra, axis=1)
+    return models
+
+
+def _draw_steady(axes: Axes, commands: Floats, models: Mapping[str, Floats]) -> None:
+    for name, speeds in models.items():
+        style, colour = {BEFORE: ("-", VERMILLION), ANY: ("--", PURPLE)}.get(name, ("-", BLUE))
+        axes.plot(commands, speeds, style, color=colour, lw=1.3, label=name)
+    dress(axes)
 
 
 def _steady(drives: Drives, theta: Theta, commands: Floats) -> Floats:
@@ -129,9 +139,8 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     column = int(found.adopted[0].form.startswith("right"))
     full = drives.robot.figures["full_speed"]
     axes.plot(times, duties[0, :, 0] * full, color=GREY, lw=0.8, ls=":", label="command")
-    before, later = (found.declared.theta, VERMILLION, BEFORE), (found.model.theta, BLUE, after(diagnosis))
-    for theta, colour, name in (before, later):
-        draws = full * _responses(_driven(drives, duties), theta)[..., column]
+    for fitted, colour, name in ((found.declared, VERMILLION, BEFORE), (found.model, BLUE, after(diagnosis))):
+        draws = full * _responses(_driven(drives, duties), fitted.theta)[..., column]
         _draw_responses(axes, times, draws, colour, name)
     axes.set_xlabel("time since the command [s]", fontsize=8)
     axes.set_ylabel(f"speed of the {('left', 'right')[column]} wheel [m/s]", fontsize=8)

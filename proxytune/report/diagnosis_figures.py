@@ -92,7 +92,7 @@ def _scale(axes: Axes, gains: Sequence[float]) -> None:
         axes.set_xscale("symlog", linthresh=2.0 * LEAST_GAIN, linscale=0.5)
         axes.set_xlim(1.3 * low, 1.5 * high)
     else:
-        axes.set_xlim(1.05 * low, 1.05 * high)
+        axes.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
 
 
 def _role(diagnosis: Diagnosis, tried: Tried) -> _Role:

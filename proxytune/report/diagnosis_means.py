@@ -156,7 +156,7 @@ def _means(signal: Floats, added: Floats, share_of: Floats | None) -> tuple[Floa
 
 def means_figure(diagnosis: Diagnosis, curve: Curve | None, panels: tuple[Panel, ...]) -> Figure:
     """Draw panels side by side; the curve is the flexible one, where there is one."""
-    figure = Figure(figsize=(max(3.6, 2.6 * len(panels) + 0.4), 2.8), layout="constrained")
+    figure = Figure(figsize=(max(3.6, 2.2 * len(panels) + 0.4), 2.8), layout="constrained")
     rates = rates_of(diagnosis, curve)
     all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for axes, panel in zip(all_axes, panels, strict=True):
@@ -169,7 +169,7 @@ def means_figure(diagnosis: Diagnosis, curve: Curve | None, panels: tuple[Panel,
 
 def draw_means(axes: Axes, rates: Rates, signal: Floats, panel: Panel) -> None:
     """Draw means of what is added over a signal of the increments (N,)."""
-    factor, unit = (1.0, "% of it") if panel.share else (DEGREES, "deg/s") if panel.motion == "turn" else (1e3, "mm/s")
+    factor, unit = (1.0, "%") if panel.share else (DEGREES, "deg/s") if panel.motion == "turn" else (1e3, "mm/s")
     axes.axhline(0.0, color=VERMILLION, lw=1.0, label=BEFORE)
     for name, added in rates.added.items():
         places, values = _means(signal, added[panel.motion], rates.declared[panel.motion] if panel.share else None)

@@ -1,0 +1,70 @@
+"""Logs of a domain instance: manoeuvres driven and measured as a robot's would be."""
+
+import json
+
+import numpy as np
+import pandas as pd
+
+from proxytune.diagnosis.drives import Floats
+from proxytune.diagnosis.manoeuvres import LIBRARY
+from proxytune.driving.family import LaneFollowing
+from proxytune.driving.recording import follow
+from proxytune.driving.robot import read_robot
+from proxytune.logs import Log, LogEpisode
+
+POSITION_NOISE_M = 0.002
+HEADING_NOISE_RAD = 0.005
+"""White noise of a measured pose, as a tracker above the floor has it."""
+
+
+def record(family: LaneFollowing, *, name: str, repeats: int, seconds: float, seed: int) -> Log:
+    """Drive every manoeuvre so many times, each time at another size and to the other side.
+
+    Args:
+        family: The domain; its effects are what is recorded.
+        name: What the log is called.
+        repeats: Drives of each manoeuvre.
+        seconds: Length of a drive [s].
+        seed: Of sizes, starts and noise.
+    """
+    rate = read_robot(family.robot).figures["control_rate"]
+    times = np.arange(round(seconds * rate)) / rate
+    episodes = []
+    for number in range(repeats * len(LIBRARY)):
+        random = np.random.default_rng((seed, number))
+        duties = _varied(LIBRARY[number % len(LIBRARY)][2](times), random, number // len(LIBRARY))
+        poses = _driven(family, duties, random, number)
+        episodes.append(LogEpisode(str(number), times, duties, poses, None))
+    return Log(name, family.robot, "duty", rate, {}, tuple(episodes))
+
+
+def _varied(duties: Floats, random: np.random.Generator, repeat: int) -> Floats:
+    sized = duties * random.uniform(0.75, 1.0)
+    return np.round(sized if repeat % 2 == 0 else sized[:, ::-1], 4)
+
+
+def _driven(family: LaneFollowing, duties: Floats, random: np.random.Generator, number: int) -> Floats:
+    start = np.array((0.0, 0.0, random.uniform(-np.pi, np.pi)))
+    instance = family.instance({})
+    with family.plant_at(instance.robot, start) as plant:
+        poses = follow(instance, plant, start, duties, number)
+    noise = random.standard_normal(poses.shape) * (POSITION_NOISE_M, POSITION_NOISE_M, HEADING_NOISE_RAD)
+    return np.asarray(poses + noise)
+
+
+def log_text(log: Log, source: str) -> str:
+    """A log.toml for a recorded log."""
+    pose = f"x, y with {POSITION_NOISE_M:g} m, heading with {HEADING_NOISE_RAD:g} rad of white noise (1 sigma)"
+    facts = {"format": 1, "name": log.name, "robot": log.robot, "command": log.command, "rate_hz": log.rate_hz}
+    facts |= {"pose": pose, "measured": False, "source": source}
+    return "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in facts.items())
+
+
+def samples_text(log: Log) -> str:
+    """A samples.csv for a log of duties."""
+    columns = ("time", "left", "right", "x", "y", "heading")
+    tables = [
+        pd.DataFrame(np.column_stack((e.times, e.commands, e.poses)), columns=columns).assign(episode=e.name)
+        for e in log.episodes
+    ]
+    return pd.concat(tables)[["episode", *columns]].to_csv(index=False, float_format="%.4f", lineterminator="\n")

@@ -9,7 +9,7 @@ import numpy as np
 from proxytune.diagnosis.candidates import Candidate, candidates
 from proxytune.diagnosis.drives import Drives
 from proxytune.diagnosis.events import RandomEffect, random_effects
-from proxytune.diagnosis.fitting import Coordinate, Fit, fit, loss_of, placed, predictive
+from proxytune.diagnosis.fitting import Coordinate, Fit, fit, loss_of, placed, predictive, span
 from proxytune.diagnosis.flexible import Curve, curves
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, lateness
 from proxytune.diagnosis.screening import Lead, screen
@@ -212,7 +212,10 @@ def _refit(
 def _start(model: Fit, lead: Lead) -> Theta:
     """The better of the probe and where the step from it leads."""
     theta = {**model.theta, **lead.candidate.fixed}
-    starts = [placed(theta, lead.candidate.free, np.array(values)) for values in (lead.start, lead.probe)]
+    low, high = np.array([span(coordinate) for coordinate in lead.candidate.free]).T
+    starts = [
+        placed(theta, lead.candidate.free, np.clip(np.array(values), low, high)) for values in (lead.start, lead.probe)
+    ]
     return min(starts, key=lambda start: loss_of(model.drives, start, model.whiten))
 
 

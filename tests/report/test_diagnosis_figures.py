@@ -12,7 +12,8 @@ import hidden
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS, candidates
 from proxytune.diagnosis.diagnosis import diagnose
-from proxytune.diagnosis.replay import RANDOM_EFFECTS, increments
+from proxytune.diagnosis.innovations import huber
+from proxytune.diagnosis.replay import RANDOM_EFFECTS, disturbed, increments
 from proxytune.diagnosis.search import LEAST_GAIN, Adopted
 from proxytune.diagnosis.signals import signal_groups
 from proxytune.diagnosis.windows import cut, strays
@@ -21,7 +22,7 @@ from proxytune.effects import theta_names
 from proxytune.effects.catalogue import CATALOGUE
 from proxytune.report.diagnosis_effect import STATIC, TRANSIENT, effect_curve
 from proxytune.report.diagnosis_figures import SHOWN, diagnosis_figures
-from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, MOTIONS
+from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, MOTIONS, retuned
 from proxytune.report.diagnosis_residual import MANY_WINDOWS, residual_map, residual_over_time, strayed
 from proxytune.report.diagnosis_style import BEFORE
 
@@ -79,7 +80,7 @@ def test_every_figure_is_drawn_without_a_warning(diagnosis):
 
 
 def test_figures_are_made_for_a_column(figures):
-    assert all(3.4 <= figure.get_figwidth() <= 9.0 for figure in figures.values())
+    assert all(3.4 <= figure.get_figwidth() <= 7.0 for figure in figures.values())
 
 
 def test_the_legend_lies_within_its_figure(figures):
@@ -98,7 +99,7 @@ def test_axes_say_what_they_show_in_which_unit(figures):
     assert "[nats]" in labels["ranking"][1][0]
     assert [y for _, y in labels["error"]] == ["error of position, RMS [mm]", "error of heading, RMS [deg]"]
     assert all(x == "length of the prediction [s]" for x, _ in labels["error"])
-    assert [y for _, y in labels["effect_curve"]][::2] == ["steady speed [m/s]", "added speed on the drives [mm/s]"]
+    assert [y for _, y in labels["effect_curve"]][::2] == ["steady speed [m/s]", "added speed [mm/s]"]
     assert [x for x, _ in labels["effect_curve"]][2:] == ["command [duty]"] * 2
 
 
@@ -136,16 +137,14 @@ def test_residuals_over_time_are_the_root_mean_squares_of_the_windows(diagnosis,
 
 
 def test_many_episodes_become_a_median_with_a_band(diagnosis):
-    drives, both = (
-        diagnosis.parts.fitted,
-        strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=diagnosis.parts.fitted))),
-    )
+    drives = diagnosis.parts.fitted
+    both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=drives)))
     (axes,) = residual_over_time(drives, both).axes
     _, middle = values(axes, BEFORE)
     first = np.unique(both[BEFORE].window, return_index=True)[1]
     start = drives.first[both[BEFORE].increment[first]] / drives.tick_hz
     assert middle[0] == pytest.approx(np.median(both[BEFORE].rms[start < 1.0]))
-    bands = [band for band in axes.collections if len(band.get_paths()[0].vertices) > 3]
+    bands = [band for band in axes.collections if band.get_paths()]
     assert len(bands) == 2
 
 
@@ -240,14 +239,44 @@ def test_measured_means_weigh_every_increment_once(diagnosis):
     assert means.mean() == pytest.approx(rates.mean(), abs=0.05 * np.abs(means).max())
 
 
+def test_an_effect_on_one_wheel_bends_the_curves_of_that_wheel_alone(diagnosis):
+    weak = with_effect(diagnosis, "wheel_gain", "left wheel", {"wheel_gain.left": 0.8})
+    upper_left, upper_right, left, right = effect_curve(weak).axes
+    label = "with wheel gain"
+    assert np.abs(values(left, label)[1]).max() > 50.0
+    assert np.abs(values(right, label)[1]).max() < 5.0
+    assert values(upper_left, label)[1] == pytest.approx(0.8 * values(upper_left, BEFORE)[1], abs=1e-6)
+    assert values(upper_right, label)[1] == pytest.approx(values(upper_right, BEFORE)[1], abs=1e-6)
+
+
+def test_the_curve_over_the_signal_is_drawn_for_the_wheel_that_it_moves(diagnosis):
+    curve = next(curve for curve in diagnosis.found.curves if curve.group.name == "wheel command")
+    turns_right = curve.group.twists[:, :, 2].min(axis=(0, 1)) < 0.0
+    pushed = curve._replace(weights=np.where(turns_right, 0.1, 0.0), gain=50.0)
+    left, right, *_ = effect_curve(replace(diagnosis, found=replace(diagnosis.found, curves=(pushed,)))).axes
+    assert np.interp(0.0, *values(left, ANY)) == pytest.approx(0.1 * 0.6)
+    assert np.interp(0.0, *values(right, ANY)) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_declared_parameters_give_way_to_the_curve_that_was_fitted_with_them(diagnosis):
+    declared, curve = diagnosis.found.declared, diagnosis.found.curves[0]
+
+    def loss(theta):
+        said = disturbed(declared.drives, theta, curve.group.twists @ curve.weights)
+        return huber(declared.whiten.whiten(declared.drives.measured - said)).sum()
+
+    assert loss(retuned(declared, curve)) < loss(declared.theta) - 5.0
+    idle = curve._replace(weights=np.zeros_like(curve.weights))
+    assert retuned(declared, idle) == pytest.approx(dict(declared.theta), abs=0.02)
+
+
 def test_every_motion_effect_has_a_curve():
     assert set(MOTION_EFFECTS) == {*STATIC, *TRANSIENT, *MOTIONS}
     assert all(name in GROUPS for name, _ in MOTIONS.values())
 
 
-FORMS = [
-    candidate for candidate in candidates(read_robot("duckiebot").figures, {}, ("trim", "delay")) if candidate.probes
-]
+EVERY = candidates(read_robot("duckiebot").figures, {}, ("trim", "delay"))
+FORMS = [one for one in EVERY if one.form not in ("left wheel", "right wheel") or one.label == "dead_band (left wheel)"]
 
 
 @pytest.mark.parametrize("candidate", FORMS, ids=lambda candidate: candidate.label)
@@ -290,12 +319,25 @@ def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnos
     names = {group.name for group in signal_groups(diagnosis.found.declared)}
     assert names <= set(GROUPS)
     for curve in diagnosis.found.curves:
-        figure = effect_curve(without_effects(diagnosis, (curve,)))
+        figure = effect_curve(without_effects(diagnosis, (curve._replace(gain=50.0),)))
         figure.draw_without_rendering()
         for axes, panel in zip(figure.axes, GROUPS[curve.group.name], strict=True):
             assert axes.get_xlabel() == panel.label
             assert np.isfinite(values(axes, ANY)[1]).all()
             assert {one.get_label() for one in axes.get_lines()} == {BEFORE, MEASURED, ANY}
+
+
+def test_a_curve_that_says_nothing_is_not_drawn(diagnosis):
+    idle = tuple(curve._replace(gain=-1.0) for curve in diagnosis.found.curves)
+    slope = with_effect(
+        replace(diagnosis, found=replace(diagnosis.found, curves=idle)),
+        "floor_slope",
+        "",
+        {"floor_slope.x": 0.05, "floor_slope.y": 0.0},
+    )
+    band = replace(diagnosis, found=replace(diagnosis.found, curves=idle))
+    for one in (slope, band):
+        assert all(line.get_label() != ANY for axes in effect_curve(one).axes for line in axes.get_lines())
 
 
 def test_without_a_candidate_there_is_no_ranking(diagnosis):

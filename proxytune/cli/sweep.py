@@ -31,7 +31,7 @@ from proxytune.study.lock import locked
 from proxytune.study.progress import Bars
 from proxytune.study.store import Store, SweepRecord
 from proxytune.study.study import Study, open_study
-from proxytune.study.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval
+from proxytune.study.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval, with_target
 
 MOST_POINTS = 10_000
 
@@ -59,8 +59,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Simulate what is missing of the sweeps, and draw them."""
     folder = study_folder(arguments.path)
     study = open_study(folder)
-    sweeps = _planned(study, arguments)
-    discrepancy = discrepancy_study(study, arguments.target_model) if arguments.target_model else None
+    sweeps, discrepancy = _planned(study, arguments), None
+    if arguments.target_model:
+        discrepancy = discrepancy_study(study, arguments.target_model)
+        sweeps = [with_target(sweep, arguments.target_model, discrepancy) for sweep in sweeps]
     per_point = len(study.settings.agents) + (discrepancy is not None)
     points = sum(len(sweep.points) for sweep in sweeps)
     spent = Spent()
@@ -68,7 +70,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         with Bars(points * per_point * study.settings.starts) as bars:
             for sweep in sweeps:
                 spent += run_sweep(study, store, sweep, bars, discrepancy)
-        curves = [curve for sweep in sweeps if (curve := curve_of(study, store, sweep, discrepancy))]
+        curves = [curve for sweep in sweeps if (curve := curve_of(study, store, sweep))]
     output = arguments.output or folder / "figures"
     return _answer(curves, spent, draw_curves(curves, output), write_curves(curves, output))
 

@@ -16,6 +16,8 @@ ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 MARKERS = "osD^v"
 PANEL = (2.6, 2.0)
+HELD, BESIDE = "held value", "lower and higher value"
+INTERVAL = "95 % interval"
 SIDE = 1 / 3
 """The bars stand at the held value and so much of the parameter's box to either side."""
 
@@ -34,7 +36,7 @@ def sweep_figure(curves: Sequence[Curve]) -> Figure:
         points = [(point.value, point.assessment) for point in curve.points if point.assessment is not None]
         _prpv(upper, points)
         _ppv(lower, points)
-        lower.set_xlabel(curve.label, fontsize=8)
+        lower.set_xlabel(_label(curve), fontsize=8)
         for axes in (upper, lower):
             _dress(axes, curve)
     # Only now: a limit set earlier would hide what later columns of the shared axis hold.
@@ -42,8 +44,7 @@ def sweep_figure(curves: Sequence[Curve]) -> Figure:
         axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
     panels[0, 0].set_ylabel("PRPV [ordered pairs]", fontsize=8)
     panels[1, 0].set_ylabel("PPV", fontsize=8)
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=7, frameon=False)
+    _explain(figure, panels[0, 0])
     return figure
 
 
@@ -68,11 +69,10 @@ def panels_figure(curve: Curve) -> Figure:
     for axes in panels:
         _dress(axes, curve)
     for axes in panels[-columns:]:
-        axes.set_xlabel(curve.label, fontsize=8)
+        axes.set_xlabel(_label(curve), fontsize=8)
     for axes in panels[:2]:
         axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=7, frameon=False)
+    _explain(figure, panels[0])
     return figure
 
 
@@ -89,18 +89,18 @@ def bars_figure(curves: Sequence[Curve]) -> Figure:
         indices, held = bar_points(curve)
         chosen = [curve.points[index] for index in indices]
         spots = [place * 4.0 + offset for offset in range(len(chosen))]
-        ticks += [(spot, f"{point.value:.3g}") for spot, point in zip(spots, chosen, strict=True)]
+        ticks += [(spot, f"{point.value:.3g}".replace("-", "−")) for spot, point in zip(spots, chosen, strict=True)]
         _bars(axes, spots, chosen, curve.points[held])
         centre = (spots[0] + spots[-1]) / 2
         axes.annotate(
-            curve.label.replace("_", " ").replace(" [", "\n["),
+            _label(curve).replace(" [", "\n["),
             (centre, 0), xytext=(0, -20), xycoords=("data", "axes fraction"), textcoords="offset points",
             ha="center", va="top", fontsize=8,
         )  # fmt: skip
     found = [point.assessment for curve in curves for point in curve.points if point.assessment is not None]
     if found:
         _levels(axes, found)
-        figure.legend(loc="outside upper center", ncols=2, fontsize=7, frameon=False)
+        _explain(figure, axes)
     axes.set_xticks([spot for spot, _ in ticks], [text for _, text in ticks])
     axes.set_xlabel(" \n ", fontsize=8)
     axes.set_ylabel("PRPV [ordered pairs]", fontsize=8)
@@ -132,10 +132,13 @@ def _bars(axes: Axes, spots: Sequence[float], chosen: Sequence[SweepPoint], held
             axes.annotate("failed", (spot, 0), rotation=90, ha="center", va="bottom", fontsize=6)
             continue
         inner, score = point.assessment.prpv_interval, point.assessment.prpv.value
-        axes.bar(spot, score, width=0.85, color=BLUE if point is held else LIGHT_BLUE)
+        colour, label = (BLUE, HELD) if point is held else (LIGHT_BLUE, BESIDE)
+        axes.bar(spot, score, width=0.85, color=colour, label=label)
         if inner.low is not None and inner.high is not None:
             ends = [[score - inner.low], [inner.high - score]]
-            axes.errorbar([spot], [score], yerr=ends, fmt="none", ecolor="0.2", elinewidth=1.0, capsize=2)
+            axes.errorbar(
+                [spot], [score], yerr=ends, fmt="none", ecolor="0.2", elinewidth=1.0, capsize=2, label=INTERVAL
+            )
 
 
 def _srcc(axes: Axes, series: Sequence[Series]) -> None:
@@ -179,7 +182,7 @@ def _prpv(axes: Axes, points: Sequence[tuple[float, Assessment]]) -> None:
     inner = [assessment.prpv_interval for assessment in found]
     if all(one.low is not None for one in inner):
         lows, highs = [one.low or 0.0 for one in inner], [one.high or 0.0 for one in inner]
-        axes.fill_between(values, lows, highs, color=BLUE, alpha=0.18, linewidth=0, label="95 % interval")
+        axes.fill_between(values, lows, highs, color=BLUE, alpha=0.18, linewidth=0, label=INTERVAL)
     scores = [assessment.prpv.value for assessment in found]
     axes.plot(values, scores, "o-", color=BLUE, markersize=3, linewidth=1.2, label="PRPV")
 
@@ -205,6 +208,20 @@ def _levels(axes: Axes, found: Sequence[Assessment]) -> None:
 
 def _dress(axes: Axes, curve: Curve) -> None:
     if curve.parameter in curve.base:
-        axes.axvline(curve.base[curve.parameter], color="0.6", linewidth=0.8)
+        axes.axvline(curve.base[curve.parameter], color="0.6", linewidth=0.8, label=HELD)
     axes.tick_params(labelsize=7)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def _explain(figure: Figure, axes: Axes) -> None:
+    """One legend below the figure: each label once, the measure itself left to its axis."""
+    by_label = {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    by_label.pop("PRPV", None)
+    columns = 2 if figure.get_figwidth() < 5 else 4 if len(by_label) <= 4 else 3
+    figure.legend(
+        list(by_label.values()), list(by_label), loc="outside lower center", ncols=columns, fontsize=7, frameon=False
+    )
+
+
+def _label(curve: Curve) -> str:
+    return curve.label.replace("_", " ")

@@ -10,11 +10,16 @@ The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_versi
     episodes   instance, agent, start, seed       what determines an episode: the key, so none is ever run twice
                metrics (JSON) or failure          what it scored, or why it failed
                seconds                            how long it took
-    sweeps     parameter, base (JSON), points (JSON), identity     the curves that have been asked for
+    sweeps     number, parameter, base (JSON), points (JSON), identity     the curves asked for, the last one last
+               target_model                       the target's model.toml as it was; empty without POD
+               replays                            identity of the instances whose episodes are POD's replays, or empty
 
 θ as JSON has its parameters sorted by name and every digit of its numbers. While a study runs, what is written goes to
 `study.db-wal` first (SQLite's write-ahead log: a commit costs no wait for the disk, and survives a `kill -9`). That
 file belongs to study.db until the next clean end of a run, which leaves the one file.
+
+Format 1 had neither `target_model` nor `replays`. It is still read, and becomes format 2 when next written to; its
+sweeps are then drawn again without POD until they are asked for once more, which simulates nothing anew.
 """
 
 import sqlite3
@@ -24,10 +29,15 @@ from pathlib import Path
 
 from proxytune.errors import StoreError
 
-FORMAT = 1
+FORMAT = 2
 APPLICATION = 0x70747564  # "ptud"
 PATIENCE_S = 30.0
 
+SWEEPS = """
+CREATE TABLE sweeps (
+    number INTEGER PRIMARY KEY, parameter TEXT NOT NULL, base TEXT NOT NULL, points TEXT NOT NULL,
+    identity TEXT NOT NULL, target_model TEXT NOT NULL DEFAULT '', replays TEXT NOT NULL DEFAULT '',
+    UNIQUE (parameter, base, points, identity, replays));"""
 SCHEMA = f"""
 BEGIN;
 CREATE TABLE facts (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -41,12 +51,25 @@ CREATE TABLE episodes (
     instance INTEGER NOT NULL REFERENCES instances (id), agent TEXT NOT NULL, start INTEGER NOT NULL,
     seed INTEGER NOT NULL, metrics TEXT, failure TEXT, seconds REAL NOT NULL,
     PRIMARY KEY (instance, agent, start, seed), CHECK ((metrics IS NULL) <> (failure IS NULL))) WITHOUT ROWID;
-CREATE TABLE sweeps (
-    parameter TEXT NOT NULL, base TEXT NOT NULL, points TEXT NOT NULL, identity TEXT NOT NULL,
-    PRIMARY KEY (parameter, base, points, identity)) WITHOUT ROWID;
+{SWEEPS}
 PRAGMA application_id = {APPLICATION};
 PRAGMA user_version = {FORMAT};
 COMMIT;
+"""
+FROM_1 = f"""
+BEGIN;
+ALTER TABLE sweeps RENAME TO sweeps_1;
+{SWEEPS}
+INSERT INTO sweeps (parameter, base, points, identity)
+    SELECT parameter, base, points, identity FROM sweeps_1 ORDER BY parameter, base, points, identity;
+DROP TABLE sweeps_1;
+PRAGMA user_version = {FORMAT};
+COMMIT;
+"""
+AS_FROM_1 = """
+CREATE TEMP VIEW sweeps AS
+    SELECT row_number() OVER (ORDER BY parameter, base, points, identity) AS number,
+        *, '' AS target_model, '' AS replays FROM main.sweeps;
 """
 
 
@@ -93,6 +116,9 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
     (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if verdict != "ok":
         raise _corrupt(path, str(verdict))
+    if version < FORMAT:
+        # A view of this connection alone leaves the file as it is.
+        connection.executescript(FROM_1 if writable else AS_FROM_1)
 
 
 @contextmanager

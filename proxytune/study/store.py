@@ -59,11 +59,21 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class SweepRecord:
-    """A sweep that has been asked for: the parameter, the values of the others, and where it was looked at."""
+    """A sweep that has been asked for.
+
+    Attributes:
+        parameter: What is swept.
+        base: Values of the others; those not named are nominal.
+        points: Where it is looked at, in rising order.
+        target_model: The target's model.toml as it was when POD was asked for; empty where it was not.
+        replays: Identity of the domain family whose episodes are POD's replays; empty without POD.
+    """
 
     parameter: str
     base: Theta
     points: tuple[float, ...]
+    target_model: str = ""
+    replays: str = ""
 
 
 def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
@@ -164,15 +174,22 @@ class Store:
         return {(agent, start): mean for agent, start, mean in rows}
 
     def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
-        """Remember that a sweep has been asked for."""
+        """Remember that a sweep has been asked for in the domain family with this identity."""
         row = (sweep.parameter, theta_json(sweep.base), json.dumps(sweep.points), identity)
         with self._transaction() as connection:
-            connection.execute("INSERT OR IGNORE INTO sweeps VALUES (?, ?, ?, ?)", row)
+            # A sweep asked for again becomes the last one.
+            connection.execute(
+                "INSERT OR REPLACE INTO sweeps VALUES (NULL, ?, ?, ?, ?, ?, ?)",
+                (*row, sweep.target_model, sweep.replays),
+            )
 
-    def sweeps(self, identity: str) -> list[SweepRecord]:
-        """Every sweep that has been asked for."""
-        rows = self._all("SELECT parameter, base, points FROM sweeps WHERE identity = ?", (identity,))
-        return [SweepRecord(name, json.loads(base), tuple(json.loads(points))) for name, base, points in rows]
+    def sweeps(self) -> list[tuple[str, SweepRecord]]:
+        """Every sweep that has been asked for, the last one last, with the identity of its domain family."""
+        rows = self._all("SELECT identity, parameter, base, points, target_model, replays FROM sweeps ORDER BY number")
+        return [
+            (identity, SweepRecord(name, json.loads(base), tuple(json.loads(points)), *pod))
+            for identity, name, base, points, *pod in rows
+        ]
 
     def _instance(self, connection: sqlite3.Connection, identity: str, theta: str) -> int:
         connection.execute("INSERT OR IGNORE INTO instances (identity, theta) VALUES (?, ?)", (identity, theta))

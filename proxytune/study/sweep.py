@@ -1,13 +1,15 @@
 """Usefulness along one parameter of the domain family, the others held."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
 from proxytune.errors import InputError
 from proxytune.settings import nearest
 from proxytune.space import Interval, Parameter, Theta
+from proxytune.study.discrepancy import METRICS
 from proxytune.study.evaluate import Evaluation, Spent, evaluation, plan, simulate
 from proxytune.study.progress import Watcher
 from proxytune.study.store import Store, SweepRecord
@@ -117,12 +119,17 @@ def plan_sweep(interval: Interval, base: Theta, points: int) -> SweepRecord:
     return SweepRecord(interval.name, dict(base), tuple(sorted({*grid, *own})))
 
 
+def with_target(sweep: SweepRecord, model: Path, discrepancy: Study) -> SweepRecord:
+    """The sweep with POD besides, against the target of this model (discrepancy.discrepancy_study)."""
+    return replace(sweep, target_model=model.read_text(encoding="utf-8"), replays=discrepancy.identity)
+
+
 def run_sweep(
     study: Study, store: Store, sweep: SweepRecord, watcher: Watcher, discrepancy: Study | None = None
 ) -> Spent:
     """Simulate what is missing of a sweep; episodes are shared with the study's trials and other sweeps.
 
-    With a study of the discrepancy (discrepancy.discrepancy_study), POD is simulated too.
+    With the study of the discrepancy that the sweep names (with_target), POD is simulated too.
     """
     store.save_sweep(study.identity, sweep)
     spent = Spent()
@@ -134,19 +141,14 @@ def run_sweep(
     return spent
 
 
-def curve_of(study: Study, store: Store, sweep: SweepRecord, discrepancy: Study | None = None) -> Curve | None:
+def curve_of(study: Study, store: Store, sweep: SweepRecord) -> Curve | None:
     """The curve of a sweep from what the store has; None if an episode is still missing."""
-    found = [(value, evaluation(study, store, _theta(sweep, value))) for value in sweep.points]
-    points = [
-        _point(study, value, known, _pod(discrepancy, store, _theta(sweep, value)) if discrepancy else {})
-        for value, known in found
-        if known is not None
-    ]
-    if len(points) < len(found):
+    points = [point for value in sweep.points if (point := _point(study, store, sweep, value))]
+    if len(points) < len(sweep.points):
         return None
     unit = study.family.parameters[sweep.parameter].unit
     metrics = tuple(metric.name for metric in study.settings.metrics)
-    return Curve(sweep.parameter, unit, sweep.base, metrics, tuple(points), discrepancy is not None)
+    return Curve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
 
 
 def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
@@ -159,8 +161,9 @@ def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
 
 
 def all_curves(study: Study, store: Store) -> Sequence[Curve]:
-    """The curves of every sweep that has been finished in this domain family."""
-    curves = [curve_of(study, store, sweep) for sweep in store.sweeps(study.identity)]
+    """The curves of every sweep that has been finished, the last one last, each in the domain family of then."""
+    known = [(identity, sweep) for identity, sweep in store.sweeps() if sweep.parameter in study.family.parameters]
+    curves = [curve_of(replace(study, identity=identity), store, sweep) for identity, sweep in known]
     return [curve for curve in curves if curve is not None]
 
 
@@ -168,15 +171,24 @@ def _theta(sweep: SweepRecord, value: float) -> dict[str, float]:
     return {**sweep.base, sweep.parameter: value}
 
 
-def _pod(discrepancy: Study, store: Store, theta: Theta) -> dict[str, PodMean]:
-    planned = plan(discrepancy.settings, theta, discrepancy.settings.seed)
-    known = store.outcomes(discrepancy.identity, theta)
-    worked = [found.metrics for episode in planned if (found := known.get(episode)) and found.metrics is not None]
-    return {name: pod_mean([one[name] for one in worked]) for name in discrepancy.family.metrics} if worked else {}
-
-
-def _point(study: Study, value: float, known: Evaluation, pod: Mapping[str, PodMean]) -> SweepPoint:
+def _point(study: Study, store: Store, sweep: SweepRecord, value: float) -> SweepPoint | None:
+    """One point from what the store has; None if an episode or a replay is still missing."""
+    known = evaluation(study, store, _theta(sweep, value))
+    pod = _pod(study, store, sweep, value) if sweep.replays else {}
+    if known is None or pod is None:
+        return None
     found = None
     if known.proxy is not None:
         found = assess(proxy=known.proxy, target=study.target, metrics=study.settings.metrics)
     return SweepPoint(value, known, found, pod)
+
+
+def _pod(study: Study, store: Store, sweep: SweepRecord, value: float) -> dict[str, PodMean] | None:
+    # Its first agent's commands are replayed, as discrepancy_study has it.
+    replayed = replace(study.settings, agents=study.settings.agents[:1])
+    planned = plan(replayed, _theta(sweep, value), replayed.seed)
+    known = store.outcomes(sweep.replays, _theta(sweep, value))
+    if not all(episode in known for episode in planned):
+        return None
+    worked = [metrics for episode in planned if (metrics := known[episode].metrics) is not None]
+    return {name: pod_mean([one[name] for one in worked]) for name in METRICS} if worked else {}

@@ -70,6 +70,58 @@ def test_a_newer_format_is_refused(tmp_path):
     refused(path, f"has format {FORMAT + 1}, this proxytune reads up to {FORMAT}; install a newer one")
 
 
+OLD_SWEEPS = """
+DROP TABLE sweeps;
+CREATE TABLE sweeps (
+    parameter TEXT NOT NULL, base TEXT NOT NULL, points TEXT NOT NULL, identity TEXT NOT NULL,
+    PRIMARY KEY (parameter, base, points, identity)) WITHOUT ROWID;
+INSERT INTO sweeps VALUES ('trim', '{}', '[-0.3, 0.3]', 'identity'), ('blur', '{}', '[0.0, 0.1]', 'identity');
+INSERT INTO facts VALUES ('seed', '1');
+PRAGMA user_version = 1;
+"""
+SWEEPS_OF_1 = "SELECT number, parameter, base, points, identity, target_model, replays FROM sweeps ORDER BY number"
+CONVERTED = [
+    (1, "blur", "{}", "[0.0, 0.1]", "identity", "", ""),
+    (2, "trim", "{}", "[-0.3, 0.3]", "identity", "", ""),
+]
+
+
+@pytest.fixture
+def of_format_1(tmp_path):
+    path = made(tmp_path / "study.db")
+    with sqlite3.connect(path) as plain:
+        plain.executescript(OLD_SWEEPS)
+    return path
+
+
+def test_format_1_is_read_as_it_is(of_format_1):
+    before = of_format_1.read_bytes()
+    connection = connect(of_format_1, writable=False)
+    assert connection.execute(SWEEPS_OF_1).fetchall() == CONVERTED
+    connection.close()
+    assert of_format_1.read_bytes() == before
+
+
+def test_format_1_becomes_the_present_one_when_opened_for_writing_and_keeps_what_it_had(of_format_1):
+    disconnect(connect(of_format_1, writable=True))
+    with sqlite3.connect(of_format_1) as plain:
+        assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
+        assert plain.execute(SWEEPS_OF_1).fetchall() == CONVERTED
+        assert plain.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
+        names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    assert names == {"facts", "instances", "trials", "episodes", "sweeps"}
+
+
+def test_a_new_database_and_a_converted_one_have_the_same_tables(of_format_1, tmp_path):
+    disconnect(connect(of_format_1, writable=True))
+    new = made(tmp_path / "new.db")
+    tables = []
+    for path in (of_format_1, new):
+        with sqlite3.connect(path) as plain:
+            tables.append(sorted(plain.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL")))
+    assert tables[0] == tables[1]
+
+
 def test_somebody_else_s_database_is_refused(tmp_path):
     with sqlite3.connect(tmp_path / "study.db") as plain:
         plain.execute("CREATE TABLE photos (name TEXT)")

@@ -11,7 +11,7 @@ from proxytune.study.progress import Silent
 from proxytune.study.series import series_of
 from proxytune.study.store import Store
 from proxytune.study.study import open_study
-from proxytune.study.sweep import curve_of, plan_sweep, pod_mean, run_sweep, sweep_interval
+from proxytune.study.sweep import curve_of, plan_sweep, pod_mean, run_sweep, sweep_interval, with_target
 
 TRUTH = {"trim": 0.1, "delay": 0.12}
 
@@ -31,9 +31,11 @@ def opened(make_study, truth):
 
 def swept(study, discrepancy, points=4):
     plan = plan_sweep(sweep_interval(study, "trim"), TRUTH, points)
+    if discrepancy:
+        plan = with_target(plan, study.settings.folder.parent / "truth.toml", discrepancy)
     with Store.open(study.settings.folder) as store:
         spent = run_sweep(study, store, plan, Silent(), discrepancy)
-        return spent.episodes, curve_of(study, store, plan, discrepancy)
+        return spent.episodes, curve_of(study, store, plan)
 
 
 def test_pod_is_nothing_at_the_truth_and_something_beside_it(opened):
@@ -104,6 +106,24 @@ def test_a_curve_has_pod_at_every_point_kept_like_other_episodes(opened):
     assert [point.pod["pod_pose"].value == 0 for point in curve.points] == [False, False, True, False]
     assert {point.pod["pod_image"].starts for point in curve.points} == {3}
     assert {one.key for one in series_of(curve)} >= set(METRICS)
+
+
+def test_a_sweep_stopped_before_its_last_replays_has_no_curve_yet(opened):
+    study, discrepancy = opened
+
+    class Stopping(Silent):
+        def begin(self, what, known):
+            if what.startswith("POD, trim 4"):
+                raise KeyboardInterrupt
+
+    model = study.settings.folder.parent / "truth.toml"
+    plan = with_target(plan_sweep(sweep_interval(study, "trim"), TRUTH, 4), model, discrepancy)
+    with Store.open(study.settings.folder) as store:
+        with pytest.raises(KeyboardInterrupt):
+            run_sweep(study, store, plan, Stopping(), discrepancy)
+        assert curve_of(study, store, plan) is None
+        assert curve_of(study, store, replace(plan, replays="")) is not None, "only POD is missing"
+    assert swept(study, discrepancy)[0] == 3
 
 
 def test_several_processes_find_the_same(make_study, truth, opened):

@@ -1,4 +1,5 @@
 import sqlite3
+from dataclasses import replace
 
 import pytest
 
@@ -68,13 +69,32 @@ def test_seconds_are_averaged_over_domain_instances(tmp_path):
         assert store.seconds() == {("agent1", 2): 1.0}
 
 
-def test_a_sweep_is_remembered_once(tmp_path):
-    sweep = SweepRecord("trim", {"delay": 0.1}, (-0.3, 0.0, 0.3))
+SWEEP = SweepRecord("trim", {"delay": 0.1}, (-0.3, 0.0, 0.3))
+
+
+def test_a_sweep_is_remembered_once_with_the_identity_of_its_domain_family(tmp_path):
     with Store.open(tmp_path) as store:
-        store.save_sweep("identity", sweep)
-        store.save_sweep("identity", sweep)
-        assert store.sweeps("identity") == [sweep]
-        assert store.sweeps("another identity") == []
+        store.save_sweep("identity", SWEEP)
+        store.save_sweep("identity", SWEEP)
+        store.save_sweep("another identity", SWEEP)
+        assert store.sweeps() == [("identity", SWEEP), ("another identity", SWEEP)]
+
+
+def test_the_sweep_asked_for_last_comes_last_also_if_it_is_an_old_one(tmp_path):
+    other = replace(SWEEP, parameter="blur")
+    with Store.open(tmp_path) as store:
+        for sweep in (SWEEP, other, SWEEP):
+            store.save_sweep("identity", sweep)
+        assert store.sweeps() == [("identity", other), ("identity", SWEEP)]
+
+
+def test_a_sweep_keeps_the_target_model_of_its_pod_beside_the_same_without(tmp_path):
+    against = replace(SWEEP, target_model='robot = "duckiebot"\n', replays="both")
+    with Store.open(tmp_path) as store:
+        store.save_sweep("identity", against)
+        store.save_sweep("identity", SWEEP)
+    with Store.read(tmp_path) as store:
+        assert store.sweeps() == [("identity", against), ("identity", SWEEP)]
 
 
 def test_a_study_that_has_not_been_run_is_told_how_to_run_it(tmp_path):

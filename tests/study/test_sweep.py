@@ -66,6 +66,16 @@ def test_an_interrupted_sweep_goes_on_where_it_was(make_study):
         assert [curve.parameter for curve in all_curves(study, store)] == ["trim"]
 
 
+def test_sweeps_of_a_parameter_that_the_family_no_longer_has_are_left_out(make_study, monkeypatch):
+    folder = make_study()
+    swept(folder)
+    swept(folder, parameter="delay")
+    monkeypatch.setattr("wobbly.PARAMETERS", {"delay": open_study(folder).family.parameters["delay"]})
+    study = open_study(make_study(parameters={"delay": "[0.0, 0.3]"}))
+    with Store.read(folder) as store:
+        assert [curve.parameter for curve in all_curves(study, store)] == ["delay"]
+
+
 def test_a_point_where_an_agent_fails_throughout_has_no_score_but_the_curve_stands(make_study):
     _, curve = swept(make_study(domain={"faults": '["agent3:*:raises"]'}), points=2)
     assert [point.assessment for point in curve.points] == [None, None, None]

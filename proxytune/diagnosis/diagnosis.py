@@ -11,7 +11,7 @@ from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit, intervals, seen
 from proxytune.diagnosis.innovations import Noise
 from proxytune.diagnosis.manoeuvres import Manoeuvre, next_manoeuvre
-from proxytune.diagnosis.plausible import check_clocks, check_motion
+from proxytune.diagnosis.plausible import check_clocks, check_motion, check_units
 from proxytune.diagnosis.search import Adopted, Found, Told, search
 from proxytune.diagnosis.split import Parts, split
 from proxytune.diagnosis.visibility import unseen
@@ -140,6 +140,7 @@ def diagnose(
     start = {name: robot.theta.get(name, PARAMETERS[name].neutral_value(robot.figures)) for name in names}
     parts = split(log, robot, test)
     check_motion(log.name, parts.fitted)
+    check_units(log.name, parts.fitted, start)
     check_clocks(log.name, parts.fitted, start)
     found = search(parts.fitted, start, names, seed, told)
     told("testing on drives kept aside")

@@ -26,6 +26,9 @@ from proxytune.space import Theta
 HORIZONS_S = (1.0, 2.0, 5.0)
 """Horizons at which the error is told."""
 
+FEWEST_BLOCKS = 3
+"""No error is told over windows from fewer blocks: it would have no interval."""
+
 CONFIRMED_S = 2.0
 """The horizon at which it is confirmed on the bullet plant."""
 
@@ -218,7 +221,7 @@ Strays = Callable[[Drives, Theta, Windows], Floats]
 
 def _error(found: Found, drives: Drives, horizon_s: float, seed: int, how: Strays = strays) -> HorizonError | None:
     windows = cut(drives, horizon_s)
-    if len(windows.begin) < 2:
+    if len(np.unique(drives.block[windows.begin])) < FEWEST_BLOCKS:
         return None
     blocks = drives.block[windows.begin][windows.window]
     before, after = (how(drives, fitted.theta, windows) ** 2 for fitted in (found.declared, found.model))

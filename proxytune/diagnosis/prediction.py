@@ -1,5 +1,6 @@
 """What a fitted model says of any log: poses predicted window by window."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,58 +29,48 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
     """
     if not horizon_s * log.rate_hz >= 1.0:
         raise LogError(f"{log.name}: a horizon of {horizon_s:g} s is shorter than a sample of {1.0 / log.rate_hz:g} s")
-    parts = [_of_episode(log, robot, theta, episode, horizon_s) for episode in log.episodes]
-    rows = [part for part in parts if len(part)]
-    if not rows:
-        raise LogError(f"{log.name}: no measured pose to start a window from")
-    return pd.concat(rows, ignore_index=True)
-
-
-def _of_episode(log: Log, robot: Robot, theta: Theta, episode: LogEpisode, horizon_s: float) -> pd.DataFrame:
-    known = np.flatnonzero(np.isfinite(episode.poses).all(axis=1))
+    whole = gather(log, robot, log.episodes)
     reach = int(np.floor(horizon_s * log.rate_hz + 1e-9))
-    starts = _starts(known, reach, len(episode.times))
-    if len(starts) == 0:
-        return pd.DataFrame()
-    drives = _standing(log, robot, episode, starts)
-    ticks = round(drives.tick_hz / log.rate_hz)
-    walked = window_paths(drives, theta, np.arange(len(starts)), reach * ticks)[:, ::ticks]
-    covered = starts[:, None] + np.arange(reach + 1)
+    starts = [_starts(episode, reach) for episode in log.episodes]
+    if not any(len(rows) for rows in starts):
+        raise LogError(f"{log.name}: no measured pose to start a window from")
+    ticks = round(whole.tick_hz / log.rate_hz)
+    windows = _windows(whole, log.episodes, starts, ticks)
+    walked = window_paths(windows, theta, np.arange(len(windows.first)), reach * ticks)[:, ::ticks]
+    poses = _placed(windows.poses[:, 0], walked)
+    cuts = np.cumsum([len(rows) for rows in starts])[:-1]
+    parts = zip(log.episodes, starts, np.split(poses, cuts), strict=True)
+    return pd.concat([_rows(*part) for part in parts if len(part[1])], ignore_index=True)
+
+
+def _rows(episode: LogEpisode, starts: Whole, poses: Floats) -> pd.DataFrame:
+    """The predicted poses (W, rows, 3) of an episode's windows, as far as the episode goes."""
+    covered = starts[:, None] + np.arange(poses.shape[1])
     inside = covered < len(episode.times)
-    poses = _placed(episode.poses[starts], walked)
     start = np.broadcast_to(episode.times[starts, None], covered.shape)
-    return pd.DataFrame(
-        {
-            "episode": episode.name,
-            "start_time": start[inside],
-            "time": episode.times[np.minimum(covered, len(episode.times) - 1)][inside],
-            "x": poses[..., 0][inside],
-            "y": poses[..., 1][inside],
-            "heading": poses[..., 2][inside],
-        }
-    )
+    times = episode.times[np.minimum(covered, len(episode.times) - 1)]
+    columns = {"start_time": start, "time": times, "x": poses[..., 0], "y": poses[..., 1], "heading": poses[..., 2]}
+    return pd.DataFrame({"episode": episode.name} | {name: values[inside] for name, values in columns.items()})
 
 
-def _starts(known: Whole, reach: int, rows: int) -> Whole:
+def _starts(episode: LogEpisode, reach: int) -> Whole:
     """Rows at which windows begin: measured ones, at least `reach` apart, not the last row."""
+    known = np.flatnonzero(np.isfinite(episode.poses[:-1]).all(axis=1))
     starts: list[int] = []
     at = 0
-    while True:
-        later = np.searchsorted(known, at)
-        if later >= len(known) or known[later] >= rows - 1:
-            return np.array(starts, dtype=int)
+    while (later := int(np.searchsorted(known, at))) < len(known):
         starts.append(int(known[later]))
         at = starts[-1] + reach
+    return np.array(starts, dtype=int)
 
 
-def _standing(log: Log, robot: Robot, episode: LogEpisode, starts: Whole) -> Drives:
-    """An episode's drives whose increments are the windows' beginnings alone."""
-    whole = gather(log, robot, [episode])
-    ticks = round(whole.tick_hz / log.rate_hz)
-    poses = np.repeat(episode.poses[starts][:, None], 2, axis=1)
-    first = starts * ticks
-    nothing = np.zeros(len(starts), dtype=int)
-    return replace(whole, episode=nothing, first=first, last=first, poses=poses, block=nothing)
+def _windows(whole: Drives, episodes: Sequence[LogEpisode], starts: Sequence[Whole], ticks: int) -> Drives:
+    """Drives whose increments are the windows' beginnings alone."""
+    poses = np.concatenate([episode.poses[rows] for episode, rows in zip(episodes, starts, strict=True)])
+    first = np.concatenate(starts) * ticks
+    number = np.repeat(np.arange(len(episodes)), [len(rows) for rows in starts])
+    both = np.repeat(poses[:, None], 2, axis=1)
+    return replace(whole, episode=number, first=first, last=first, poses=both, block=np.zeros_like(first))
 
 
 def _placed(start: Floats, walked: Floats) -> Floats:

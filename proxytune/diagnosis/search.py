@@ -16,16 +16,19 @@ from proxytune.diagnosis.screening import Lead, screen
 from proxytune.diagnosis.windows import cut, ratio, strays
 from proxytune.space import Theta
 
-MOST_EFFECTS = 4
+MOST_EFFECTS = 5
 """No more effects are adopted."""
 
 LEAST_GAIN = 15.0
 """Nats that an effect must gain on blocks it was not fitted to."""
 
+CLEAR_GAIN = 30.0
+"""Nats that a random effect must gain: its chance is drawn from shifted innovations, which is rough."""
+
 P_VALUE = 0.01
 """Chance must gain as much as rarely as this."""
 
-LEAST_SHARE = 0.03
+LEAST_SHARE = 0.01
 """What gains less than this share of all that was gained before may only mend the form of that."""
 
 REFITTED = 6
@@ -49,8 +52,12 @@ COSINE_APART = 0.95
 """Effects closer than this in evidence, or in what they do to the innovations, are rivals."""
 
 RIVAL_SHARE = 0.7
-RIVAL_HORIZON_S = 2.0
-"""Effects are rivals too if the second has this share of the evidence and its error over such windows is no other."""
+"""Effects are rivals too if the second has this share of the evidence and predicts no worse."""
+
+ERROR_HORIZON_S = 2.0
+ERROR_FACTOR = 1.05
+"""A model predicts worse if its error over windows of this horizon is shown to be larger by more than this factor: such
+an effect is not adopted, whatever the evidence of single steps."""
 
 
 class Tried(NamedTuple):
@@ -152,7 +159,7 @@ def search(drives: Drives, theta: Theta, declared: tuple[str, ...], seed: int, t
         tried = tried or _tried(looked)
         first_curves = first_curves or looked.curves
         least = max(LEAST_GAIN, LEAST_SHARE * sum(effect.gain for effect in adopted))
-        best = _best(looked, least)
+        best = _best(model, looked, least)
         remainder = _unnamed(looked, max(least, best.gain if best else 0.0))
         if best is None or number == MOST_EFFECTS or (remainder and not _goes_on(adopted, best, remainder)):
             break
@@ -226,14 +233,17 @@ class _Choice(NamedTuple):
     random: RandomEffect | None
 
 
-def _best(looked: _Round, least: float) -> _Choice | None:
-    """The effect with most evidence, if that is more than chance."""
+def _best(model: Fit, looked: _Round, least: float) -> _Choice | None:
+    """The effect with most evidence, if that is more than chance and predicts no worse."""
     named = [
         _Choice(gain, lead, fitted, None) for lead, fitted, gain in looked.fits.values() if lead.p_value <= P_VALUE
     ]
-    chancy = [_Choice(effect.gain, None, None, effect) for effect in looked.random if effect.p_value <= P_VALUE]
-    best = max(named + chancy, key=lambda choice: choice.gain, default=None)
-    if best is None or best.gain < least:
+    clear = [effect for effect in looked.random if effect.p_value <= P_VALUE and effect.gain >= CLEAR_GAIN]
+    chancy = [_Choice(effect.gain, None, None, effect) for effect in clear]
+    ranked = sorted(named + chancy, key=lambda choice: -choice.gain)
+    enough = (choice for choice in ranked if choice.gain >= least)
+    best = next((choice for choice in enough if choice.fitted is None or _no_worse(choice.fitted, model)), None)
+    if best is None:
         return None
     plain = [choice for choice in named if _is_plain_form_of(choice, best)]
     return plain[0] if plain else best
@@ -307,14 +317,17 @@ def _rivals(best: Lead, chosen: Fit, gain: float, looked: _Round) -> tuple[Candi
 
 def _as_good(other: tuple[Lead, Fit, float], gain: float, chosen: Fit) -> bool:
     """Whether it has most of the evidence and predicts no worse, block by block."""
-    if other[2] < RIVAL_SHARE * gain:
-        return False
-    windows = cut(chosen.drives, RIVAL_HORIZON_S)
+    return other[2] >= RIVAL_SHARE * gain and _no_worse(other[1], chosen)
+
+
+def _no_worse(one: Fit, other: Fit) -> bool:
+    """Whether one model's error over windows is not shown to be larger than the other's by more than ERROR_FACTOR."""
+    windows = cut(other.drives, ERROR_HORIZON_S)
     if len(windows.begin) < 2:
-        return False
-    squares = [strays(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (other[1], chosen)]
-    interval = ratio(squares[0], squares[1], chosen.drives.block[windows.begin][windows.window]).interval
-    return interval[0] <= 1.0 <= interval[1]
+        return True
+    squares = [strays(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
+    blocks = other.drives.block[windows.begin][windows.window]
+    return ratio(squares[0], squares[1], blocks).interval[0] <= ERROR_FACTOR
 
 
 def _cosine(one: Lead, other: Lead) -> float:

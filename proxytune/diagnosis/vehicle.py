@@ -50,11 +50,13 @@ def _full_speed(log: Log) -> float:
 
 def _driven(log: Log) -> Floats:
     """Metres a second that the robot drove per unit of duty, over all drives together (1,)."""
-    every = max(1, round(log.rate_hz))
+    every = max(1, round(log.rate_hz / 2.0))
     way = duty = 0.0
     for episode in log.episodes:
         places = episode.poses[::every, :2]
         known = np.flatnonzero(np.isfinite(places).all(axis=1))
-        way += float(np.hypot(*np.diff(places[known], axis=0).T).sum())
-        duty += float(np.abs(episode.commands.mean(axis=1)).sum()) / log.rate_hz
+        if len(known) > 1:
+            between = slice(known[0] * every, known[-1] * every)
+            way += float(np.hypot(*np.diff(places[known], axis=0).T).sum())
+            duty += float(np.abs(episode.commands[between].mean(axis=1)).sum()) / log.rate_hz
     return np.array([way / duty if duty > 0.0 else 1e-3])

@@ -1,0 +1,299 @@
+"""`diagnose` from a log's folder to its findings: the JSON of DESIGN.md, files that read back, one-line refusals."""
+
+import json
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+import hidden
+from planted import TRUTH, planted_log, with_poses, write_log
+
+from proxytune.cli.main import main
+from proxytune.effects import CATALOGUE, read_model
+from proxytune.study.study import open_study
+
+KEYS = {
+    "verdict",
+    "declared",
+    "effects",
+    "candidates",
+    "residual_depends_on",
+    "error",
+    "could_not_be_seen",
+    "next_manoeuvre",
+}
+ERROR_KEYS = {
+    "horizon_s",
+    "before",
+    "before_interval",
+    "after",
+    "after_interval",
+    "noise_floor",
+    "unit",
+}
+SCRUBBING = {**TRUTH, "yaw_scrub": 0.12}
+
+
+def small_log(**more):
+    return planted_log(SCRUBBING, **{"episodes": 6, "seconds": 12.0, **more})
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    return tmp_path_factory.mktemp("diagnosed")
+
+
+@pytest.fixture(scope="module")
+def printed(home):
+    """What was printed, diagnosing a small log once."""
+    with pytest.MonkeyPatch.context() as patch:
+        lines = []
+        patch.setattr("builtins.print", lambda *words, **_: lines.append(" ".join(map(str, words))))
+        folder = write_log(small_log(), home / "log")
+        assert main(["diagnose", str(folder), "--output", str(home / "out"), "--json"]) == 0
+    (text,) = lines
+    return text
+
+
+@pytest.fixture(scope="module")
+def document(printed):
+    return json.loads(printed)
+
+
+def test_the_document_has_what_the_design_promises(document):
+    assert set(document) >= KEYS
+    assert document["verdict"] == "explained"
+    assert set(document["error"]) >= ERROR_KEYS
+    assert (document["error"]["horizon_s"], document["error"]["unit"]) == (2.0, "m")
+    assert set(document["declared"]) == {"trim", "delay"}
+    for estimate in document["declared"].values():
+        assert set(estimate) >= {"value", "interval"}
+        assert estimate["interval"][0] <= estimate["value"] <= estimate["interval"][1]
+
+
+def test_the_effect_is_named_with_its_parameter_interval_and_unit(document):
+    (effect,) = document["effects"]
+    assert effect["name"] == "yaw_scrub"
+    assert effect["indistinguishable_from"] == []
+    (parameter,) = effect["parameters"].values()
+    assert set(effect["parameters"]) == {"baseline"}
+    assert parameter["unit"] == "m"
+    assert parameter["interval"][0] < 0.12 < parameter["interval"][1]
+
+
+def test_every_effect_tried_is_told_best_first(document):
+    gains = [candidate["held_out_gain"] for candidate in document["candidates"]]
+    assert gains == sorted(gains, reverse=True)
+    assert all(set(candidate) >= {"name", "held_out_gain", "p_value"} for candidate in document["candidates"])
+    names = {candidate["name"] for candidate in document["candidates"]}
+    assert {"yaw_scrub", "dead_band", "stiction", "dropped_commands", "delay_jitter"} <= names <= set(CATALOGUE)
+
+
+def test_error_falls_and_its_intervals_lie_round_it(document):
+    error = document["error"]
+    assert error["after"] < error["before"]
+    for when in ("before", "after"):
+        low, high = error[f"{when}_interval"]
+        assert 0.0 < low < error[when] < high
+    assert 0.0 < error["noise_floor"] < error["before"]
+
+
+def test_what_is_printed_is_what_is_written(document, home):
+    written = json.loads((home / "out" / "diagnosis.json").read_text())
+    files = document["files"]
+    assert {key: value for key, value in document.items() if key != "files"} == written
+    assert {Path(name).name for name in files} == {path.name for path in (home / "out").iterdir()}
+    assert {"diagnosis.json", "model.toml"} <= {Path(name).name for name in files}
+    figures = [Path(name) for name in files if name.endswith(".png")]
+    assert len(figures) >= 3
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in figures)
+
+
+def test_the_model_reads_back_with_what_was_found(document, home):
+    model = read_model(home / "out" / "model.toml")
+    (parameter,) = document["effects"][0]["parameters"].values()
+    assert model.robot == "duckiebot"
+    assert model.theta["yaw_scrub"] == parameter["value"]
+    assert model.intervals["yaw_scrub"] == tuple(parameter["interval"])
+    assert set(model.theta) >= {"trim", "delay", "yaw_scrub"}
+
+
+def test_predicting_the_test_drives_with_the_model_reproduces_the_error(document, home, capsys):
+    log = small_log()
+    kept = replace(log, episodes=log.episodes[2::3])
+    folder = write_log(kept, home / "kept")
+    output = home / "kept.csv"
+    assert main(["predict", str(home / "out" / "model.toml"), str(folder), "--output", str(output), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["error"]["value"] == pytest.approx(document["error"]["after"], rel=0.15)
+    assert told["error"]["value"] < document["error"]["before"]
+
+
+def test_a_study_takes_the_model_as_its_proxy(printed, home):
+    shipped = Path(__file__).parents[2] / "studies" / "known_answer"
+    study = home / "study"
+    study.mkdir()
+    shutil.copy(shipped / "target.csv", study)
+    shutil.copy(home / "out" / "model.toml", study)
+    text = (shipped / "study.toml").read_text(encoding="utf-8")
+    (study / "study.toml").write_text(text, encoding="utf-8")
+    plain = open_study(study)
+    (study / "study.toml").write_text(text.replace("format = 1", 'format = 1\nproxy = "model.toml"'), encoding="utf-8")
+    extended = open_study(study)
+    assert extended.settings.proxy == study / "model.toml"
+    assert extended.identity != plain.identity
+    chains = [opened.family.instance({}).drivetrain.motion for opened in (plain, extended)]
+    assert [{effect.name for effect in chain.effects} for chain in chains] == [set(), {"yaw_scrub"}]
+
+
+def test_an_effect_that_is_declared_is_not_missing_in_another_log_either(home, printed, capsys):
+    test = write_log(small_log(seed=2), home / "test")
+    words = ["--declared", "trim, delay,yaw_scrub", "--test", str(test), "--output", str(home / "declared"), "--json"]
+    assert main(["diagnose", str(home / "log"), *words]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["verdict"], told["effects"]) == ("nothing missing", [])
+    assert told["declared"]["yaw_scrub"]["value"] == pytest.approx(0.12, abs=0.01)
+    assert told["error"]["after"] == told["error"]["before"]
+    assert told["fitted_s"] == pytest.approx(told["tested_s"], rel=0.02)
+
+
+def test_a_robot_of_the_logs_own_geometry_is_diagnosed_and_its_model_predicts(tmp_path, capsys):
+    log = replace(small_log(), robot="my_robot")
+    own = {"wheel_radius_m": 0.0318, "baseline_m": 0.16, "full_speed_m_s": 0.6}
+    folder = write_log(log, tmp_path / "log", **own)
+    assert main(["diagnose", str(folder), "--declared", "trim,delay,motor_lag", "--output", str(tmp_path / "o")]) == 0
+    capsys.readouterr()
+    model = tmp_path / "o" / "model.toml"
+    assert read_model(model).geometry == {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}
+    assert main(["predict", str(model), str(folder), "--output", str(tmp_path / "p.csv"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["error"]["value"] < 0.02
+
+
+def edited(column, row, value):
+    """A log's folder with one cell of samples.csv changed."""
+
+    def make(folder):
+        write_log(small_log(episodes=6), folder)
+        table = pd.read_csv(folder / "samples.csv", dtype=str)
+        table.loc[row, column] = value
+        table.to_csv(folder / "samples.csv", index=False)
+
+    return make
+
+
+def changed(change):
+    """A log's folder of a changed log."""
+    return lambda folder: write_log(change(small_log()), folder)
+
+
+def with_commands(log, change):
+    return replace(log, episodes=tuple(replace(e, commands=change(e.commands)) for e in log.episodes))
+
+
+def without_commands(folder):
+    log = small_log()
+    episodes = tuple(replace(e, commands=np.empty((len(e.times), 0))) for e in log.episodes)
+    write_log(replace(log, command="none", episodes=episodes), folder)
+
+
+def in_degrees(log):
+    return with_poses(log, lambda poses: poses * (1.0, 1.0, 180.0 / np.pi))
+
+
+def two_clocks(log):
+    def late(poses):
+        moved = np.full_like(poses, np.nan)
+        moved[60:] = poses[:-60]
+        return moved
+
+    return with_poses(log, late)
+
+
+def still(log):
+    random = np.random.default_rng(1)
+    return with_poses(log, lambda poses: random.normal(0.0, (0.002, 0.002, 0.005), poses.shape))
+
+
+def without_poses(log):
+    return with_poses(log, lambda poses: np.full_like(poses, np.nan))
+
+
+BAD = {
+    "a log without commands": (without_commands, "has no commands"),
+    "time that does not increase": (edited("time", 7, "0.1"), "line 9, column 'time': 0.1 s does not come after"),
+    "headings in degrees": (changed(in_degrees), "look like degrees; write headings in radians"),
+    "a robot unknown and without geometry": (
+        changed(lambda log: replace(log, robot="tractor")),
+        "robot 'tractor' is unknown",
+    ),
+    "fewer than two episodes' worth of data": (
+        lambda folder: write_log(small_log(episodes=1, seconds=15.0), folder),
+        "at least 20 s",
+    ),
+    "commands outside ±1": (
+        changed(lambda log: with_commands(log, lambda duties: 1.2 * duties / np.abs(duties).max())),
+        "a duty must be between -1 and 1",
+    ),
+    "commands that are zero": (
+        changed(lambda log: with_commands(log, lambda duties: 0.0 * duties)),
+        "every command is zero",
+    ),
+    "a stationary robot": (changed(still), "stands still"),
+    "NaN": (edited("x", 5, "nan"), "line 7, column 'x': must be a finite number"),
+    "two clocks apart": (
+        lambda folder: write_log(two_clocks(small_log(seconds=30.0)), folder),
+        " s earlier; they seem to come from two clocks",
+    ),
+    "no poses": (changed(without_poses), "no two measured poses"),
+    "no folder": (lambda folder: None, "no such folder"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_written(case, tmp_path, capsys):
+    make, says = BAD[case]
+    make(tmp_path / "log")
+    assert main(["diagnose", str(tmp_path / "log"), "--output", str(tmp_path / "out"), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    line = [text for text in err.splitlines() if text.strip()][-1]
+    assert line.startswith("proxytune diagnose: ")
+    assert says in line
+    assert err.count("proxytune diagnose") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--declared", "trimm"], "--declared trimm: no effect on motion has this name"),
+        (["--declared", "blur"], "--declared blur: no effect on motion"),
+        (["--robot", "duckybot"], "robot 'duckybot' is unknown"),
+        (["--seed", "-1"], "--seed must be at least 0"),
+        (["--test", "nowhere"], "nowhere: no such folder"),
+    ],
+)
+def test_wrong_options_are_told_in_one_line(words, says, home, printed, capsys, tmp_path):
+    assert main(["diagnose", str(home / "log"), *words, "--output", str(tmp_path / "out")]) == 2
+    err = capsys.readouterr().err
+    assert says in err
+    assert "Traceback" not in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_people_read_that_a_clean_log_is_missing_nothing_and_where_the_files_are(tmp_path, capsys):
+    folder = write_log(hidden.make_log(hidden.CLEAN[0], episodes=6, seconds=12.0), tmp_path / "log")
+    assert main(["diagnose", str(folder), "--output", str(tmp_path / "out")]) == 0
+    out = capsys.readouterr().out
+    assert "nothing missing" in out
+    assert "model.toml" in out
+    told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert (told["verdict"], told["effects"], told["residual_depends_on"]) == ("nothing missing", [], [])
+    assert told["next_manoeuvre"] is None

@@ -1,0 +1,162 @@
+"""`predict` replays any log with a model file and says how far it strays."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+from planted import TRUTH, planted_log, with_poses, write_log
+
+from proxytune.cli.main import main
+from proxytune.effects import Model, model_text
+
+COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_log(planted_log(TRUTH, episodes=2, seconds=10.0, noise=None), tmp_path / "log")
+
+
+@pytest.fixture
+def model(tmp_path):
+    def write(theta=TRUTH, robot="duckiebot", **more):
+        path = tmp_path / "model.toml"
+        path.write_text(model_text(Model(robot, None, theta, {}, **more)), encoding="utf-8")
+        return path
+
+    return write
+
+
+def predicted(*words, capsys):
+    assert main(["predict", *map(str, words), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_every_window_is_written_and_compared_with_what_was_measured(folder, model, tmp_path, capsys):
+    told = predicted(model(), folder, "--horizon", 2, "--output", tmp_path / "poses.csv", capsys=capsys)
+    table = pd.read_csv(tmp_path / "poses.csv", dtype={"episode": str})
+    assert list(table.columns) == COLUMNS
+    assert told["rows"] == len(table)
+    assert told["windows"] == len(table[["episode", "start_time"]].drop_duplicates()) == 10
+    assert told["horizon_s"] == 2.0
+    assert told["error"]["value"] < 1e-6
+    assert told["error"]["unit"] == "m"
+    assert told["error"]["poses"] == 2 * 199
+
+
+def test_the_error_is_that_of_the_written_poses(folder, model, tmp_path, capsys):
+    told = predicted(model({"trim": 0.1, "delay": 0.12}), folder, "--output", tmp_path / "poses.csv", capsys=capsys)
+    table = pd.read_csv(tmp_path / "poses.csv")
+    measured = pd.read_csv(folder / "samples.csv")[["episode", "time", "x", "y"]]
+    both = table[table.time > table.start_time].merge(measured, on=["episode", "time"], suffixes=("", "_seen"))
+    apart = np.hypot(both.x - both.x_seen, both.y - both.y_seen)
+    assert told["error"]["value"] == pytest.approx(np.sqrt(np.mean(apart**2)))
+    assert told["error"]["value"] > 0.005
+
+
+def test_a_longer_horizon_has_fewer_windows_and_a_larger_error(folder, model, tmp_path, capsys):
+    path = model({"trim": 0.1, "delay": 0.12})
+    short, long = (
+        predicted(path, folder, "--horizon", seconds, "--output", tmp_path / "p.csv", capsys=capsys)
+        for seconds in (1, 5)
+    )
+    assert long["windows"] < short["windows"]
+    assert long["error"]["value"] > short["error"]["value"]
+
+
+def test_people_read_the_error_in_millimetres(folder, model, tmp_path, capsys):
+    assert main(["predict", str(model()), str(folder), "--output", str(tmp_path / "p.csv")]) == 0
+    assert "10 windows of 2 s: RMSE 0.0 mm" in capsys.readouterr().out
+
+
+def test_a_robot_of_its_own_needs_geometry_in_the_model_or_the_log(model, tmp_path, capsys):
+    log = replace(planted_log(TRUTH, episodes=2, seconds=10.0, noise=None), robot="my_robot")
+    own = {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}
+    theta = {**TRUTH, "motor_lag.time_constant": 0.2}
+    bare = write_log(log, tmp_path / "bare")
+    told = predicted(model(theta, "my_robot", geometry=own), bare, "--output", tmp_path / "p.csv", capsys=capsys)
+    assert told["error"]["value"] < 1e-6
+    stated = write_log(log, tmp_path / "stated", wheel_radius_m=0.0318, baseline_m=0.16, full_speed_m_s=0.6)
+    told = predicted(model(theta, "my_robot"), stated, "--output", tmp_path / "p.csv", capsys=capsys)
+    assert told["error"]["value"] < 1e-6
+    assert main(["predict", str(model(theta, "my_robot")), str(bare), "--output", str(tmp_path / "q.csv")]) == 2
+    assert "robot 'my_robot' is unknown" in capsys.readouterr().err
+    assert not (tmp_path / "q.csv").exists()
+
+
+def test_a_log_without_a_pose_to_compare_with_is_still_predicted(model, tmp_path, capsys):
+    log = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
+
+    def sparse(poses):
+        out = np.full_like(poses, np.nan)
+        out[::40] = poses[::40]
+        return out
+
+    folder = write_log(with_poses(log, sparse), tmp_path / "sparse")
+    told = predicted(model(), folder, "--horizon", 1, "--output", tmp_path / "p.csv", capsys=capsys)
+    assert told["windows"] == 5
+    assert told["error"]["poses"] == 0
+
+
+BAD = {
+    "no such model": (["{home}/gone.toml", "{log}"], "gone.toml"),
+    "no such log": (["{model}", "{home}/gone"], "gone: no such folder"),
+    "a horizon of nothing": (["{model}", "{log}", "--horizon", "0"], "--horizon must be a positive number of seconds"),
+    "a horizon that is no number": (["{model}", "{log}", "--horizon", "nan"], "--horizon must be a positive number"),
+    "an endless horizon": (["{model}", "{log}", "--horizon", "inf"], "--horizon must be a positive number"),
+    "a horizon shorter than a sample": (["{model}", "{log}", "--horizon", "0.01"], "shorter than a sample"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line_and_nothing_is_written(case, folder, model, tmp_path, capsys):
+    words, says = BAD[case]
+    path = model()
+    given = [word.format(home=tmp_path, log=folder, model=path) for word in words]
+    assert main(["predict", *given, "--output", str(tmp_path / "p.csv"), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("proxytune predict: ")
+    assert says in err
+    assert not (tmp_path / "p.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("format = 1\n", "robot"),
+        ('format = 1\nrobot = "duckiebot"\n[effects.dead_bnd]\nwidth = 0.1\n', "no such effect"),
+        ('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 7\n', "trim"),
+        ("format = \n", "model.toml"),
+    ],
+)
+def test_a_model_that_cannot_be_read_is_told_with_its_file(text, says, folder, tmp_path, capsys):
+    (tmp_path / "model.toml").write_text(text, encoding="utf-8")
+    output = tmp_path / "p.csv"
+    assert main(["predict", str(tmp_path / "model.toml"), str(folder), "--output", str(output)]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "model.toml" in err
+    assert says in err
+
+
+def test_a_log_without_commands_cannot_be_predicted(model, tmp_path, capsys):
+    log = planted_log(TRUTH, episodes=1, seconds=5.0, noise=None)
+    episodes = tuple(replace(e, commands=np.empty((len(e.times), 0))) for e in log.episodes)
+    folder = write_log(replace(log, command="none", episodes=episodes), tmp_path / "none")
+    assert main(["predict", str(model()), str(folder), "--output", str(tmp_path / "p.csv")]) == 2
+    assert "has no commands" in capsys.readouterr().err
+
+
+def test_an_output_needs_a_name(folder, model, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["predict", str(model()), str(folder)])
+    assert caught.value.code == 2
+    assert "--output" in capsys.readouterr().err

@@ -1,0 +1,151 @@
+"""A diagnosis holds what was found, tests it on drives kept aside, and refuses what it cannot bear."""
+
+import sys
+from dataclasses import FrozenInstanceError, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parent))
+
+import hidden
+from planted import ROBOT, TRUTH, drives_of, fitted, planted_log, with_poses
+
+from proxytune.diagnosis.diagnosis import (
+    HORIZONS_S,
+    _error,
+    declared_effects,
+    declared_parameters,
+    diagnose,
+    residual_over_time,
+)
+from proxytune.diagnosis.search import Found
+from proxytune.driving.robot import read_robot
+from proxytune.errors import LogError
+
+SCRUBBING = {**TRUTH, "yaw_scrub": 0.12}
+
+
+@pytest.fixture(scope="module")
+def told():
+    return []
+
+
+@pytest.fixture(scope="module")
+def diagnosis(told):
+    log = planted_log(SCRUBBING, episodes=6, seconds=12.0)
+    return diagnose(log, ROBOT, ("trim", "delay"), told=told.append)
+
+
+def test_the_planted_effect_is_found_with_its_value(diagnosis):
+    assert diagnosis.verdict == "explained"
+    assert [effect.effect for effect in diagnosis.effects] == ["yaw_scrub"]
+    estimate = diagnosis.theta["yaw_scrub"]
+    assert estimate.interval[0] < 0.12 < estimate.interval[1]
+    assert estimate.unit == "m"
+    assert np.ptp(estimate.interval) < 0.02
+
+
+def test_declared_values_are_those_before_the_effect_and_all_values_those_after(diagnosis):
+    assert set(diagnosis.declared) == {"trim", "delay"}
+    assert set(diagnosis.theta) == {"trim", "delay", "yaw_scrub"}
+    for name, true in TRUTH.items():
+        low, high = diagnosis.theta[name].interval
+        assert low < true < high
+
+
+def test_errors_are_told_at_every_horizon_and_fall_to_the_floor(diagnosis):
+    assert [error.horizon_s for error in diagnosis.errors] == list(HORIZONS_S)
+    for error in diagnosis.errors:
+        assert error.before.interval[0] < error.before.value < error.before.interval[1]
+        assert error.ratio.value == pytest.approx(error.after.value / error.before.value)
+        assert error.after.value < error.before.value
+        assert error.after.value == pytest.approx(error.noise_floor, rel=0.35)
+    error = diagnosis.errors[1]
+    assert error.ratio.interval[1] < 1.0
+    assert error.removable_left < 0.3
+    assert error.heading_after.value < error.heading_before.value
+
+
+def test_nothing_removable_is_left_to_speak_of_where_nothing_was(diagnosis):
+    error = diagnosis.errors[1]
+    at_floor = error.before._replace(value=error.noise_floor)
+    assert replace(error, before=at_floor).removable_left is None
+    assert replace(error, after=error.before).removable_left == 1.0
+
+
+def test_the_test_drives_are_not_fitted(diagnosis):
+    assert diagnosis.parts.fitted.duties.shape[0] == 4
+    assert diagnosis.parts.tested.duties.shape[0] == 2
+    assert diagnosis.found.model.drives is diagnosis.parts.fitted
+
+
+def test_progress_is_told(diagnosis, told):
+    assert told[0] == "fitting what is declared"
+    assert any("round 2" in line for line in told)
+
+
+def test_a_diagnosis_cannot_be_changed(diagnosis):
+    with pytest.raises(FrozenInstanceError):
+        diagnosis.verdict = "nothing missing"
+
+
+def test_the_best_candidate_is_the_one_adopted(diagnosis):
+    gains = [tried.gain for tried in diagnosis.found.tried]
+    assert gains == sorted(gains, reverse=True)
+    assert diagnosis.found.tried[0].effect == "yaw_scrub"
+    assert 0.0 < diagnosis.found.tried[0].p_value <= 0.01
+
+
+def test_residuals_are_small_with_the_effect_and_lie_where_the_robot_was(diagnosis):
+    tested = diagnosis.parts.tested
+    before, places = residual_over_time(tested, diagnosis.found.declared.theta, 2.0)
+    after, _ = residual_over_time(tested, diagnosis.found.model.theta, 2.0)
+    assert before.shape == after.shape == (len(places), 2)
+    assert np.mean(after[:, 1] ** 2) < 0.5 * np.mean(before[:, 1] ** 2)
+    assert 0.0 < after[:, 0].min() < after[:, 0].max() <= 12.0
+
+
+@pytest.mark.parametrize(("robot", "effects"), [("duckiebot", ("trim", "delay")), ("husky", ()), ("irobot_create", ())])
+def test_declared_is_what_a_robot_has_of_theta_that_acts_on_motion(robot, effects):
+    assert declared_effects(read_robot(robot)) == effects
+
+
+def test_declared_effects_are_read_into_their_parameters():
+    assert declared_parameters(("trim", "wheel_gain", "trim")) == ("trim", "wheel_gain.left", "wheel_gain.right")
+    assert declared_parameters(("dead_band",)) == ("dead_band.width",)
+    assert declared_parameters(()) == ()
+
+
+@pytest.mark.parametrize(("name", "nearest"), [("trimm", "trim"), ("blur", ""), ("camera_pitch", "")])
+def test_what_does_not_act_on_motion_cannot_be_declared(name, nearest):
+    with pytest.raises(LogError, match=f"^--declared {name}: no effect on motion has this name.*{nearest}"):
+        declared_parameters((name,))
+
+
+def test_the_same_seed_gives_the_same_diagnosis(diagnosis):
+    again = diagnose(planted_log(SCRUBBING, episodes=6, seconds=12.0), ROBOT, ("trim", "delay"))
+    assert again.theta == diagnosis.theta
+    assert again.found.tried == diagnosis.found.tried
+    assert again.errors == diagnosis.errors
+
+
+@pytest.mark.parametrize("level", [1e-6, 0.002])
+def test_a_stationary_robot_gets_no_answer(level):
+    random = np.random.default_rng(1)
+    case = hidden.CLEAN[0]
+    log = with_poses(
+        hidden.make_log(case, episodes=6, seconds=12.0), lambda poses: random.normal(0.0, level, poses.shape)
+    )
+    with pytest.raises(LogError, match="stands still"):
+        diagnose(log, ROBOT, ("trim", "delay"))
+
+
+def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
+    short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
+    log = replace(short, episodes=(*short.episodes, replace(long.episodes[0], name="long")))
+    drives = drives_of(log)
+    model = fitted(drives)
+    error = _error(Found(model, model, (), (), (), ()), drives, 5.0, 1)
+    assert error is None or np.isfinite((*error.before.interval, *error.ratio.interval)).all()

@@ -1,0 +1,100 @@
+"""Lost and jittering commands are found, and clean drives have none."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parent))
+
+from planted import TRUTH, fitted, planted_drives
+
+from proxytune.diagnosis.events import SHIFTS, _jitter, _lost, random_effects, responses
+
+SHORT = {"episodes": 4, "seconds": 25.0}
+
+
+def weighed(theta, seed=1):
+    effects = random_effects(fitted(planted_drives({**TRUTH, **theta}, seed=seed, **SHORT)), 1)
+    return {effect.effect: effect for effect in effects}
+
+
+@pytest.fixture(scope="module")
+def lost():
+    return weighed({"dropped_commands": 0.3})
+
+
+@pytest.fixture(scope="module")
+def late():
+    return weighed({"delay_jitter": 0.15})
+
+
+def test_lost_commands_are_found_with_their_probability(lost):
+    found = lost["dropped_commands"]
+    assert found.gain > 30.0
+    assert found.p_value <= 0.01
+    assert found.gain > lost["delay_jitter"].gain
+    assert 0.1 < found.value < 0.5
+    assert found.interval[0] <= found.value <= found.interval[1]
+
+
+def test_jittering_commands_are_found_with_their_spread(late):
+    found = late["delay_jitter"]
+    assert found.gain > 15.0
+    assert found.p_value <= 0.01
+    assert 0.07 < found.value < 0.3
+    assert found.interval[0] <= found.value <= found.interval[1]
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_clean_drives_have_neither(seed):
+    for found in weighed({}, seed).values():
+        assert found.gain < 10.0
+
+
+def test_every_effect_names_its_parameter(lost):
+    assert {name: effect.parameter for name, effect in lost.items()} == {name: name for name in lost}
+
+
+@pytest.fixture(scope="module")
+def answered():
+    return responses(fitted(planted_drives({**TRUTH, "dropped_commands": 0.3}, episodes=2, seconds=10.0)), 1)
+
+
+def test_every_command_that_changes_something_has_a_response(answered):
+    assert 20 < len(answered.size) < 2 * 200
+    assert answered.pull.shape == answered.size.shape
+    assert answered.shifted.shape == (SHIFTS, len(answered.size))
+    assert answered.size.min() > 0.0
+
+
+def test_a_model_that_explains_everything_is_pulled_nowhere():
+    base = fitted(planted_drives(TRUTH, episodes=2, seconds=10.0, noise=None))
+    found = responses(base, 1)
+    assert np.median(np.abs(found.pull) / found.size) < 0.1
+
+
+def test_a_robot_whose_command_never_changes_has_no_responses():
+    drives = planted_drives(TRUTH, episodes=2, seconds=10.0)
+    still = replace(drives, duties=np.full_like(drives.duties, 0.4), rest=np.full_like(drives.rest, 0.4))
+    base = fitted(still)
+    assert len(responses(base, 1).size) == 0
+    assert random_effects(base, 1) == ()
+
+
+@pytest.mark.parametrize(("ratio", "size"), [(_lost, 0.05), (_lost, 0.2), (_jitter, 0.3), (_jitter, 2.0)])
+def test_mean_lateness_speaks_for_nothing_since_the_delay_has_it_already(ratio, size):
+    pull = np.array([-1e-4, 0.0, 1e-4])
+    said = ratio(size, pull, np.zeros(3))
+    np.testing.assert_allclose(said - said[1], 0.0, atol=2e-6)
+    assert said[1] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("ratio", "size"), [(_lost, 0.2), (_jitter, 1.5)])
+def test_what_points_against_a_loss_of_no_consequence_costs(ratio, size):
+    gains = ratio(size, np.array([-8.0, 0.0, 0.0]), np.array([8.0, 8.0, 1e-9]))
+    assert gains[0] > 1.0
+    assert gains[1] < 0.0
+    assert gains[2] == pytest.approx(0.0, abs=1e-3)

@@ -1,0 +1,99 @@
+"""How often the diagnosis is right, over hidden effects of every kind at full size."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from joblib import Parallel, delayed
+
+sys.path.append(str(Path(__file__).parent))
+
+import rates
+
+EVERY = 6
+"""Every so many-th case of each kind, 37 in all: twelve one-minute logs take ten to fifteen seconds a case."""
+
+
+@pytest.mark.slow
+def test_what_is_hidden_is_named_and_what_cannot_be_named_is_flagged(capsys):
+    jobs = rates.all_jobs(EVERY)
+    rows = Parallel(n_jobs=2)(delayed(rates.diagnosed)(job) for job in jobs)
+    counted = rates.rates(rows)
+    with capsys.disabled():
+        print()
+        print("\n".join(row.text for row in rows))
+        print("\n".join(f"{name}: {rate}" for name, rate in counted.items()))
+        print(rates.confusion(rows))
+    assert counted["failed"].hits == 0
+    assert counted["in form above 30 nats named"].share >= 0.85
+    assert counted["in form wrong without a flag"].share <= 0.15
+    assert counted["pairs both named"].share >= 0.5
+    assert counted["clean false alarms"].share <= 0.4
+    assert counted["taken out flagged"].share >= 0.7
+    assert counted["outside flagged"].share >= 0.8
+    assert counted["other form right or flagged"].share >= 0.5
+
+
+def row(kind, verdict, *adopted, right=(), **more):
+    case = rates.Case("case", (), "normal", 1, 0.0, 0.0, right)
+    without = "dead_band" if kind == "taken out" else ""
+    return rates.Row(rates.Job(kind, case, without), verdict, adopted, **more)
+
+
+def test_a_hidden_effect_counts_as_named_if_it_or_its_rival_was_added():
+    hidden = (("dead_band",), ("motor_lag", "delay"))
+    assert row("pair", "explained", ("dead_band",), ("stiction", "motor_lag"), right=hidden).right
+    assert not row("pair", "explained", ("dead_band",), right=hidden).right
+    assert row("clean", "nothing missing").right
+
+
+def test_what_is_neither_hidden_nor_a_rival_is_wrong_unless_flagged():
+    hidden = (("dead_band",),)
+    assert row("in form", "explained", ("dead_band",), ("turn_slip",), right=hidden).wrong
+    assert not row("in form", "explained", ("stiction", "dead_band"), right=hidden).wrong
+    assert not row("in form", "partly explained", ("turn_slip",), right=hidden).wrong
+    assert row("taken out", "explained", ("dead_band",), right=hidden).wrong
+
+
+def test_rates_count_what_they_say():
+    hidden = (("dead_band",),)
+    rows = [
+        row("in form", "explained", ("dead_band",), right=hidden, evidence=100.0, after=1.04, true=1.0),
+        row("in form", "nothing missing", right=hidden, evidence=10.0),
+        row("clean", "explained", ("trim",)),
+        row("clean", "nothing missing"),
+        row("taken out", "unexplained", right=hidden),
+        row("outside", "explained", ("dead_band",)),
+    ]
+    counted = {name: (rate.hits, rate.of) for name, rate in rates.rates(rows).items()}
+    assert counted["in form above 30 nats named"] == (1, 1)
+    assert counted["in form, any evidence, named"] == (1, 2)
+    assert counted["clean false alarms"] == (1, 2)
+    assert counted["taken out flagged"] == (1, 1)
+    assert counted["outside flagged"] == (0, 1)
+    assert counted["error after within 5 % of the true model's"] == (1, 1)
+    assert "nothing" in rates.confusion(rows)
+
+
+def test_every_kind_has_a_share_of_any_beginning():
+    kinds = {job.kind for job in rates.all_jobs()[:60]}
+    assert kinds == {"in form", "other form", "pair", "outside", "taken out", "clean", "bullet"}
+    names = [(job.kind, job.case.name) for job in rates.all_jobs()]
+    assert len(names) == len(set(names)) > 200
+
+
+def test_an_effect_taken_out_is_not_found():
+    with rates._without("dead_band"):
+        forms = rates.searching.candidates(rates.read_robot("duckiebot").figures, {}, ())
+    assert "stiction" in {form.effect for form in forms}
+    assert "dead_band" not in {form.effect for form in forms}
+    assert rates.searching.candidates is rates.candidates
+
+
+def test_a_row_tells_its_case_in_one_line():
+    text = row("taken out", "partly explained", ("stiction", "backlash"), depends_on=("heading",), evidence=5.0).text
+    assert "case without dead_band" in text
+    assert "[stiction(backlash)] rest: heading" in text
+    assert "\n" not in text
+    assert np.isnan(row("clean", "nothing missing").true)

@@ -10,7 +10,12 @@ import pytest
 from proxytune.cli.main import main
 
 STUDIES = Path(__file__).resolve().parent.parent / "studies"
-MADE_FROM = {"quickstart": "truth.toml", "known_answer": "truth.toml", "duckiebot": "twin.toml"}
+MADE_FROM = {
+    "quickstart": "truth.toml",
+    "known_answer": "truth.toml",
+    "duckiebot": "twin.toml",
+    "closing_the_loop": "twin.toml",
+}
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from types import ModuleType
 
 from rich.console import Console
 
-from proxytune.cli import diagnose, listing, measure, plot, predict, record, score, study, sweep
+from proxytune.cli import compare, diagnose, listing, measure, plot, predict, record, score, study, sweep
 from proxytune.errors import InputError, ProxytuneError
 
 COMMANDS: dict[str, tuple[ModuleType, str]] = {
@@ -20,6 +20,7 @@ COMMANDS: dict[str, tuple[ModuleType, str]] = {
     "record": (record, "drive a model file through manoeuvres and write the log"),
     "diagnose": (diagnose, "close the loop: from measured drives to the effect that the model lacks"),
     "predict": (predict, "what a fitted model says of any log"),
+    "compare": (compare, "how fast each search engine finds a good theta"),
     "plot": (plot, "draw a study's figures again"),
     "list": (listing, "robots, effects, agents or metrics"),
 }

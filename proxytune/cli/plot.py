@@ -23,7 +23,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """Draw the convergence figure, the report and every finished sweep."""
+    """Draw the study's own figures, the report and every finished sweep."""
     opened = open_study(arguments.path)
     folder = opened.settings.folder
     with Store.read(folder) as store:

@@ -7,17 +7,21 @@ from typing import Any
 
 from proxytune.cli.answer import Answer
 from proxytune.cli.study_folder import study_folder
+from proxytune.errors import InputError
 from proxytune.report.convergence import convergence
 from proxytune.report.page import page
+from proxytune.report.search_figures import evaluations_figure, profiles_figure
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import study_table
 from proxytune.report.writing import save, write_text
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines import make_proposer
+from proxytune.search.proposer import Proposer
 from proxytune.study.evaluate import Spent
 from proxytune.study.lock import locked
 from proxytune.study.progress import Bars
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import run_study
+from proxytune.study.settings import StudySettings
 from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
@@ -35,10 +39,11 @@ def run(arguments: argparse.Namespace) -> Answer:
     folder = study_folder(arguments.path)
     study = open_study(folder)
     settings = study.settings
+    proposer = _proposer(settings)
     episodes = settings.budget * len(settings.agents) * settings.starts
     with locked(folder), Store.open(folder) as store:
         with Bars(episodes) as bars:
-            spent = run_study(study, store, GaussianProcess(settings.initial), bars)
+            spent = run_study(study, store, proposer, bars)
         result = result_of(study, store)
     figures, report = draw(result, folder)
     costs = _costs(result, spent, time.perf_counter() - begun)
@@ -47,13 +52,22 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer(document, study_table(result, _told(costs), files))
 
 
+def _proposer(settings: StudySettings) -> Proposer:
+    try:
+        return make_proposer(settings.engine, settings.initial)
+    except InputError as problem:
+        raise settings.error("engine", str(problem)) from None
+
+
 def draw(result: StudyResult, folder: Path) -> tuple[list[Path], Path]:
-    """Draw the convergence figure and the report; their paths."""
-    figure = folder / "figures" / "convergence.png"
+    """Draw the study's figures and the report; their paths."""
+    drawn = {"convergence": convergence, "profiles": profiles_figure, "evaluations": evaluations_figure}
+    figures = [folder / "figures" / f"{name}.png" for name in drawn]
     report = folder / "report.html"
-    save(convergence(result), figure)
-    write_text(report, page(result, [figure]))
-    return [figure], report
+    for figure, draw_one in zip(figures, drawn.values(), strict=True):
+        save(draw_one(result), figure)
+    write_text(report, page(result, figures))
+    return figures, report
 
 
 def _costs(result: StudyResult, spent: Spent, total: float) -> dict[str, Any]:

@@ -125,7 +125,15 @@ def log_likelihood(drives: Drives, errors: Floats, whiten: Whitener) -> Floats:
 
 
 def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
-    """The noise under which errors (N, 3) are likeliest."""
+    """The noise under which errors (N, 3) are likeliest, looked for from `start` and from FIRST_GUESS.
+
+    A start from a model that misses much can end where all noise is too large.
+    """
+    found = [_fit_noise(drives, errors, noise) for noise in dict.fromkeys((start, FIRST_GUESS))]
+    return min(found, key=lambda pair: pair[0])[1]
+
+
+def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noise]:
     scale = np.concatenate((start.drive, start.pose))
     bounds = [(np.log(1e-6 / s), np.log(3.0 / s)) for s in scale]
 
@@ -136,7 +144,7 @@ def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
     found = minimize(
         surprise, np.zeros(5), method="L-BFGS-B", bounds=bounds, options={"eps": 1e-4, "ftol": 1e-9, "maxiter": 60}
     )
-    return _scaled(scale, found.x)
+    return float(found.fun), _scaled(scale, found.x)
 
 
 def _scaled(scale: Floats, logs: Floats) -> Noise:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-from proxytune.report.study_table import best_theta, usefulness_lines
+from proxytune.report.study_table import BEST_COLUMNS, best_theta, identity_lines, usefulness_lines
 from proxytune.study.result import StudyResult
 from proxytune.study.store import TrialRecord
 
@@ -50,8 +50,10 @@ def page(result: StudyResult, figures: Sequence[Path]) -> str:
     return PAGE.substitute(
         title=html.escape(settings.name),
         summary=html.escape(f"{len(result.trials)} of {settings.budget} trials. " + _meaning(result)),
-        best=_table(("parameter", "best", "searched"), best_theta(result)),
-        usefulness="".join(f"<li>{html.escape(line)}</li>" for line in usefulness_lines(result)),
+        best=_table(BEST_COLUMNS, best_theta(result)),
+        usefulness="".join(
+            f"<li>{html.escape(line)}</li>" for line in [*identity_lines(result), *usefulness_lines(result)]
+        ),
         figures="".join(_image(path) for path in figures),
         trials=_table(("trial", *settings.space.names, "PRPV", "PPV", "failed episodes"), _trials(result)),
         settings=_table(("key", "value"), _settings(result)),
@@ -86,6 +88,7 @@ def _settings(result: StudyResult) -> list[tuple[str, str]]:
         ("metrics", ", ".join(str(metric) for metric in settings.metrics)),
         ("agents", ", ".join(settings.agents)),
         ("starts", str(settings.starts)),
+        ("engine", settings.engine),
         ("seed", str(settings.seed)),
     ]
 

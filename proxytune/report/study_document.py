@@ -17,6 +17,8 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         "best": {
             "index": best.trial.number,
             "theta": dict(best.trial.theta),
+            "theta_interval": {profile.name: list(profile.interval) for profile in result.profiles},
+            "unidentified": list(result.unidentified),
             "prpv": measures["prpv"],
             "prpv_normalised": measures["prpv_normalised"],
             "prpv_interval": measures["prpv_interval"],
@@ -26,6 +28,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
             "usefulness": measures,
         },
         **{key: measures[key] for key in shared},
+        "stopped": result.stopped or None,
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
         "target": _target(result),

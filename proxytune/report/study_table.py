@@ -9,15 +9,26 @@ from rich.text import Text
 
 from proxytune.study.result import StudyResult
 
+BEST_COLUMNS = ("parameter", "best", "not worse", "searched")
 
-def best_theta(result: StudyResult) -> list[tuple[str, str, str]]:
-    """Parameter, value with unit, and the box searched, as texts."""
+
+def best_theta(result: StudyResult) -> list[tuple[str, str, str, str]]:
+    """Parameter, value with unit, the values not worse beyond noise, and the box searched, as texts."""
     known = result.study.family.parameters
     rows = []
-    for interval in result.study.settings.space.intervals:
+    for interval, profile in zip(result.study.settings.space.intervals, result.profiles, strict=True):
         value = f"{result.best.trial.theta[interval.name]:.4g} {known[interval.name].unit}".strip()
-        rows.append((interval.name, value, f"[{interval.low:g}, {interval.high:g}]"))
+        low, high = profile.interval
+        not_worse = "unidentified" if profile.unidentified else f"{low:.3g} to {high:.3g}"
+        rows.append((interval.name, value, not_worse, f"[{interval.low:g}, {interval.high:g}]"))
     return rows
+
+
+def identity_lines(result: StudyResult) -> list[str]:
+    """Which parameters PRPV does not see, and how the study came to its end; nothing where there is nothing to say."""
+    names = ", ".join(result.unidentified)
+    unseen = [f"unidentified: {names}; any value in the box is as good, beyond noise"] if names else []
+    return [*unseen, *([f"stopped: {result.stopped}"] if result.stopped else [])]
 
 
 def usefulness_lines(result: StudyResult) -> list[str]:
@@ -49,12 +60,17 @@ def study_table(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Re
     """The result of a study as `study` shows it."""
     settings = result.study.settings
     table = Table(box=None, pad_edge=False)
-    for column in ("parameter", "best", "searched"):
+    for column in BEST_COLUMNS:
         table.add_column(column)
     for row in best_theta(result):
         table.add_row(*row)
     head = (
         f"{settings.name}: {len(result.trials)} of {settings.budget} trials; best is trial {result.best.trial.number}"
     )
-    lines = [*usefulness_lines(result), spent, *(f"{what}: {path}" for what, path in files.items())]
+    lines = [
+        *identity_lines(result),
+        *usefulness_lines(result),
+        spent,
+        *(f"{what}: {path}" for what, path in files.items()),
+    ]
     return Group(Text(head), table, *(Text(line) for line in lines))

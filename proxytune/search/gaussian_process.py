@@ -8,7 +8,7 @@ from skopt.acquisition import gaussian_ei
 from threadpoolctl import threadpool_limits
 
 from proxytune.search.design import design_point, from_unit, unit_points
-from proxytune.search.proposer import Trial, Values
+from proxytune.search.proposer import Trial, Values, proposal_seed, with_failures_as_worst
 from proxytune.search.surrogate import Array, Surrogate, fit_surrogate, unit_array
 from proxytune.space import Space
 
@@ -35,18 +35,27 @@ class GaussianProcess:
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point, a function of the set of trials and the seed alone; never a point visited before."""
-        scored = [trial.score for trial in trials if trial.score is not None]
-        if len(trials) < self.initial or not scored:
+        filled = with_failures_as_worst(trials)
+        if len(trials) < self.initial or not filled:
             return design_point(space, len(trials), seed)
-        worst = max(scored)
-        filled = [Trial(trial.values, worst if trial.score is None else trial.score) for trial in trials]
         with threadpool_limits(limits=1):
-            cloud = int(np.random.SeedSequence([seed, len(trials)]).generate_state(1)[0])
-            return from_unit(space, _most_promising(fit_surrogate(space, filled), cloud))
+            return from_unit(space, _most_promising(fit_surrogate(space, filled), proposal_seed(seed, len(trials)))[0])
 
 
-def _most_promising(surrogate: Surrogate, seed: int) -> Array:
-    """The point of the unit cube with the highest expected improvement: a Sobol cloud, then ever closer looks."""
+def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tuple[float, float]:
+    """The most that any θ is expected to improve the score, and the standard deviation of the score's noise.
+
+    Raises:
+        RunError: If no trial has a score.
+    """
+    surrogate = fit_surrogate(space, with_failures_as_worst(trials))
+    with threadpool_limits(limits=1):
+        _, gain = _most_promising(surrogate, proposal_seed(seed, len(trials)))
+    return gain, surrogate.noise_deviation
+
+
+def _most_promising(surrogate: Surrogate, seed: int) -> tuple[Array, float]:
+    """The point of the unit cube with the highest expected improvement, and that: a Sobol cloud, then closer looks."""
     visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
     _, incumbent = surrogate.incumbent()
     dimensions = visited.shape[1]
@@ -58,8 +67,8 @@ def _most_promising(surrogate: Surrogate, seed: int) -> Array:
         around = np.clip(leaders[:, None, :] + width * offsets, 0.0, 1.0).reshape(-1, dimensions)
         points = np.concatenate([leaders, _new(around, visited)])
         gains = gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0)
-    best: Array = points[int(np.argmax(gains))]
-    return best
+    best = int(np.argmax(gains))
+    return points[best], float(gains[best])
 
 
 def _new(points: Array, visited: Array) -> Array:

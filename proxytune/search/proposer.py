@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from proxytune.space import Space
 
 Values = tuple[float, ...]
@@ -27,5 +29,19 @@ class Proposer(Protocol):
     """Chooses where to look next, remembering nothing: that is what makes resuming exact."""
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point; the same for the same trials in whatever order they are given."""
+        """The next point; the same for the same trials in the order in which they were made."""
         ...
+
+
+def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:
+    """The trials, a failed one with the worst score seen, so that a search moves away from it; none without a score."""
+    scored = [trial.score for trial in trials if trial.score is not None]
+    if not scored:
+        return []
+    worst = max(scored)
+    return [Trial(trial.values, worst if trial.score is None else trial.score) for trial in trials]
+
+
+def proposal_seed(seed: int, count: int) -> int:
+    """The seed of what is drawn for the proposal after so many trials."""
+    return int(np.random.SeedSequence([seed, count]).generate_state(1)[0])

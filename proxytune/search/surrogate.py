@@ -64,12 +64,29 @@ class Surrogate:
     model: GaussianProcessRegressor
     visited: tuple[Trial, ...]
 
+    @property
+    def noise_deviation(self) -> float:
+        """Standard deviation of one score around the mean, the steps included; in the score's unit."""
+        return float(np.sqrt(self.model.noise_) * self.model.y_train_std_)
+
     def predict(self, unit: Array) -> tuple[Array, Array]:
         """Posterior mean and standard deviation, noise excluded, at points (n, parameters) of the unit cube."""
         with threadpool_limits(limits=1), warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Predicted variances smaller than 0")
             mean, deviation = self.model.predict(unit, return_std=True)
         return mean, deviation
+
+    def mean(self, unit: Array) -> Array:
+        """Posterior mean (n,) at points (n, parameters) of the unit cube."""
+        with threadpool_limits(limits=1):
+            mean: Array = self.model.predict(unit)
+        return mean
+
+    def joint(self, unit: Array) -> tuple[Array, Array]:
+        """Posterior mean (n,) and covariance (n, n), noise excluded, at points (n, parameters) of the unit cube."""
+        with threadpool_limits(limits=1):
+            mean, covariance = self.model.predict(unit, return_cov=True)
+        return mean, covariance
 
     def at_visited(self) -> tuple[Array, Array]:
         """Posterior mean and standard deviation at the visited trials."""

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.errors import RunError
-from proxytune.search.surrogate import fit_surrogate
+from proxytune.search.profile import Profile, profiles
+from proxytune.search.surrogate import Surrogate, fit_surrogate
 from proxytune.study.evaluate import Evaluation, evaluation, told
 from proxytune.study.run import as_trials
+from proxytune.study.stopping import stopped
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
 from proxytune.usefulness import Assessment, assess
@@ -40,13 +42,22 @@ class StudyResult:
         study: Which one.
         trials: Its finished and failed trials, in order.
         best: The best of them.
+        profiles: What is known of each parameter, in the order of the box.
+        stopped: Why it runs no further; empty while it is not at its end.
         failures: The first failed episodes, told in one line each.
     """
 
     study: Study
     trials: tuple[TrialRecord, ...]
     best: Best
+    profiles: tuple[Profile, ...]
+    stopped: str
     failures: tuple[str, ...]
+
+    @property
+    def unidentified(self) -> tuple[str, ...]:
+        """The parameters of which every value in the box is as good as the best, beyond noise."""
+        return tuple(profile.name for profile in self.profiles if profile.unidentified)
 
     @property
     def failed_episodes(self) -> int:
@@ -70,12 +81,19 @@ def result_of(study: Study, store: Store) -> StudyResult:
     if not scored:
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
         raise RunError(f"{store.path}: {reason}")
-    return StudyResult(study, trials, _best(study, store, scored), _failures(study, store, trials))
+    surrogate = fit_surrogate(study.settings.space, as_trials(study.settings.space, scored))
+    return StudyResult(
+        study=study,
+        trials=trials,
+        best=_best(study, store, scored, surrogate),
+        profiles=profiles(surrogate),
+        stopped=stopped(study, store, trials),
+        failures=_failures(study, store, trials),
+    )
 
 
-def _best(study: Study, store: Store, scored: list[TrialRecord]) -> Best:
+def _best(study: Study, store: Store, scored: list[TrialRecord], surrogate: Surrogate) -> Best:
     space = study.settings.space
-    surrogate = fit_surrogate(space, as_trials(space, scored))
     mean, deviation = surrogate.at_visited()
     row = int(np.argmin(mean))
     values = surrogate.visited[row].values

@@ -1,4 +1,4 @@
-"""The loop of a study: propose, simulate, score, until the budget is spent."""
+"""The loop of a study: propose, simulate, score, until the budget is spent or a rule says stop."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,12 +9,13 @@ from proxytune.search.proposer import Proposer, Trial
 from proxytune.space import Space, Theta
 from proxytune.study.evaluate import Evaluation, Spent, evaluation, simulate
 from proxytune.study.progress import Watcher
+from proxytune.study.stopping import stopped
 from proxytune.study.store import State, Store, TrialRecord
 from proxytune.study.study import Study, changes, facts
 
 
 def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) -> Spent:
-    """Run a study to the end of its budget, from wherever it was left.
+    """Run a study to the end of its budget, or until a rule stops it, from wherever it was left.
 
     The next θ is a function of the seed and the finished trials alone, and an episode that has been simulated is never
     simulated again: a study stopped at any moment goes on as if it had not been.
@@ -29,7 +30,7 @@ def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) 
     budget, spent = study.settings.budget, Spent()
     trials = store.trials()
     done = [trial for trial in trials if trial.state != "open"]
-    while len(done) < budget:
+    while not stopped(study, store, done):
         _check_hope(study, done)
         number = len(done) + 1
         theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, done)

@@ -7,6 +7,7 @@ from typing import Any
 
 from proxytune.errors import InputError
 from proxytune.scores import Metric
+from proxytune.search.engines import DEFAULT_ENGINE, STUDY_ENGINES
 from proxytune.settings import Section, read_settings
 from proxytune.space import Interval, Space
 
@@ -15,8 +16,22 @@ FILE_NAME = "study.toml"
 FORMAT = 1
 KEYS = (
     "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
-    "starts", "budget", "initial", "seed", "jobs", "on_failure", "parameters", "domain",
+    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "stop", "parameters", "domain",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class StopRules:
+    """When a study ends before its budget is spent; None where a rule is not asked for.
+
+    Attributes:
+        wall_time_s: After the trial with which its episodes have taken so long [s], all runs together.
+        no_improvement: Once the most that any θ is expected to improve the score is less than this, in standard
+            deviations of the score's noise.
+    """
+
+    wall_time_s: float | None = None
+    no_improvement: float | None = None
 
 
 @dataclass(frozen=True)
@@ -35,9 +50,11 @@ class StudySettings:
         starts: How many of the family's starting conditions, the first ones, each agent drives from.
         budget: How many trials.
         initial: How many of them come from the quasi-random design.
+        engine: What proposes the others.
         seed: Seed of the episodes and of the search.
         jobs: How many processes run episodes.
         stop_on_failure: Whether a failing episode stops the study.
+        stop: When it ends before its budget is spent.
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
     """
@@ -53,9 +70,11 @@ class StudySettings:
     starts: int
     budget: int
     initial: int
+    engine: str
     seed: int
     jobs: int
     stop_on_failure: bool
+    stop: StopRules
     space: Space
     domain: Section
 
@@ -92,9 +111,11 @@ def read_study_settings(path: Path) -> StudySettings:
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", low=1, high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
+        engine=read.text("engine", DEFAULT_ENGINE, choices=STUDY_ENGINES),
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
+        stop=_stop(read.section("stop")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
     )
@@ -120,6 +141,20 @@ def _agents(read: Section) -> tuple[str, ...]:
     return agents
 
 
+def _stop(rules: Section) -> StopRules:
+    rules.only(("wall_time_s", "no_improvement"))
+    return StopRules(_positive(rules, "wall_time_s"), _positive(rules, "no_improvement"))
+
+
+def _positive(rules: Section, key: str) -> float | None:
+    if key not in rules.values:
+        return None
+    value = rules.number(key)
+    if value <= 0.0:
+        raise rules.error(key, f"must be above 0, got {value:g}; take it out to have no such rule")
+    return value
+
+
 def _space(parameters: Section) -> Space:
     if not parameters.values:
         raise Section(parameters.path, "", {}).error("parameters", "is missing; write NAME = [low, high] in it")
@@ -138,8 +173,10 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "starts": settings.starts,
         "budget": settings.budget,
         "initial": settings.initial,
+        "engine": settings.engine,
         "seed": settings.seed,
         "jobs": settings.jobs,
         "on_failure": "stop" if settings.stop_on_failure else "continue",
+        "stop": {key: value for key, value in vars(settings.stop).items() if value is not None},
         "parameters": {i.name: [i.low, i.high] for i in settings.space.intervals},
     }

@@ -10,6 +10,7 @@ from typing import Any
 from proxytune.domain import DomainFamily
 from proxytune.errors import InputError
 from proxytune.scores import ScoreTable, read_scores
+from proxytune.search.engines import DEFAULT_ENGINE
 from proxytune.settings import nearest
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
@@ -62,9 +63,11 @@ def read_target(settings: StudySettings) -> ScoreTable:
 def facts(study: Study) -> dict[str, Any]:
     """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
 
-    Budget, jobs and what to do on failure are not among them. The proxy's model is: the family's identity covers it.
+    Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
+    identity covers it. The default engine goes without saying, as it did when there was no other.
     """
     settings = study.settings
+    engine = {} if settings.engine == DEFAULT_ENGINE else {"engine": settings.engine}
     return {
         "family": settings.family,
         "target": _table_digest(study.target),
@@ -74,6 +77,7 @@ def facts(study: Study) -> dict[str, Any]:
         "starts": settings.starts,
         "initial": settings.initial,
         "seed": settings.seed,
+        **engine,
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
         "identity": study.identity,
@@ -94,6 +98,8 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
 def _change(key: str, before: Any, after: Any) -> str:
     if key == "target":
         return "target (its contents)"
+    if key == "engine" and before is None:
+        before = DEFAULT_ENGINE
     shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
     return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
 

@@ -42,7 +42,7 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
     first = json.loads(capsys.readouterr().out)
     assert first["episodes"] == {"run": 126, "reused": 0, "failed": 0}
     assert 0 < first["seconds"]["outside_episodes"] <= first["seconds"]["total"]
-    assert [Path(path).exists() for path in (*first["figures"], first["report"])] == [True, True]
+    assert [Path(path).exists() for path in (*first["figures"], first["report"])] == [True] * 4
     assert main(["study", str(folder), "--json"]) == 0
     second = json.loads(capsys.readouterr().out)
     assert second["episodes"] == {"run": 0, "reused": 126, "failed": 0}
@@ -81,6 +81,27 @@ def test_bad_input_is_one_line_and_exit_2(make_study, capsys):
     assert "budget: must be between" in refused(capsys, 2, "study", make_study(budget="-1"))
     assert "agents: no agent 'agnet1'" in refused(capsys, 2, "study", make_study(agents='["agent0", "agnet1"]'))
     assert not (make_study() / "study.db").exists()
+
+
+def test_an_engine_that_is_not_installed_is_refused_by_file_and_key_and_nothing_is_simulated(
+    make_study, capsys, monkeypatch
+):
+    monkeypatch.setattr("proxytune.search.engines.find_spec", lambda name: None)
+    folder = make_study(engine='"tpe"')
+    told = refused(capsys, 2, "study", folder)
+    assert f"{folder / 'study.toml'}: engine: 'tpe' needs Optuna, which is not installed" in told
+    assert not (folder / "study.db").exists()
+
+
+def test_why_a_study_has_ended_is_said(make_study, capsys):
+    folder = make_study(stop="{ no_improvement = 1e9 }")
+    assert main(["study", str(folder)]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "wobbly: 5 of 7 trials" in out
+    assert "stopped: no θ is expected to improve PRPV by more than" in out
+    make_study()
+    assert main(["study", str(folder)]) == 0
+    assert "stopped: the budget of 7 trials is spent" in capsys.readouterr().out
 
 
 def test_a_folder_without_a_study_is_refused(tmp_path, capsys):

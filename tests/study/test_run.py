@@ -4,6 +4,7 @@ from dataclasses import replace
 import pytest
 
 from proxytune.errors import EpisodeError, RunError, SettingsError
+from proxytune.search.engines import make_proposer
 from proxytune.search.gaussian_process import GaussianProcess
 from proxytune.study.progress import Silent
 from proxytune.study.run import as_stored, as_trials, check_facts, run_study
@@ -111,6 +112,7 @@ EDITS = {
     "the metrics": ({"metrics": '["distance:max"]'}, "metrics"),
     "a tolerance": ({"metrics": '["distance:max:5%", "survival_time:max"]'}, "metrics"),
     "the agents": ({"agents": '["agent0", "agent1"]'}, "agents"),
+    "the engine": ({"engine": '"sobol"'}, 'engine (was "gp")'),
     "the domain": ({"domain": {"version": '"2"'}}, "domain.version (was nothing)"),
 }
 
@@ -173,6 +175,24 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
         run_study(study, store, GaussianProcess(5), Stopping(4))
     make_study(seed="2")
     assert len(run(folder)[1]) == 7
+
+
+@pytest.mark.parametrize("engine", ["gp", "random", "sobol", "tpe"])
+def test_with_every_engine_an_interrupted_study_goes_on_to_the_same_trials(make_study, engine):
+    if engine == "tpe":
+        pytest.importorskip("optuna")
+    folders = [make_study(called, engine=f'"{engine}"') for called in ("whole", "stopped")]
+    whole, stopped_one = (open_study(folder) for folder in folders)
+    with Store.open(folders[0]) as store:
+        run_study(whole, store, make_proposer(engine, 5), Silent())
+        expected = store.trials()
+    for episodes in (30, 70):
+        with Store.open(folders[1]) as store, pytest.raises(KeyboardInterrupt):
+            run_study(stopped_one, store, make_proposer(engine, 5), Stopping(episodes))
+    with Store.open(folders[1]) as store:
+        run_study(stopped_one, store, make_proposer(engine, 5), Silent())
+        assert store.trials() == expected
+    assert len(expected) == 7
 
 
 def test_the_search_sees_failed_trials_without_a_score(make_study):

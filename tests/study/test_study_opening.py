@@ -45,6 +45,20 @@ def test_agents_of_the_target_that_are_not_in_the_study_do_not_count(make_study)
     assert study.target.complete
 
 
+def test_the_engine_is_a_fact_but_the_default_goes_without_saying(make_study):
+    """Trials of before there was a choice stay valid."""
+    default, other = facts(open_study(make_study(engine='"gp"'))), facts(open_study(make_study(engine='"random"')))
+    assert default == facts(open_study(make_study()))
+    assert "engine" not in default
+    assert changes(default, other) == ['engine (was "gp")']
+    assert changes(other, default) == ['engine (was "random")']
+
+
+def test_rules_to_stop_are_no_facts(make_study):
+    plain = facts(open_study(make_study()))
+    assert facts(open_study(make_study(stop="{ wall_time_s = 5, no_improvement = 0.1 }"))) == plain
+
+
 def test_the_order_of_agents_and_lines_is_no_fact(make_study):
     one = facts(open_study(make_study()))
     agents = '["agent5", "agent4", "agent3", "agent2", "agent1", "agent0"]'

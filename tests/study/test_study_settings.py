@@ -1,7 +1,7 @@
 import pytest
 
 from proxytune.errors import SettingsError
-from proxytune.study.settings import DEFAULT_FAMILY, as_document, read_study_settings
+from proxytune.study.settings import DEFAULT_FAMILY, StopRules, as_document, read_study_settings
 
 
 def test_a_study_is_given_as_its_folder_or_its_file(make_study):
@@ -17,6 +17,7 @@ def test_what_is_written_is_what_is_read(make_study):
     assert settings.target == settings.folder / "target.csv"
     assert settings.proxy == settings.folder / "m.toml"
     assert as_document(settings)["on_failure"] == "stop"
+    assert settings.stop == StopRules()
 
 
 def test_what_may_be_left_out_has_a_default(make_study):
@@ -24,6 +25,20 @@ def test_what_may_be_left_out_has_a_default(make_study):
     settings = read_study_settings(make_study("mine", **left_out))
     assert (settings.name, settings.family, settings.proxy) == ("mine", DEFAULT_FAMILY, None)
     assert (settings.initial, settings.seed, settings.jobs, settings.stop_on_failure) == (8, 1, 1, False)
+    assert settings.engine == "gp"
+
+
+def test_rules_to_stop_are_read_each_on_its_own(make_study):
+    settings = read_study_settings(make_study(stop="{ wall_time_s = 60 }"))
+    assert settings.stop == StopRules(wall_time_s=60.0)
+    settings = read_study_settings(make_study(stop="{ no_improvement = 0.2 }"))
+    assert settings.stop == StopRules(no_improvement=0.2)
+    assert as_document(settings)["stop"] == {"no_improvement": 0.2}
+
+
+@pytest.mark.parametrize("engine", ["gp", "random", "sobol", "tpe"])
+def test_a_study_names_its_engine(make_study, engine):
+    assert as_document(read_study_settings(make_study(engine=f'"{engine}"')))["engine"] == engine
 
 
 def test_the_box_does_not_depend_on_the_order_of_its_lines(make_study):
@@ -50,6 +65,15 @@ BAD = {
     "a metric twice": ({"metrics": '["distance:max", "distance:min"]'}, "metrics: names a metric twice"),
     "an unknown objective": ({"objective": '"prvp"'}, "objective: unknown value 'prvp'; did you mean 'prpv'?"),
     "an unknown rule": ({"on_failure": '"stopp"'}, "on_failure: unknown value 'stopp'; did you mean 'stop'?"),
+    "an unknown engine": ({"engine": '"tpr"'}, "engine: unknown value 'tpr'; did you mean 'tpe'?"),
+    "an engine for comparison only": ({"engine": '"skopt"'}, "engine: unknown value 'skopt'; known are: gp"),
+    "an unknown rule to stop": (
+        {"stop": "{ wall_time = 5 }"},
+        "stop.wall_time: unknown key; did you mean 'wall_time_s'",
+    ),
+    "no time at all": ({"stop": "{ wall_time_s = 0 }"}, "stop.wall_time_s: must be above 0, got 0; take it out"),
+    "a negative gain": ({"stop": "{ no_improvement = -1 }"}, "stop.no_improvement: must be above 0, got -1"),
+    "stop as a number": ({"stop": "5"}, "stop: must be a table"),
     "no format": ({"format": None}, "format: is missing"),
     "a later format": ({"format": "2"}, "format: this proxytune reads up to 1; install a newer one"),
     "no parameters": ({"parameters": {}}, "parameters: is missing"),

@@ -1,0 +1,165 @@
+"""`compare`: how fast each engine finds a good θ, on an analytic stand-in or on a study."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from joblib import Parallel, delayed
+from rich.console import Group
+from rich.text import Text
+
+from proxytune.cli.answer import Answer
+from proxytune.cli.study_folder import study_folder
+from proxytune.errors import InputError, StoreError
+from proxytune.report.compare_document import compare_document, compare_lines, compare_table
+from proxytune.report.compare_figure import compare_figure
+from proxytune.report.writing import save, write_text
+from proxytune.search.analytic import Analytic, Objective
+from proxytune.search.comparison import Run, RunKey, run_document, run_engine, run_from, search_code
+from proxytune.search.engines import DEFAULT_ENGINE, ENGINES, STUDY_ENGINES, installed, make_proposer
+from proxytune.search.summary import EngineSummary, summarise
+from proxytune.study.lock import locked
+from proxytune.study.objective import StudyObjective, noise_floor
+from proxytune.study.progress import Bars
+from proxytune.study.store import Store
+from proxytune.study.study import open_study
+
+ANALYTIC = "analytic"
+FILE_NAME = "runs.jsonl"
+BUDGET = 40
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the objective, the engines and how much to spend."""
+    parser.add_argument("study", metavar="STUDY", help=f"a study's folder, or '{ANALYTIC}' for the stand-in")
+    parser.add_argument(
+        "--engines",
+        default=",".join(filter(installed, STUDY_ENGINES)),
+        metavar="NAME,…",
+        help=f"of {', '.join(ENGINES)}; {DEFAULT_ENGINE} is always there [all of a study's]",
+    )
+    parser.add_argument(
+        "--seeds", type=int, default=30, metavar="N", help="runs per engine, the same seeds for all [30]"
+    )
+    parser.add_argument("--budget", type=int, metavar="N", help=f"evaluations per run [the study's, or {BUDGET}]")
+    parser.add_argument("--initial", type=int, metavar="N", help="of them the shared design [the study's, or 10]")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="where runs and figure go [./compare_STUDY]")
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Run what is not finished yet of every engine and seed, and sum all up."""
+    name = Path(arguments.study).absolute().name
+    output = arguments.output or Path(f"compare_{name}")
+    engines = _engines(arguments.engines)
+    _check(arguments)
+    with locked(_made(output)), _objective(arguments, output) as (objective, budget, initial, jobs):
+        keys = _keys(objective, engines, arguments.seeds, budget, initial)
+        runs = _finished(objective, keys, output / FILE_NAME, jobs)
+    grouped = [[runs[key] for key in keys if key.engine == engine] for engine in engines]
+    summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
+    return _answer(objective, summaries, grouped, output)
+
+
+def _answer(
+    objective: Objective, summaries: Sequence[EngineSummary], grouped: Sequence[Sequence[Run]], output: Path
+) -> Answer:
+    budget, figure = grouped[0][0].key.budget, output / "compare.png"
+    save(compare_figure(grouped, objective.tolerance), figure)
+    document = compare_document(objective.name, summaries, budget, objective.tolerance)
+    write_text(output / "compare.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
+    lines = [*compare_lines(summaries), f"figure: {figure}"]
+    table = compare_table(objective.name, summaries, budget)
+    return Answer({**document, "figures": [str(figure)]}, Group(table, *(Text(line) for line in lines)))
+
+
+def _engines(text: str) -> list[str]:
+    """The engines asked for, the default first."""
+    named = [name.strip() for name in text.split(",") if name.strip()]
+    for name in named:
+        try:
+            make_proposer(name, 1)
+        except InputError as problem:
+            raise InputError(f"--engines: {problem}") from None
+    return list(dict.fromkeys([DEFAULT_ENGINE, *named]))
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    for name, least in (("seeds", 2), ("budget", 2), ("initial", 1)):
+        value = getattr(arguments, name)
+        if value is not None and value < least:
+            raise InputError(f"--{name} {value}: give at least {least}")
+
+
+@contextmanager
+def _objective(arguments: argparse.Namespace, output: Path) -> Iterator[tuple[Objective, int, int, int]]:
+    """The objective with budget, design and how many runs at a time: a study's own episodes run in parallel instead."""
+    if arguments.study == ANALYTIC:
+        yield Analytic(), *_spending(arguments, BUDGET, 10), 2
+        return
+    study = open_study(study_folder(Path(arguments.study)))
+    settings = study.settings
+    budget, initial = _spending(arguments, settings.budget, settings.initial)
+    per_run = (budget + 1) * len(settings.agents) * settings.starts
+    episodes = per_run * arguments.seeds * len(_engines(arguments.engines))
+    print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
+    with Store.open(output) as store, Bars(episodes) as bars:
+        yield StudyObjective(study, store, bars, noise_floor(study)), budget, initial, 1
+
+
+def _spending(arguments: argparse.Namespace, budget: int, initial: int) -> tuple[int, int]:
+    budget, initial = arguments.budget or budget, arguments.initial or initial
+    if initial >= budget:
+        raise InputError(f"--budget {budget}: is spent on the design of {initial}; raise it, or lower --initial")
+    return budget, initial
+
+
+def _keys(objective: Objective, engines: Sequence[str], seeds: int, budget: int, initial: int) -> list[RunKey]:
+    code = search_code()
+    return [
+        RunKey(objective.identity, engine, seed, budget, initial, code)
+        for engine in engines
+        for seed in range(1, seeds + 1)
+    ]
+
+
+def _finished(objective: Objective, keys: Sequence[RunKey], path: Path, jobs: int) -> Mapping[RunKey, Run]:
+    """All runs, those that the file lacks run now, each written as soon as it is finished."""
+    known = read_runs(path)
+    missing = [key for key in keys if key not in known]
+    with Parallel(n_jobs=min(jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
+        for run in parallel(delayed(run_engine)(objective, key) for key in missing):
+            _append(path, run)
+            known[run.key] = run
+    return known
+
+
+def read_runs(path: Path) -> dict[RunKey, Run]:
+    """The finished runs in a file of JSON lines; a line that an interrupted write left unfinished is passed over."""
+    found = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        try:
+            run = run_from(json.loads(line))
+        except (ValueError, KeyError, TypeError):
+            continue
+        found[run.key] = run
+    return found
+
+
+def _append(path: Path, run: Run) -> None:
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            # On a line of its own even after one that was left unfinished.
+            file.write("\n" * (file.tell() > 0) + json.dumps(run_document(run)))
+    except OSError as problem:
+        raise StoreError(f"{path}: cannot be written ({problem.strerror}); choose another --output") from None
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise StoreError(f"{folder}: cannot be made ({problem.strerror}); choose another --output") from None
+    return folder

@@ -1,0 +1,84 @@
+"""A study as something that engines are compared on: each seed is a study of its own, simulated once."""
+
+from dataclasses import dataclass, replace
+
+from proxytune.search.proposer import Values
+from proxytune.space import Space
+from proxytune.study.evaluate import Evaluation, evaluation, simulate
+from proxytune.study.progress import Watcher
+from proxytune.study.store import Store
+from proxytune.study.study import Study, facts
+from proxytune.usefulness import assess
+
+FRESH = 1_000_003
+"""Added to a seed for the episodes that judge an answer: no engine has seen them."""
+
+
+@dataclass(frozen=True)
+class StudyObjective:
+    """PRPV of a study; its episodes are simulated when first asked for, and kept in the store.
+
+    Regret is PRPV above the target's noise floor: the optimum is not known.
+
+    Attributes:
+        study: The study.
+        store: Where its episodes are kept.
+        watcher: Is told of every episode.
+        floor: The target's noise floor, 0 where its episodes do not tell.
+    """
+
+    study: Study
+    store: Store
+    watcher: Watcher
+    floor: float
+    tolerance: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """The study's name."""
+        return self.study.settings.name
+
+    @property
+    def space(self) -> Space:
+        """The study's box."""
+        return self.study.settings.space
+
+    @property
+    def identity(self) -> str:
+        """All that its figures depend on, apart from the seed."""
+        kept = {key: value for key, value in facts(self.study).items() if key not in ("seed", "initial", "engine")}
+        return repr(sorted(kept.items()))
+
+    def score(self, values: Values, seed: int) -> float | None:
+        """PRPV, with the placement noise of this seed; None where an agent has no episode that worked."""
+        return self._evaluated(values, seed).prpv
+
+    def regret(self, values: Values, seed: int) -> float | None:
+        """The score above the noise floor."""
+        return self._above(self.score(values, seed))
+
+    def fresh_regret(self, values: Values, seed: int) -> float | None:
+        """PRPV on fresh episodes above the noise floor."""
+        return self._above(self.score(values, seed + FRESH))
+
+    def error(self, values: Values, seed: int) -> None:
+        """Not known: a study's target is what was measured."""
+
+    def _above(self, score: float | None) -> float | None:
+        return None if score is None else score - self.floor
+
+    def _evaluated(self, values: Values, seed: int) -> Evaluation:
+        seeded = replace(self.study, settings=replace(self.study.settings, seed=seed))
+        theta = self.space.theta(values)
+        found = evaluation(seeded, self.store, theta)
+        if found is None:
+            simulate(seeded, self.store, theta, self.watcher, f"seed {seed}")
+            found = evaluation(seeded, self.store, theta)
+        assert found is not None
+        return found
+
+
+def noise_floor(study: Study) -> float:
+    """PRPV of the target against itself by halves of its episodes; 0 where there are too few."""
+    found = assess(proxy=study.target, target=study.target, metrics=study.settings.metrics)
+    return found.noise_floor.value or 0.0

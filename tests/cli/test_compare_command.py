@@ -1,0 +1,112 @@
+import json
+
+import pytest
+
+from proxytune.cli.compare import read_runs
+from proxytune.cli.main import main, parser
+from proxytune.search import engines
+
+FEW = ("--engines", "random,sobol", "--seeds", "2", "--budget", "7", "--initial", "5")
+
+
+def compare(*arguments):
+    return main(["compare", *map(str, arguments)])
+
+
+@pytest.fixture
+def document(tmp_path, capsys):
+    assert compare("analytic", *FEW, "--output", tmp_path / "out", "--json") == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_it_prints_one_document_with_every_engine_and_draws_the_figure(document, tmp_path):
+    assert [row["engine"] for row in document["engines"]] == ["gp", "random", "sobol"]
+    assert (document["objective"], document["budget"], document["default"]) == ("analytic", 7, "gp")
+    assert {row["seeds"] for row in document["engines"]} == {2}
+    for row in document["engines"]:
+        assert row["regret"]["low"] <= row["regret"]["value"] <= row["regret"]["high"]
+        assert 0 < row["error"]["value"] < 1
+    assert [row["saved"] is None for row in document["engines"]] == [True, False, False]
+    assert (tmp_path / "out" / "compare.png").stat().st_size > 10_000
+    assert json.loads((tmp_path / "out" / "compare.json").read_text())["engines"] == document["engines"]
+
+
+def test_finished_runs_are_kept_and_a_line_cut_off_is_run_again(document, tmp_path, capsys):
+    path = tmp_path / "out" / "runs.jsonl"
+    lines = path.read_text().splitlines()
+    assert len(lines) == len(read_runs(path)) == 6
+    kept = lines[0].replace('"error": ', '"error": 1000')
+    path.write_text("\n".join([kept, *lines[1:5], lines[5][:40]]))
+    assert compare("analytic", *FEW, "--output", tmp_path / "out", "--json") == 0
+    again = json.loads(capsys.readouterr().out)
+    assert len(read_runs(path)) == 6
+    assert len(path.read_text().splitlines()) == 7
+    assert max(row["error"]["high"] for row in again["engines"]) > 100, "the first line was not run again"
+
+
+def test_another_budget_is_another_run(document, tmp_path, capsys):
+    assert compare("analytic", *FEW, "--budget", "8", "--output", tmp_path / "out") == 0
+    assert len(read_runs(tmp_path / "out" / "runs.jsonl")) == 12
+
+
+def test_people_see_a_verdict_per_rival(tmp_path, capsys):
+    assert compare("analytic", *FEW, "--output", tmp_path / "out") == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "gp reaches the noise floor" in out
+    assert "than sobol" in out
+    assert ">7" in out
+
+
+def test_a_study_is_compared_on_its_own_episodes_which_are_simulated_once(make_study, tmp_path, capsys):
+    journal = tmp_path / "journal"
+    folder = make_study(domain={"journal": f'"{journal}"'})
+    arguments = ("compare", str(folder), "--engines", "sobol", "--seeds", "2", "--output", str(tmp_path / "out"))
+    assert main([*arguments, "--json"]) == 0
+    out, told = capsys.readouterr()
+    document = json.loads(out)
+    assert told == f"compare: at most {2 * 2 * 8 * 18} episodes, {8 * 18} in each run\n"
+    assert (document["objective"], document["budget"]) == ("wobbly", 7)
+    assert [row["error"] for row in document["engines"]] == [None, None]
+    episodes = journal.read_text().splitlines()
+    # Two engines share the design of five; each goes on with two, and is judged on one more θ.
+    assert len(episodes) <= 2 * (5 + 2 * 3) * 18
+    assert not (folder / "study.db").exists()
+    assert main([*arguments, "--json"]) == 0
+    assert journal.read_text().splitlines() == episodes
+
+
+BAD = {
+    "an unknown engine": (("--engines", "gp,tpr"), "--engines: unknown engine 'tpr'"),
+    "one seed": (("--seeds", "1"), "--seeds 1: give at least 2"),
+    "no budget": (("--budget", "0"), "--budget 0: give at least 2"),
+    "a budget of the design": (("--budget", "10"), "--budget 10: is spent on the design of 10; raise it"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line_and_exit_2(tmp_path, capsys, case):
+    options, expected = BAD[case]
+    engines_named = () if "--engines" in options else ("--engines", "sobol")
+    assert compare("analytic", *engines_named, *options, "--output", tmp_path / "out") == 2
+    out, told = capsys.readouterr()
+    assert out == ""
+    assert told.count("\n") == 1
+    assert expected in told
+
+
+def test_tpe_without_optuna_is_told_before_anything_runs(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(engines, "find_spec", lambda name: None)
+    assert compare("analytic", "--engines", "gp,tpe", "--output", tmp_path / "out") == 2
+    assert "--engines: 'tpe' needs Optuna, which is not installed" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_optuna_the_other_engines_are_compared_unless_named(monkeypatch):
+    monkeypatch.setattr(engines, "find_spec", lambda name: None)
+    assert parser().parse_args(["compare", "analytic"]).engines == "gp,random,sobol"
+
+
+def test_a_place_that_cannot_be_written_is_one_line_and_exit_1(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert compare("analytic", *FEW, "--output", tmp_path / "file" / "out") == 1
+    assert "cannot be made" in capsys.readouterr().err

@@ -19,7 +19,13 @@ FLOORS = (
     {"cli"},
     {"__main__", "__init__"},
 )
-ROOMS = {"pybullet": {"driving/bullet"}, "skopt": {"search"}, "sqlite3": {"study"}, "argparse": {"cli"}}
+ROOMS = {
+    "pybullet": {"driving/bullet"},
+    "skopt": {"search"},
+    "optuna": {"search"},
+    "sqlite3": {"study"},
+    "argparse": {"cli"},
+}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 

@@ -179,7 +179,8 @@ def _use(motion: _Motion) -> SignalGroup:
 def _turning(motion: _Motion) -> SignalGroup:
     columns = hats(motion.yaw)
     bend = hats(motion.forward * motion.yaw)
-    twists = _twists(columns * motion.forward[..., None], bend[..., :-1] - bend[..., 1:], columns)
+    sideways = np.concatenate((bend[..., :-1] - bend[..., 1:], columns), axis=-1)
+    twists = _twists(columns * motion.forward[..., None], sideways, columns)
     effects = ("turn_slip", "yaw_scrub", "lateral_slip", "marker_offset", "heading_offset")
     return SignalGroup("turn rate", effects, motion.yaw, "rad/s", twists)
 

@@ -3,6 +3,7 @@
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console, Group
 from rich.text import Text
@@ -44,13 +45,13 @@ def run(arguments: argparse.Namespace) -> Answer:
         found = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=status.update)
         folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
         status.update("drawing")
-        files = _write(found, folder)
-    answer = document(found) | {"files": files}
-    return Answer(answer, Group(shown(found), Text("\n".join(files))))
+        told = document(found)
+        files = _write(found, told, folder)
+    return Answer(told | {"files": files}, Group(shown(found), Text("\n".join(files))))
 
 
-def _write(found: Diagnosis, folder: Path) -> list[str]:
-    write_text(folder / "diagnosis.json", json.dumps(document(found), indent=2, allow_nan=False, ensure_ascii=False))
+def _write(found: Diagnosis, told: dict[str, Any], folder: Path) -> list[str]:
+    write_text(folder / "diagnosis.json", json.dumps(told, indent=2, allow_nan=False, ensure_ascii=False))
     write_text(folder / "model.toml", model_file(found))
     drawn = []
     for name, figure in diagnosis_figures(found).items():

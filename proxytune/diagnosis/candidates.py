@@ -24,7 +24,8 @@ class Candidate:
         form: What is special about this form: `left wheel`; empty where nothing is.
         free: Its coordinates.
         fixed: Its other parameters.
-        probes: Steps from neutral to start from, one value per coordinate.
+        neutral: Where the model has its coordinates.
+        probes: Where a search starts, one value per coordinate.
     """
 
     effect: str

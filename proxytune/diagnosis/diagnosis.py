@@ -17,7 +17,7 @@ from proxytune.diagnosis.split import Parts, split
 from proxytune.diagnosis.visibility import unseen
 from proxytune.diagnosis.windows import Rmse, Windows, cut, floor, ratio, rmse, strays
 from proxytune.driving.robot import Robot
-from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, theta_names
+from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, effect_of, theta_names
 from proxytune.errors import LogError
 from proxytune.logs import Log
 from proxytune.settings import nearest
@@ -160,7 +160,7 @@ def diagnose(
         residual_depends_on=tuple(curve.group.name for curve in found.remainder),
         errors=errors,
         confirmed=_confirmed(found, parts.tested, seed, told),
-        could_not_be_seen=unseen(found.model, _names(names) | {effect.effect for effect in found.adopted}),
+        could_not_be_seen=unseen(found.model, set(map(effect_of, names)) | {effect.effect for effect in found.adopted}),
         manoeuvre=next_manoeuvre(found),
         parts=parts,
         found=found,
@@ -184,10 +184,6 @@ def declared_parameters(effects: Iterable[str]) -> tuple[str, ...]:
             raise LogError(f"--declared {effect}: no effect on motion has this name; {nearest(effect, MOTION_EFFECTS)}")
         names += [name for name in theta_names(CATALOGUE[effect]) if not name.endswith(".imbalance")]
     return tuple(dict.fromkeys(names))
-
-
-def _names(parameters: Iterable[str]) -> set[str]:
-    return {name.split(".")[0] for name in parameters}
 
 
 def estimates(fitted: Fit, adopted: Iterable[Adopted]) -> dict[str, Estimate]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ class Drives:
     travel: Floats
     wheels: Floats | None
 
-    @property
+    @cached_property
     def measured(self) -> Floats:
         """Each increment in the body frame of its first pose (N, 3): forward, left [m], turn [rad]."""
         return relative(self.poses[:, 0], self.poses[:, 1])

@@ -18,7 +18,7 @@ from proxytune.diagnosis.innovations import (
     whitener,
 )
 from proxytune.diagnosis.replay import increments
-from proxytune.effects import PARAMETERS
+from proxytune.effects import PARAMETERS, effect_of
 from proxytune.space import Theta
 
 ROUNDS = 3
@@ -26,6 +26,9 @@ ROUNDS = 3
 
 STEP = 1e-3
 """Finite differences step by this fraction of a coordinate's range."""
+
+KEPT_SOLVABLE = 1e-6
+"""Added to the curvature of the loss, so that a coordinate without a slope does no harm."""
 
 ROUGH_EFFECTS = ("stiction", "command_quantisation")
 """Effects whose parameters change the motion by steps: no slope leads to their best value, so it is scanned for."""
@@ -122,7 +125,7 @@ def _scanned(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten
 
 
 def _is_rough(coordinate: Coordinate) -> bool:
-    return coordinate[0].split(".")[0] in ROUGH_EFFECTS
+    return effect_of(coordinate[0]) in ROUGH_EFFECTS
 
 
 def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
@@ -160,25 +163,35 @@ def predictive(fitted: Fit) -> Floats:
 
     Leaving a block out moves the parameters by one Newton step.
     """
-    z, slope = fitted.innovations, fitted.slopes
-    inner = np.abs(z) < HUBER
-    pull = by_block(fitted.drives, slope * clipped(z)[:, None])
-    curve = by_block(fitted.drives, slope[:, :, None] * (slope * inner[:, None])[:, None, :])
-    rest = curve.sum(axis=0) - curve + 1e-6 * np.eye(slope.shape[1])
-    moved = -np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
-    shifted = z + np.einsum("nc,nc->n", slope, np.repeat(moved[fitted.drives.block], 3, axis=0))
+    shifted = left_out(fitted, fitted.slopes, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
     loss = huber(shifted).reshape(-1, 3).sum(axis=1) + fitted.whiten.log_determinant
-    return -by_block(fitted.drives, np.repeat(loss / 3.0, 3))
+    return sum_by(fitted.drives.block, -loss, int(fitted.drives.block.max()) + 1)
+
+
+def left_out(fitted: Fit, columns: Floats, penalty: Floats) -> Floats:
+    """The innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it."""
+    pull, curve = slopes_by_block(fitted, columns)
+    rest = curve.sum(axis=0) - curve + penalty
+    moved = -np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
+    own = np.repeat(moved[fitted.drives.block], 3, axis=0)
+    return np.asarray(fitted.innovations + np.einsum("nc,nc->n", columns, own))
+
+
+def slopes_by_block(fitted: Fit, columns: Floats) -> tuple[Floats, Floats]:
+    """Gradient (blocks, columns) and curvature (blocks, columns, columns) of each block's loss along the columns."""
+    z, label = fitted.innovations, np.repeat(fitted.drives.block, 3)
+    inner = columns * (np.abs(z) < HUBER)[:, None]
+    pull = by_block(fitted.drives, columns * clipped(z)[:, None])
+    curve = [columns[own].T @ inner[own] for own in (label == block for block in range(len(pull)))]
+    return pull, np.stack(curve)
 
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """Intervals of the fitted parameters: 95 %, from the spread between blocks (sandwich)."""
-    z, slope = fitted.innovations, fitted.slopes
-    curve = slope.T @ (slope * (np.abs(z) < HUBER)[:, None]) + 1e-6 * np.eye(slope.shape[1])
-    pull = by_block(fitted.drives, slope * clipped(z)[:, None])
-    inverse = np.linalg.inv(curve)
-    blocks = len(pull)
-    spread = inverse @ (pull.T @ pull) @ inverse * blocks / max(1, blocks - slope.shape[1])
+    pull, curve = slopes_by_block(fitted, fitted.slopes)
+    blocks, count = pull.shape
+    inverse = np.linalg.inv(curve.sum(axis=0) + KEPT_SOLVABLE * np.eye(count))
+    spread = inverse @ (pull.T @ pull) @ inverse * blocks / max(1, blocks - count)
     found = {}
     for coordinate, variance in zip(fitted.free, np.diag(spread), strict=True):
         low, high = span(coordinate)

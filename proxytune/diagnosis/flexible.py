@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.drives import Floats
-from proxytune.diagnosis.fitting import Fit, by_block, predictive, renoised
-from proxytune.diagnosis.innovations import HUBER, clipped, fit_noise, huber
-from proxytune.diagnosis.replay import disturbed, increments
+from proxytune.diagnosis.fitting import Fit, left_out, predictive, renoised, slopes_by_block
+from proxytune.diagnosis.innovations import fit_noise, huber
+from proxytune.diagnosis.replay import increments, moved_by, twists_of
 from proxytune.diagnosis.signals import SignalGroup, signal_groups
 
 RIDGES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
@@ -37,15 +37,16 @@ def curves(fitted: Fit) -> list[Curve]:
     The best few are fitted again with the noise that they leave: a candidate's noise is fitted too.
     """
     plain = float(predictive(fitted).sum())
-    found = [_curve(fitted, group, _columns(fitted, group), plain) for group in signal_groups(fitted)]
+    groups = signal_groups(fitted)
+    columns = {group.name: _columns(fitted, group) for group in groups}
+    found = [_curve(fitted, group, columns[group.name], plain) for group in groups]
     found.sort(key=lambda curve: -curve.gain)
     promising = [curve for curve in found[:REFITTED] if curve.gain > 0.0]
-    again = [_with_own_noise(fitted, curve, plain) for curve in promising]
+    again = [_with_own_noise(fitted, curve, columns[curve.group.name], plain) for curve in promising]
     return sorted(again + found[len(promising) :], key=lambda curve: -curve.gain)
 
 
-def _with_own_noise(fitted: Fit, curve: Curve, plain: float) -> Curve:
-    changes = _columns(fitted, curve.group)
+def _with_own_noise(fitted: Fit, curve: Curve, changes: Floats, plain: float) -> Curve:
     left = fitted.drives.measured - increments(fitted.drives, fitted.theta) + changes @ curve.weights
     quieter = renoised(fitted, fit_noise(fitted.drives, left, fitted.noise))
     better = _curve(quieter, curve.group, changes, plain)
@@ -62,30 +63,20 @@ def _curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -> Cu
 
 def _columns(fitted: Fit, group: SignalGroup) -> Floats:
     """Change of the errors per weight of each basis function (N, 3, columns)."""
-    here = increments(fitted.drives, fitted.theta)
+    drives, theta = fitted.drives, fitted.theta
+    twists = twists_of(drives, theta)
+    here = moved_by(drives, theta, twists)
     parts = np.moveaxis(group.twists, -1, 0)
-    return np.stack([here - disturbed(fitted.drives, fitted.theta, twist) for twist in parts], axis=-1)
+    return np.stack([here - moved_by(drives, theta, twists + part) for part in parts], axis=-1)
 
 
 def _ridge(fitted: Fit, both: Floats, flexible: int, ridge: float) -> tuple[float, Floats]:
     """The predictive log-likelihood with a ridge on the flexible weights, and those weights."""
-    z = fitted.innovations
-    inner = (np.abs(z) < HUBER)[:, None]
     scale = np.concatenate((np.zeros(both.shape[1] - flexible), np.ones(flexible)))
     size = np.sqrt((both**2).sum(axis=0)) + 1e-12
     unit = both / size
     penalty = np.diag(scale * ridge + 1e-9)
-    pull = by_block(fitted.drives, unit * clipped(z)[:, None])
-    curve = _blockwise(fitted, unit, unit * inner)
+    pull, curve = slopes_by_block(fitted, unit)
     weights = -np.linalg.solve(curve.sum(axis=0) + penalty, pull.sum(axis=0))
-    left_out = -np.linalg.solve(curve.sum(axis=0) - curve + penalty, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
-    shifted = z + np.einsum("nc,nc->n", unit, np.repeat(left_out[fitted.drives.block], 3, axis=0))
-    loss = huber(shifted).sum() + fitted.whiten.log_determinant.sum()
+    loss = huber(left_out(fitted, unit, penalty)).sum() + fitted.whiten.log_determinant.sum()
     return -float(loss), (weights / size)[-flexible:]
-
-
-def _blockwise(fitted: Fit, left: Floats, right: Floats) -> Floats:
-    """leftᵀ right over the innovations of each block (blocks, columns, columns)."""
-    label = np.repeat(fitted.drives.block, 3)
-    blocks = range(int(label.max()) + 1)
-    return np.stack([left[label == b].T @ right[label == b] for b in blocks])

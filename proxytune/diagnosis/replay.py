@@ -64,9 +64,14 @@ def between(drives: Drives, walked: Floats) -> Floats:
     return relative(walked[drives.episode, drives.first], walked[drives.episode, drives.last])
 
 
+def moved_by(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+    """The increments that these twists of every tick (E, T, 3) make, as a model's tracker sees them."""
+    return between(drives, _seen(drives, twists, _model(drives, theta)[1]))
+
+
 def disturbed(drives: Drives, theta: Theta, extra: Floats) -> Floats:
     """The increments when something adds to the twist of every tick (E, T, 3)."""
-    return between(drives, _seen(drives, twists_of(drives, theta) + extra, _model(drives, theta)[1]))
+    return moved_by(drives, theta, twists_of(drives, theta) + extra)
 
 
 def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
@@ -99,8 +104,18 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
 
 def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
     """The wheel speeds that a model says (E, T, 2), as fractions of full speed."""
-    train, _ = _model(drives, theta)
-    memory = train.begin(_setting(drives))
+    return _wheel_speeds(drives, _model(drives, theta)[0], _setting(drives))
+
+
+def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
+    """The same with random effects as one seed draws them, instead of as expected."""
+    robot = drives.robot
+    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
+    return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
+
+
+def _wheel_speeds(drives: Drives, train: Drivetrain, setting: Setting) -> Floats:
+    memory = train.begin(setting)
     arrived, _ = train.command.apply(drives.duties, memory.command)
     return np.asarray(train.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)[0])
 

@@ -60,11 +60,12 @@ def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[Lead]:
         return []
     weight = np.abs(base.innovations) < HUBER
     projected = [without(base.slopes, probe.columns, weight) for probe in probes]
-    flips = _signs(base.drives, seed)
+    number = stretches(base.drives)
+    flips = _signs(int(number.max()) + 1, seed)
     best: dict[str, tuple[float, Floats, _Probe, Floats]] = {}
     chance = np.zeros(FLIPS)
     for probe, columns in zip(probes, projected, strict=True):
-        pulls = _by_stretch(base.drives, columns * clipped(base.innovations)[:, None])
+        pulls = _by_stretch(number, columns * clipped(base.innovations)[:, None])
         curve = columns.T @ (columns * weight[:, None])
         gain, step = _step(pulls.sum(axis=0), curve)
         chance = np.maximum(chance, _gains(flips @ pulls, curve))
@@ -123,14 +124,12 @@ def stretches(drives: Drives) -> Whole:
     return number
 
 
-def _by_stretch(drives: Drives, values: Floats) -> Floats:
-    number = stretches(drives)
+def _by_stretch(number: Whole, values: Floats) -> Floats:
     return sum_by(number, values.reshape(len(number), 3, -1).sum(axis=1), int(number.max()) + 1)
 
 
-def _signs(drives: Drives, seed: int) -> Floats:
-    random = np.random.default_rng(seed)
-    return random.choice((-1.0, 1.0), size=(FLIPS, int(stretches(drives).max()) + 1))
+def _signs(count: int, seed: int) -> Floats:
+    return np.random.default_rng(seed).choice((-1.0, 1.0), size=(FLIPS, count))
 
 
 def _step(pull: Floats, curve: Floats) -> tuple[float, Floats]:

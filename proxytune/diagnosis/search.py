@@ -14,6 +14,7 @@ from proxytune.diagnosis.flexible import Curve, curves
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, lateness
 from proxytune.diagnosis.screening import Lead, screen
 from proxytune.diagnosis.windows import cut, ratio, strays
+from proxytune.effects import effect_of
 from proxytune.space import Theta
 
 MOST_EFFECTS = 5
@@ -154,7 +155,7 @@ def search(drives: Drives, theta: Theta, declared: tuple[str, ...], seed: int, t
     remainder: list[Curve] = []
     for number in range(MOST_EFFECTS + 1):
         told(f"looking for what is missing, round {number + 1}")
-        taken = {name.split(".")[0] for name in declared} | {effect.effect for effect in adopted}
+        taken = set(map(effect_of, declared)) | {effect.effect for effect in adopted}
         looked = _look(model, taken, seed)
         tried = tried or _tried(looked)
         first_curves = first_curves or looked.curves

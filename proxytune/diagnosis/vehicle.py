@@ -5,10 +5,10 @@ import numpy as np
 from proxytune.diagnosis.drives import Floats
 from proxytune.driving.robot import Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.errors import LogError
-from proxytune.logs import Log
+from proxytune.logs import GEOMETRY, Log
 from proxytune.settings import nearest
 
-NEEDED = {"wheel_radius": "wheel_radius_m", "effective_baseline": "baseline_m"}
+NEEDED = {figure: key for key, figure in GEOMETRY.items() if figure != "full_speed"}
 """Figures that a log must state of a robot without a folder, and their keys in log.toml."""
 
 

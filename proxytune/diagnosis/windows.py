@@ -52,9 +52,7 @@ def strays(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     length = int((drives.last[windows.increment] - drives.first[begin][windows.window]).max())
     walked = window_paths(drives, theta, begin, length)
     tick = drives.last[windows.increment] - drives.first[begin][windows.window]
-    predicted = relative(walked[windows.window, 0], walked[windows.window, tick])
-    measured = relative(drives.poses[begin, 0][windows.window], drives.poses[windows.increment, 1])
-    return _apart(predicted, measured)
+    return _apart(relative(walked[windows.window, 0], walked[windows.window, tick]), _measured(drives, windows))
 
 
 def strays_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
@@ -64,7 +62,12 @@ def strays_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
         walked[drives.episode[begin], drives.first[begin]],
         walked[drives.episode[windows.increment], drives.last[windows.increment]],
     )
-    return _apart(predicted, relative(drives.poses[begin, 0], drives.poses[windows.increment, 1]))
+    return _apart(predicted, _measured(drives, windows))
+
+
+def _measured(drives: Drives, windows: Windows) -> Floats:
+    """Measured motion since each window's beginning (M, 3)."""
+    return relative(drives.poses[windows.begin[windows.window], 0], drives.poses[windows.increment, 1])
 
 
 def _apart(one: Floats, other: Floats) -> Floats:
@@ -77,22 +80,21 @@ def floor(fitted: Fit, windows: Windows, seed: int) -> tuple[float, float]:
     said = increments(fitted.drives, fitted.theta)
     random = np.random.default_rng(seed)
     squares = [
-        _noise_alone(fitted.drives, said, fitted.whiten.colour(random.standard_normal(said.size)), windows) ** 2
-        for _ in range(DRAWS)
+        _noise_alone(said, fitted.whiten.colour(random.standard_normal(said.size)), windows) ** 2 for _ in range(DRAWS)
     ]
     place, turn = np.sqrt(np.mean(squares, axis=(0, 1))).tolist()
     return place, turn
 
 
-def _noise_alone(drives: Drives, said: Floats, noise: Floats, windows: Windows) -> Floats:
-    still, moved = _chained(drives, said), _chained(drives, said + noise)
+def _noise_alone(said: Floats, noise: Floats, windows: Windows) -> Floats:
+    still, moved = _chained(said), _chained(said + noise)
     begin = windows.begin[windows.window]
     return _apart(
         relative(still[begin, 0], still[windows.increment, 1]), relative(moved[begin, 0], moved[windows.increment, 1])
     )
 
 
-def _chained(drives: Drives, steps: Floats) -> Floats:
+def _chained(steps: Floats) -> Floats:
     """Poses before and after each increment when all are put one after another (N, 2, 3)."""
     heading = np.cumsum(steps[:, 2])
     before = heading - steps[:, 2]
@@ -112,20 +114,19 @@ class Rmse(NamedTuple):
 
 def rmse(squares: Floats, blocks: Whole) -> Rmse:
     """The root mean square, with a t-interval on its logarithm from leaving blocks out in turn."""
-    value, half = _log_mean(squares, blocks)
-    return Rmse(float(np.exp(value / 2.0)), (float(np.exp((value - half) / 2)), float(np.exp((value + half) / 2))))
+    return _root(float(np.log(squares.mean())), _half_width(_left_out(squares, blocks)))
 
 
 def ratio(after: Floats, before: Floats, blocks: Whole) -> Rmse:
     """The ratio of two root mean squares over the same windows, with its interval."""
-    logs = _left_out(after, blocks) - _left_out(before, blocks)
-    centre = float(np.log(after.mean() / before.mean()))
-    half = _half_width(logs)
-    return Rmse(float(np.exp(centre / 2)), (float(np.exp((centre - half) / 2)), float(np.exp((centre + half) / 2))))
+    half = _half_width(_left_out(after, blocks) - _left_out(before, blocks))
+    return _root(float(np.log(after.mean() / before.mean())), half)
 
 
-def _log_mean(squares: Floats, blocks: Whole) -> tuple[float, float]:
-    return float(np.log(squares.mean())), _half_width(_left_out(squares, blocks))
+def _root(log: float, half: float) -> Rmse:
+    """The root of a square whose logarithm is known to within half a width."""
+    value, low, high = (float(np.exp(end / 2.0)) for end in (log, log - half, log + half))
+    return Rmse(value, (low, high))
 
 
 def _left_out(squares: Floats, blocks: Whole) -> Floats:

@@ -124,10 +124,10 @@ def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Dri
     return Drive(np.concatenate(poses), np.array(commands), crashed, driver)
 
 
-def measured(instance: Instance, driven: Drive, seed: int) -> Signal:
-    """The poses of a drive as the measurement effects show them, (ticks + 1, 3)."""
-    setting = Setting(TICK_HZ, driven.poses[0], instance.robot.figures, seed)
-    return instance.measurement.apply(driven.poses, instance.measurement.begin(setting))[0]
+def measured(instance: Instance, poses: Signal, seed: int) -> Signal:
+    """Poses from the start on, one per tick, (ticks + 1, 3), as the measurement effects show them."""
+    setting = Setting(TICK_HZ, poses[0], instance.robot.figures, seed)
+    return instance.measurement.apply(poses, instance.measurement.begin(setting))[0]
 
 
 def _begin(agent: Agent, robot: Robot) -> Any:

@@ -136,7 +136,7 @@ class LaneFollowing:
 
     def measured(self, episode: Episode, driven: Drive) -> Signal:
         """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
-        return measured(self.instance(dict(episode.theta)), driven, episode.seed)
+        return measured(self.instance(dict(episode.theta)), driven.poses, episode.seed)
 
     def replay(self, episode: Episode, commands: Signal) -> Observation:
         """Drive recorded commands (steps, 2), one per control step, in place of the episode's agent.

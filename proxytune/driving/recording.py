@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from proxytune.driving.episode import TICK_HZ, Instance
+from proxytune.driving.episode import TICK_HZ, Instance, measured
 from proxytune.driving.plant import Plant
 from proxytune.effects import Setting, Signal
 
@@ -28,7 +28,4 @@ def follow(instance: Instance, plant: Plant, start: Signal, duties: Signal, seed
     for command in duties[:-1]:
         twists, memory = train.apply(np.repeat(command[None], hold, axis=0), memory)
         poses.append(plant.move(twists)[0])
-    walked = np.concatenate(poses)
-    measurement = instance.measurement
-    seen, _ = measurement.apply(walked, measurement.begin(Setting(TICK_HZ, walked[0], figures, seed)))
-    return np.asarray(seen[::hold])
+    return np.asarray(measured(instance, np.concatenate(poses), seed)[::hold])

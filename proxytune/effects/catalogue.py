@@ -59,6 +59,11 @@ def theta_names(effect: type[Effect]) -> tuple[str, ...]:
     return tuple(f"{effect.name}.{parameter.name}" for parameter in effect.parameters)
 
 
+def effect_of(theta_name: str) -> str:
+    """The name of the effect that a parameter of θ belongs to."""
+    return theta_name.split(".")[0]
+
+
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
     {name: parameter for effect in _ALL for name, parameter in zip(theta_names(effect), effect.parameters, strict=True)}
 )

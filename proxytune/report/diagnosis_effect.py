@@ -10,9 +10,7 @@ from matplotlib.figure import Figure
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.flexible import Curve
-from proxytune.diagnosis.replay import RANDOM_EFFECTS, wheel_speeds
-from proxytune.driving.drivetrain import drivetrain
-from proxytune.effects import Setting, effects_from
+from proxytune.diagnosis.replay import RANDOM_EFFECTS, drawn_wheel_speeds, wheel_speeds
 from proxytune.report.diagnosis_means import ANY, GROUPS, MOTIONS, draw_means, means_figure, rates_of, retuned
 from proxytune.report.diagnosis_style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
 from proxytune.space import Theta
@@ -161,12 +159,4 @@ def _responses(drives: Drives, theta: Theta) -> Floats:
     """Wheel speeds (draws, T, 2) as fractions of full speed: one draw unless the model has a random effect."""
     if not any(theta.get(name, 0.0) > 0.0 for name in RANDOM_EFFECTS):
         return wheel_speeds(drives, theta)
-    robot = drives.robot
-    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
-    nominal = {**robot.figures, "control_rate": drives.rate_hz}
-    draws = []
-    for seed in range(DRAWS):
-        memory = train.begin(Setting(drives.tick_hz, drives.rest, nominal, seed=seed, headings=drives.headings))
-        arrived, _ = train.command.apply(drives.duties, memory.command)
-        draws.append(train.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)[0][0])
-    return np.stack(draws)
+    return np.stack([drawn_wheel_speeds(drives, theta, seed)[0] for seed in range(DRAWS)])

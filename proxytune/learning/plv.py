@@ -1,5 +1,6 @@
 """Proxy learning value: how many target samples a proxy saves (Courchesne et al. 2021, equations 5 and 6)."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -31,7 +32,7 @@ class Curve:
     def __post_init__(self) -> None:
         if not self.counts or self.counts[0] != 0:
             raise InputError("a learning curve starts at 0 target samples; add 0 to the grid")
-        if any(later <= earlier for earlier, later in zip(self.counts, self.counts[1:], strict=False)):
+        if any(later <= earlier for earlier, later in itertools.pairwise(self.counts)):
             raise InputError(f"the grid of target samples must rise, got {list(self.counts)}")
         if self.scores.ndim != 2 or self.scores.shape[1] != len(self.counts) or not len(self.scores):
             raise InputError(f"scores have shape {self.scores.shape}; give (seeds, {len(self.counts)})")
@@ -69,11 +70,10 @@ def converged_level(curve: Curve) -> float:
     return float(curve.mean[-1])
 
 
-def still_rising(curve: Curve, tolerance: float) -> float | None:
-    """How much the mean still gains over the last doubling of samples, where that is more than the tolerance."""
+def settled(curve: Curve, tolerance: float) -> bool:
+    """Whether the mean score gains no more than the tolerance over the last doubling of samples."""
     half = [place for place, count in enumerate(curve.counts) if 2 * count <= curve.counts[-1]]
-    gain = float(curve.mean[-1] - curve.mean[half[-1]]) if half else float("nan")
-    return gain if not gain <= tolerance else None
+    return bool(curve.mean[-1] - curve.mean[half[-1]] <= tolerance)
 
 
 def samples_needed(curve: Curve, when: Convergence) -> int | None:

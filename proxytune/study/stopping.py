@@ -19,17 +19,16 @@ def stopped(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
     """
     settings = study.settings
     if len(done) >= settings.budget:
-        return f"the budget of {settings.budget} trials is spent"
-    return _out_of_time(study, store, done) or _nothing_to_gain(settings, done)
+        kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
+        return f"the budget of {settings.budget} trials is spent{kept}"
+    return _out_of_time(settings, store, done) or _nothing_to_gain(settings, done)
 
 
-def _out_of_time(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
-    settings = study.settings
+def _out_of_time(settings: StudySettings, store: Store, done: Sequence[TrialRecord]) -> str:
     limit = settings.stop.wall_time_s
     if limit is None:
         return ""
-    outcomes = [outcome for trial in done for outcome in store.outcomes(study.identity, trial.theta).values()]
-    seconds = sum(outcome.seconds for outcome in outcomes) / settings.jobs
+    seconds = store.seconds_of_trials(len(done)) / settings.jobs
     if seconds < limit:
         return ""
     return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {limit:g}; {FILE_REMEDY}"

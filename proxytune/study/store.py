@@ -173,6 +173,11 @@ class Store:
         rows = self._all("SELECT agent, start, avg(seconds) FROM episodes GROUP BY agent, start")
         return {(agent, start): mean for agent, start, mean in rows}
 
+    def seconds_of_trials(self, last: int) -> float:
+        """How long the episodes of all trials up to this one took."""
+        query = "SELECT total(seconds) FROM trials JOIN episodes ON episodes.instance = trials.instance WHERE number <= ?"
+        return float(self._all(query, (last,))[0][0])
+
     def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
         """Remember that a sweep has been asked for in the domain family with this identity."""
         row = (sweep.parameter, theta_json(sweep.base), json.dumps(sweep.points), identity)

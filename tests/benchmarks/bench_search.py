@@ -1,4 +1,4 @@
-"""What searching costs: `python -m pytest tests/benchmarks/bench_search.py -o addopts= -s`. It prints and never fails."""
+"""What searching costs: `python -m pytest tests/benchmarks/bench_search.py -o addopts= -s`. It prints, never fails."""
 
 import resource
 import statistics

@@ -10,7 +10,8 @@ from pathlib import Path
 
 FAKES = Path(__file__).resolve().parent
 ROOT = FAKES.parents[1]
-ENVIRONMENT = {**os.environ, "PYTHONPATH": f"{ROOT}:{FAKES}", "OMP_NUM_THREADS": "1"}
+PYTHONPATH = os.pathsep.join([str(ROOT), str(FAKES), *filter(None, [os.environ.get("PYTHONPATH")])])
+ENVIRONMENT = {**os.environ, "PYTHONPATH": PYTHONPATH, "OMP_NUM_THREADS": "1"}
 
 
 def heeding_ctrl_c():

@@ -1,5 +1,6 @@
 """What a study has found out: its best θ, how useful the proxy is there, and what that is worth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,13 +71,14 @@ class StudyResult:
         return len(self.trials) * len(self.study.settings.agents) * self.study.settings.starts
 
 
-def result_of(study: Study, store: Store) -> StudyResult:
-    """Sum up what the store has; nothing is simulated.
+def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | None = None) -> StudyResult:
+    """Sum up what the store has, or the same trials scored anew; nothing is simulated.
 
     Raises:
         RunError: If no trial has a score.
     """
-    trials = tuple(trial for trial in store.trials() if trial.state != "open")
+    known = store.trials() if scored_anew is None else scored_anew
+    trials = tuple(trial for trial in known if trial.state != "open")
     scored = [trial for trial in trials if trial.prpv is not None]
     if not scored:
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
@@ -98,13 +100,18 @@ def _best(study: Study, store: Store, scored: list[TrialRecord], surrogate: Surr
     row = int(np.argmin(mean))
     values = surrogate.visited[row].values
     trial = next(trial for trial in scored if space.values(trial.theta) == values)
-    proxy = _known(study, store, trial).proxy
+    proxy = known_evaluation(study, store, trial).proxy
     assert proxy is not None
     assessment = assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
     return Best(trial, float(mean[row]), float(deviation[row]), assessment)
 
 
-def _known(study: Study, store: Store, trial: TrialRecord) -> Evaluation:
+def known_evaluation(study: Study, store: Store, trial: TrialRecord) -> Evaluation:
+    """What a finished trial's episodes came to.
+
+    Raises:
+        RunError: If the store lacks some of them.
+    """
     found = evaluation(study, store, trial.theta)
     if found is None:
         raise RunError(f"{store.path}: lacks episodes of trial {trial.number}; move it away and run the study again")
@@ -115,5 +122,7 @@ def _failures(study: Study, store: Store, trials: tuple[TrialRecord, ...]) -> tu
     lines: list[str] = []
     for trial in trials:
         if trial.failed_episodes and len(lines) < FAILURES_TOLD:
-            lines += [f"trial {trial.number}: {told(outcome)}" for outcome in _known(study, store, trial).failures]
+            lines += [
+                f"trial {trial.number}: {told(outcome)}" for outcome in known_evaluation(study, store, trial).failures
+            ]
     return tuple(lines[:FAILURES_TOLD])

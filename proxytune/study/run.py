@@ -36,7 +36,7 @@ def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) 
         theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, done)
         store.save_trial(study.identity, TrialRecord(number, theta))
         spent += simulate(study, store, theta, watcher, f"trial {number} of {budget}")
-        done.append(_record(number, evaluation(study, store, theta)))
+        done.append(record(number, evaluation(study, store, theta)))
         store.save_trial(study.identity, done[-1])
         _tell_best(watcher, done)
     return spent
@@ -86,7 +86,8 @@ def _propose(study: Study, proposer: Proposer, done: Sequence[TrialRecord]) -> T
     return space.theta(proposer.propose(space, as_trials(space, done), study.settings.seed))
 
 
-def _record(number: int, found: Evaluation | None) -> TrialRecord:
+def record(number: int, found: Evaluation | None) -> TrialRecord:
+    """A trial as the store keeps it, from what its episodes came to."""
     assert found is not None
     state: State = "failed" if found.failure else "finished"
     return TrialRecord(number, found.theta, state, found.prpv, found.ppv, len(found.failures), found.failure)

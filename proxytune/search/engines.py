@@ -55,8 +55,6 @@ def make_proposer(engine: str, initial: int) -> Proposer:
     Raises:
         InputError: If there is no such engine, or it needs a library that is not installed.
     """
-    if engine == DEFAULT_ENGINE:
-        return GaussianProcess(initial)
     if engine not in ENGINES:
         raise InputError(f"unknown engine '{engine}'; {nearest(engine, ENGINES)}")
     if not installed(engine):
@@ -64,6 +62,7 @@ def make_proposer(engine: str, initial: int) -> Proposer:
             "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]', or use another engine"
         )
     inner: dict[str, Proposer] = {
+        "gp": GaussianProcess(),
         "random": RandomPoints(),
         "sobol": Sobol(),
         "tpe": TreeParzen(),

@@ -111,7 +111,7 @@ def fit_surrogate(space: Space, trials: Sequence[Trial]) -> Surrogate:
     unit = unit_array(space, [trial.values for trial in visited])
     scores = np.array([trial.score for trial in visited], dtype=float)
     model = GaussianProcessRegressor(
-        kernel=_kernel(len(space.intervals)), optimizer=_most_probable, normalize_y=True, noise="gaussian"
+        kernel=_kernel(len(space.intervals)), optimizer=most_probable, normalize_y=True, noise="gaussian"
     )
     with threadpool_limits(limits=1), warnings.catch_warnings():
         # A hyperparameter at its bound is an answer, not a failure.
@@ -130,7 +130,7 @@ def _kernel(dimensions: int) -> ConstantKernel:
     return ConstantKernel(AMPLITUDE.median, AMPLITUDE.bounds) * smooth + WhiteKernel(NOISE.median, NOISE.bounds)
 
 
-def _most_probable(misfit: Callable[[Array], tuple[float, Array]], start: Array, bounds: Array) -> tuple[Array, float]:
+def most_probable(misfit: Callable[[Array], tuple[float, Array]], start: Array, bounds: Array) -> tuple[Array, float]:
     """The hyperparameters' logarithms of highest posterior density, as the regressor's optimiser.
 
     Args:

@@ -3,31 +3,17 @@ import importlib.util
 
 import numpy as np
 import pytest
+from steps import SPACE, search, steps
 
 from proxytune.errors import InputError
 from proxytune.search import engines
 from proxytune.search.design import design_point
 from proxytune.search.engines import ENGINES, STUDY_ENGINES, AfterDesign, make_proposer
 from proxytune.search.proposer import Trial
-from proxytune.space import Interval, Space
 
-SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
 WITHOUT = () if HAS_OPTUNA else ("tpe",)
 HERE = [name for name in ENGINES if name not in WITHOUT]
-
-
-def steps(values):
-    """An integer score with its lowest step around (0.1, 0.1), like PRPV's."""
-    return float(np.floor(40 * (abs(values[0] - 0.1) + abs(values[1] - 0.1))))
-
-
-def search(proposer, budget, seed, score=steps):
-    trials = []
-    for _ in range(budget):
-        values = proposer.propose(SPACE, trials, seed)
-        trials.append(Trial(values, score(values)))
-    return trials
 
 
 @pytest.mark.parametrize("engine", HERE)

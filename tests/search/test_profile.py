@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
+from steps import SPACE
 
 from proxytune.search.design import design_point
 from proxytune.search.profile import GRID, profiles
 from proxytune.search.proposer import Trial
 from proxytune.search.surrogate import fit_surrogate
-from proxytune.space import Interval, Space
-
-SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
 
 
 def found(score, count=40):

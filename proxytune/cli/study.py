@@ -9,6 +9,7 @@ from proxytune.cli.answer import Answer
 from proxytune.cli.study_folder import study_folder
 from proxytune.errors import InputError
 from proxytune.report.convergence import convergence
+from proxytune.report.importance_figure import importance_figure
 from proxytune.report.page import page
 from proxytune.report.search_figures import evaluations_figure, profiles_figure
 from proxytune.report.study_document import study_document
@@ -61,7 +62,12 @@ def _proposer(settings: StudySettings) -> Proposer:
 
 def draw(result: StudyResult, folder: Path) -> tuple[list[Path], Path]:
     """Draw the study's figures and the report; their paths."""
-    drawn = {"convergence": convergence, "profiles": profiles_figure, "evaluations": evaluations_figure}
+    drawn = {
+        "convergence": convergence,
+        "profiles": profiles_figure,
+        "evaluations": evaluations_figure,
+        "importance": importance_figure,
+    }
     figures = [folder / "figures" / f"{name}.png" for name in drawn]
     report = folder / "report.html"
     for figure, draw_one in zip(figures, drawn.values(), strict=True):

@@ -1,4 +1,7 @@
-"""Bayesian optimisation: expected improvement over a Gaussian process of the finished trials."""
+"""Bayesian optimisation: expected improvement over a Gaussian process of the finished trials.
+
+There are no pending trials to be told of: a study tries one θ at a time and spreads its episodes over the jobs.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

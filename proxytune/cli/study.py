@@ -17,14 +17,14 @@ from proxytune.report.study_table import study_table
 from proxytune.report.writing import save, write_text
 from proxytune.search.engines import make_proposer
 from proxytune.search.proposer import Proposer
+from proxytune.study.composition import compose_of
 from proxytune.study.evaluate import Spent
 from proxytune.study.lock import locked
 from proxytune.study.progress import Bars
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import run_study
-from proxytune.study.settings import StudySettings
 from proxytune.study.store import Store
-from proxytune.study.study import open_study
+from proxytune.study.study import Study, open_study
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     folder = study_folder(arguments.path)
     study = open_study(folder)
     settings = study.settings
-    proposer = _proposer(settings)
+    proposer = _proposer(study)
     episodes = settings.budget * len(settings.agents) * settings.starts
     with locked(folder), Store.open(folder) as store:
         with Bars(episodes) as bars:
@@ -53,9 +53,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer(document, study_table(result, _told(costs), files))
 
 
-def _proposer(settings: StudySettings) -> Proposer:
+def _proposer(study: Study) -> Proposer:
+    settings = study.settings
     try:
-        return make_proposer(settings.engine, settings.initial)
+        return make_proposer(settings.engine, settings.initial, compose_of(study))
     except InputError as problem:
         raise settings.error("engine", str(problem)) from None
 

@@ -6,18 +6,26 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, dress
+from proxytune.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, dress
 from proxytune.search.comparison import Run
 from proxytune.search.summary import median_curve
 
 COLOURS = {
     "gp": BLUE,
+    "composite": VERMILLION,
     "random": GREY,
     "sobol": ORANGE,
     "tpe": GREEN,
     "skopt": PURPLE,
 }
-STYLES = {"gp": "-", "random": ":", "sobol": "-.", "tpe": "--", "skopt": (0, (5, 1, 1, 1, 1, 1))}
+STYLES = {
+    "gp": "-",
+    "composite": (0, (7, 1.5)),
+    "random": ":",
+    "sobol": "-.",
+    "tpe": "--",
+    "skopt": (0, (5, 1, 1, 1, 1, 1)),
+}
 
 
 def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure:

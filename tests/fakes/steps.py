@@ -13,10 +13,16 @@ def steps(values):
     return float(np.floor(40 * (abs(values[0] - 0.1) + abs(values[1] - 0.1))))
 
 
+def whole(outcomes):
+    """The score of an outcome that is the score itself."""
+    return outcomes[..., 0]
+
+
 def search(proposer, budget, seed, score=steps):
     """The trials of an uninterrupted search."""
     trials = []
     for _ in range(budget):
         values = proposer.propose(SPACE, trials, seed)
-        trials.append(Trial(values, score(values)))
+        found = score(values)
+        trials.append(Trial(values, found, None if found is None else (found,)))
     return trials

@@ -1,21 +1,24 @@
-"""A stand-in with agents, metrics and episodes, without a simulator: to bootstrap PRPV and to model metrics."""
+"""A stand-in for a study with agents, metrics and episodes: slower than the analytic one, nearer to what PRPV is."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.scores import Metric, ScoreTable
 from proxytune.search.analytic import BOX
 from proxytune.search.design import from_unit, to_unit
+from proxytune.search.proposer import Compose, Values
 from proxytune.space import Space
-from proxytune.usefulness import compare
 from proxytune.usefulness.prpv import prpv_of_means
-from proxytune.usefulness.resampling import bootstrap_means
+
+Array = NDArray[np.float64]
 
 AGENTS, EPISODES = 12, 10
 METRICS = (Metric("distance"), Metric("survival_time"))
 SPREAD = 0.15
 """Standard deviation of an episode's score; the agents' own best scores lie between 0.4 and 1."""
+
 WEIGHTS = np.array([0.3, 1.5, 2.0, 3.0])
 """How hard blur, camera pitch, delay and trim hit an agent, typically, per width of the box."""
 
@@ -35,47 +38,57 @@ class Ranking:
     tolerance: float = 14.0
     identity: str = "ranking 1"
 
-    def optimum(self, seed):
-        """The true θ on the unit cube: each parameter from the middle 60 % of its interval."""
-        return np.random.default_rng([seed, 1]).uniform(0.2, 0.8, len(self.space.intervals))
+    def optimum(self, seed: int) -> Values:
+        """The true θ: each parameter drawn from the middle 60 % of its interval."""
+        unit = np.random.default_rng([seed, 1]).uniform(0.2, 0.8, len(self.space.intervals))
+        return from_unit(self.space, unit)
 
-    def means(self, values, seed):
+    def means(self, values: Values, seed: int) -> Array:
         """Mean scores without noise, shape (agents, metrics)."""
         generator = np.random.default_rng([seed, 2])
-        best = generator.uniform(0.4, 1.0, (AGENTS, 2))
-        weights = WEIGHTS * generator.lognormal(0.0, 0.7, (AGENTS, 2, len(WEIGHTS)))
+        best = generator.uniform(0.4, 1.0, (AGENTS, len(METRICS)))
+        weights = WEIGHTS * generator.lognormal(0.0, 0.7, (AGENTS, len(METRICS), len(WEIGHTS)))
         liked = generator.normal(0.0, 0.15, (AGENTS, 1, len(WEIGHTS)))
-        away = to_unit(self.space, values) - self.optimum(seed)
-        return best * np.exp(-np.linalg.norm(weights * (away - liked), axis=-1))
+        away = to_unit(self.space, values) - to_unit(self.space, self.optimum(seed))
+        decay: Array = np.exp(-np.linalg.norm(weights * (away - liked), axis=-1))
+        return best * decay
 
-    def table(self, values, seed):
+    def table(self, values: Values, seed: int) -> ScoreTable:
         """The episodes that a study would drive at a θ, drawn from seed and θ alone."""
         bits = np.frombuffer(np.array(values, dtype=float).tobytes(), dtype=np.uint32)
         return _episodes(self.means(values, seed), np.random.default_rng([seed, 3, *bits.tolist()]))
 
-    def target(self, seed):
+    def target(self, seed: int) -> ScoreTable:
         """The target's episodes, measured once."""
-        return _episodes(self._true(seed), np.random.default_rng([seed, 4]))
+        return _episodes(self.means(self.optimum(seed), seed), np.random.default_rng([seed, 4]))
 
-    def score(self, values, seed):
+    def score(self, values: Values, seed: int) -> float:
         """PRPV of the episodes."""
         return float(prpv_of_means(self.table(values, seed).means, self.target(seed).means, METRICS))
 
-    def regret(self, values, seed):
+    def outcome(self, values: Values, seed: int) -> Values:
+        """Every agent's mean metrics."""
+        return tuple(self.table(values, seed).means.ravel().tolist())
+
+    def compose(self, seed: int) -> Compose:
+        """PRPV of mean metrics."""
+        target = self.target(seed).means
+        return lambda outcomes: prpv_of_means(outcomes.reshape(*outcomes.shape[:-1], *target.shape), target, METRICS)
+
+    def regret(self, values: Values, seed: int) -> float:
         """PRPV without noise on either side."""
-        return float(prpv_of_means(self.means(values, seed), self._true(seed), METRICS))
+        return float(prpv_of_means(self.means(values, seed), self.means(self.optimum(seed), seed), METRICS))
 
-    def variance(self, values, seed):
-        """Of PRPV, from 200 bootstraps of the proxy's episodes; the target's are the same at every θ."""
-        inputs = compare(proxy=self.table(values, seed), target=self.target(seed), metrics=METRICS)
-        proxy, _ = bootstrap_means(inputs, resamples=200, seed=0)
-        return float(prpv_of_means(proxy, inputs.target.means, METRICS).var())
+    def fresh_regret(self, values: Values, seed: int) -> float:
+        """The same: it has no noise."""
+        return self.regret(values, seed)
 
-    def _true(self, seed):
-        return self.means(from_unit(self.space, self.optimum(seed)), seed)
+    def error(self, values: Values, seed: int) -> float:
+        """Mean distance of the parameters from the true ones, in widths of the box."""
+        return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.optimum(seed))).mean())
 
 
-def _episodes(means, generator):
+def _episodes(means: Array, generator: np.random.Generator) -> ScoreTable:
     values = means[:, None, :] + generator.normal(0.0, SPREAD, (AGENTS, EPISODES, len(METRICS)))
     agents, episodes = (tuple(f"{i:02}" for i in range(count)) for count in (AGENTS, EPISODES))
     return ScoreTable(agents, episodes, tuple(metric.name for metric in METRICS), values)

@@ -3,6 +3,7 @@
 from typing import Any
 
 from proxytune.report.score_document import document_of
+from proxytune.search.importance import Importance
 from proxytune.study.result import StudyResult
 from proxytune.study.settings import as_document
 from proxytune.study.store import TrialRecord
@@ -28,12 +29,17 @@ def study_document(result: StudyResult) -> dict[str, Any]:
             "usefulness": measures,
         },
         **{key: measures[key] for key in shared},
+        "importance": {found.name: _importance(found) for found in result.importances},
         "stopped": result.stopped or None,
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
         "target": _target(result),
         "settings": dict(as_document(result.study.settings)),
     }
+
+
+def _importance(found: Importance) -> dict[str, Any]:
+    return {"share": found.share, "interval": list(found.interval), "alone": found.alone}
 
 
 def _trial(trial: TrialRecord) -> dict[str, Any]:

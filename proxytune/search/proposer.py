@@ -1,15 +1,19 @@
 """What proposes the next θ: a pure function of the space, the finished trials and the seed."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.space import Space
 
 Values = tuple[float, ...]
 """A point of the search box: one value per parameter, in the order of the box."""
+
+Compose = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""Scores, shape (…,), of outcomes, shape (…, outputs)."""
 
 
 @dataclass(frozen=True)
@@ -19,10 +23,13 @@ class Trial:
     Attributes:
         values: The point, in the order of the box.
         score: Its score, or None where the trial failed.
+        outcome: What the score was computed from, one value per output; None where the trial failed, or where the
+            score has no such parts.
     """
 
     values: Values
     score: float | None
+    outcome: Values | None = None
 
 
 class Proposer(Protocol):
@@ -39,7 +46,7 @@ def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:
     if not scored:
         return []
     worst = max(scored)
-    return [Trial(trial.values, worst if trial.score is None else trial.score) for trial in trials]
+    return [replace(trial, score=worst) if trial.score is None else trial for trial in trials]
 
 
 def proposal_seed(seed: int, count: int) -> int:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.errors import RunError
+from proxytune.search.importance import Importance, importances
 from proxytune.search.profile import Profile, profiles
 from proxytune.search.surrogate import Surrogate, fit_surrogate
 from proxytune.study.evaluate import Evaluation, evaluation, told
@@ -44,6 +45,7 @@ class StudyResult:
         trials: Its finished and failed trials, in order.
         best: The best of them.
         profiles: What is known of each parameter, in the order of the box.
+        importances: How much each parameter matters, in the order of the box.
         stopped: Why it runs no further; empty while it is not at its end.
         failures: The first failed episodes, told in one line each.
     """
@@ -52,6 +54,7 @@ class StudyResult:
     trials: tuple[TrialRecord, ...]
     best: Best
     profiles: tuple[Profile, ...]
+    importances: tuple[Importance, ...]
     stopped: str
     failures: tuple[str, ...]
 
@@ -89,6 +92,7 @@ def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | N
         trials=trials,
         best=_best(study, store, scored, surrogate),
         profiles=profiles(surrogate),
+        importances=importances(surrogate),
         stopped=stopped(study, store, trials),
         failures=_failures(study, store, trials),
     )

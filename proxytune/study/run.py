@@ -7,6 +7,7 @@ from typing import Any
 from proxytune.errors import RunError, SettingsError
 from proxytune.search.proposer import Proposer, Trial
 from proxytune.space import Space, Theta
+from proxytune.study.composition import trial_of
 from proxytune.study.evaluate import Evaluation, Spent, evaluation, simulate
 from proxytune.study.progress import Watcher
 from proxytune.study.stopping import stopped
@@ -30,14 +31,16 @@ def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) 
     budget, spent = study.settings.budget, Spent()
     trials = store.trials()
     done = [trial for trial in trials if trial.state != "open"]
+    told = [trial_of(study, store, trial) for trial in done]
     while not stopped(study, store, done):
         _check_hope(study, done)
         number = len(done) + 1
-        theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, done)
+        theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, told)
         store.save_trial(study.identity, TrialRecord(number, theta))
         spent += simulate(study, store, theta, watcher, f"trial {number} of {budget}")
         done.append(record(number, evaluation(study, store, theta)))
         store.save_trial(study.identity, done[-1])
+        told.append(trial_of(study, store, done[-1]))
         _tell_best(watcher, done)
     return spent
 
@@ -81,9 +84,9 @@ def as_trials(space: Space, done: Sequence[TrialRecord]) -> list[Trial]:
     return [Trial(space.values(trial.theta), trial.prpv) for trial in done]
 
 
-def _propose(study: Study, proposer: Proposer, done: Sequence[TrialRecord]) -> Theta:
+def _propose(study: Study, proposer: Proposer, told: Sequence[Trial]) -> Theta:
     space = study.settings.space
-    return space.theta(proposer.propose(space, as_trials(space, done), study.settings.seed))
+    return space.theta(proposer.propose(space, told, study.settings.seed))
 
 
 def record(number: int, found: Evaluation | None) -> TrialRecord:

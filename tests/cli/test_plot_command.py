@@ -17,7 +17,7 @@ def test_every_figure_is_drawn_again_without_simulating(finished, capsys):
     assert main(["plot", str(finished), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert names == sorted(path.name for path in (finished / "figures").iterdir())
-    assert len(names) == 7
+    assert len(names) == 8
     assert (finished / "report.html").exists()
     assert document["best"] == before["best"]
     assert (finished / "study.db").read_bytes() == content

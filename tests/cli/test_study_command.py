@@ -23,7 +23,7 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
     first = json.loads(capsys.readouterr().out)
     assert first["episodes"] == {"run": 126, "reused": 0, "failed": 0}
     assert 0 < first["seconds"]["outside_episodes"] <= first["seconds"]["total"]
-    assert [Path(path).exists() for path in (*first["figures"], first["report"])] == [True] * 4
+    assert [Path(path).exists() for path in (*first["figures"], first["report"])] == [True] * 5
     assert main(["study", str(folder), "--json"]) == 0
     second = json.loads(capsys.readouterr().out)
     assert second["episodes"] == {"run": 0, "reused": 126, "failed": 0}

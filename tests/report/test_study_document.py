@@ -4,7 +4,7 @@ import pytest
 
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import best_theta, failure_lines, usefulness_lines
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines import make_proposer
 from proxytune.study.progress import Silent
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
@@ -48,7 +48,7 @@ def test_people_see_the_same(result):
 def test_failed_episodes_are_told_with_the_first_of_them(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6")
     with Store.open(folder) as store:
-        run_study(open_study(folder), store, GaussianProcess(5), Silent())
+        run_study(open_study(folder), store, make_proposer("gp", 5), Silent())
         result = result_of(open_study(folder), store)
     head, first, *_ = failure_lines(result)
     assert head == "6 of 108 episodes failed; the first:"

@@ -5,7 +5,6 @@ import pytest
 
 from proxytune.errors import EpisodeError, RunError, SettingsError
 from proxytune.search.engines import make_proposer
-from proxytune.search.gaussian_process import GaussianProcess
 from proxytune.study.progress import Silent
 from proxytune.study.run import as_stored, as_trials, check_facts, run_study
 from proxytune.study.store import Store, TrialRecord
@@ -16,7 +15,7 @@ def run(folder, **changes):
     study = open_study(folder)
     study = replace(study, settings=replace(study.settings, **changes))
     with Store.open(folder) as store:
-        spent = run_study(study, store, GaussianProcess(study.settings.initial), Silent())
+        spent = run_study(study, store, make_proposer("gp", study.settings.initial), Silent())
         return spent.episodes, store.trials()
 
 
@@ -65,7 +64,7 @@ def test_an_interrupted_study_loses_no_finished_episode_and_goes_on_to_the_same_
     study = replace(study, settings=replace(study.settings, jobs=jobs))
     for episodes in (5, 40, 40):
         with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-            run_study(study, store, GaussianProcess(5), Stopping(episodes))
+            run_study(study, store, make_proposer("gp", 5), Stopping(episodes))
     with sqlite3.connect(folder / "study.db") as plain:
         assert plain.execute("SELECT count(*) FROM episodes").fetchone() == (85,)
     episodes, trials = run(folder, jobs=jobs)
@@ -172,7 +171,7 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
     folder = make_study()
     study = open_study(folder)
     with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-        run_study(study, store, GaussianProcess(5), Stopping(4))
+        run_study(study, store, make_proposer("gp", 5), Stopping(4))
     make_study(seed="2")
     assert len(run(folder)[1]) == 7
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 from proxytune.report.score_document import document_of
+from proxytune.study.preflight import Preflight
 from proxytune.study.result import StudyResult
 from proxytune.study.settings import as_document
 from proxytune.study.store import TrialRecord
@@ -28,11 +29,25 @@ def study_document(result: StudyResult) -> dict[str, Any]:
             "usefulness": measures,
         },
         **{key: measures[key] for key in shared},
+        "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
         "target": _target(result),
         "settings": dict(as_document(result.study.settings)),
+    }
+
+
+def _preflight(found: Preflight | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    keys = ("moves", "p_value", "metric", "change", "noise", "pairs")
+    moved = {one.interval.name: {key: getattr(one, key) for key in keys} for one in found.movements}
+    return {
+        "base": dict(found.base),
+        "episodes": found.episodes,
+        "parameters": moved,
+        "warnings": list(found.warnings),
     }
 
 

@@ -25,10 +25,17 @@ def best_theta(result: StudyResult) -> list[tuple[str, str, str, str]]:
 
 
 def identity_lines(result: StudyResult) -> list[str]:
-    """Which parameters PRPV does not see, and how the study came to its end; nothing where there is nothing to say."""
+    """What the pre-flight found, which parameters PRPV does not see, and how the study came to its end."""
     names = ", ".join(result.unidentified)
     unseen = [f"unidentified: {names}; any value in the box is as good, beyond noise"] if names else []
-    return [*unseen, *([f"stopped: {result.stopped}"] if result.stopped else [])]
+    return [*preflight_lines(result), *unseen, *([f"stopped: {result.stopped}"] if result.stopped else [])]
+
+
+def preflight_lines(result: StudyResult) -> list[str]:
+    """Which parameters do nothing beyond noise, or that all do; nothing where there was no pre-flight."""
+    if result.preflight is None:
+        return []
+    return [*result.preflight.warnings] or ["pre-flight: every parameter changes the metrics beyond noise"]
 
 
 def usefulness_lines(result: StudyResult) -> list[str]:

@@ -8,6 +8,7 @@ from proxytune.errors import RunError
 from proxytune.search.profile import Profile, profiles
 from proxytune.search.surrogate import Surrogate, fit_surrogate
 from proxytune.study.evaluate import Evaluation, evaluation, told
+from proxytune.study.preflight import Preflight, preflight_of
 from proxytune.study.run import as_trials
 from proxytune.study.stopping import stopped
 from proxytune.study.store import Store, TrialRecord
@@ -43,6 +44,7 @@ class StudyResult:
         trials: Its finished and failed trials, in order.
         best: The best of them.
         profiles: What is known of each parameter, in the order of the box.
+        preflight: What was learnt of the parameters before the first trial; None if it is off or was never run.
         stopped: Why it runs no further; empty while it is not at its end.
         failures: The first failed episodes, told in one line each.
     """
@@ -51,6 +53,7 @@ class StudyResult:
     trials: tuple[TrialRecord, ...]
     best: Best
     profiles: tuple[Profile, ...]
+    preflight: Preflight | None
     stopped: str
     failures: tuple[str, ...]
 
@@ -66,8 +69,9 @@ class StudyResult:
 
     @property
     def episodes(self) -> int:
-        """How many episodes the trials took, failed ones counted."""
-        return len(self.trials) * len(self.study.settings.agents) * self.study.settings.starts
+        """How many episodes trials and pre-flight took, failed ones counted."""
+        trials = len(self.trials) * len(self.study.settings.agents) * self.study.settings.starts
+        return trials + (self.preflight.episodes if self.preflight else 0)
 
 
 def result_of(study: Study, store: Store) -> StudyResult:
@@ -87,6 +91,7 @@ def result_of(study: Study, store: Store) -> StudyResult:
         trials=trials,
         best=_best(study, store, scored, surrogate),
         profiles=profiles(surrogate),
+        preflight=preflight_of(study, store),
         stopped=stopped(study, store, trials),
         failures=_failures(study, store, trials),
     )

@@ -16,7 +16,8 @@ FILE_NAME = "study.toml"
 FORMAT = 1
 KEYS = (
     "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
-    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "stop", "parameters", "domain",
+    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "stop",
+    "parameters", "domain",
 )  # fmt: skip
 
 
@@ -54,6 +55,7 @@ class StudySettings:
         seed: Seed of the episodes and of the search.
         jobs: How many processes run episodes.
         stop_on_failure: Whether a failing episode stops the study.
+        preflight: Whether each parameter is first shown to matter.
         stop: When it ends before its budget is spent.
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
@@ -74,6 +76,7 @@ class StudySettings:
     seed: int
     jobs: int
     stop_on_failure: bool
+    preflight: bool
     stop: StopRules
     space: Space
     domain: Section
@@ -115,6 +118,7 @@ def read_study_settings(path: Path) -> StudySettings:
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
+        preflight=read.flag("preflight", True),
         stop=_stop(read.section("stop")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
@@ -177,6 +181,7 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "seed": settings.seed,
         "jobs": settings.jobs,
         "on_failure": "stop" if settings.stop_on_failure else "continue",
+        "preflight": settings.preflight,
         "stop": {key: value for key, value in vars(settings.stop).items() if value is not None},
         "parameters": {i.name: [i.low, i.high] for i in settings.space.intervals},
     }

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from proxytune.search.gaussian_process import expected_improvement
 from proxytune.search.proposer import Trial
+from proxytune.study.evaluate import known_outcomes, plan
 from proxytune.study.settings import StudySettings
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
@@ -14,7 +15,7 @@ FILE_REMEDY = "raise it or take it out to go on"
 def stopped(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
     """Why a study with these finished trials runs no further, in one phrase; empty while it goes on.
 
-    Only finished trials and the time of their episodes count, never the clock of this process: a study that was
+    Only finished trials and the time of their own episodes count, never the clock of this process: a study that was
     stopped stays so when it is run again, and without the rule it goes on to the trials it would have had anyway.
     """
     settings = study.settings
@@ -28,8 +29,8 @@ def _out_of_time(study: Study, store: Store, done: Sequence[TrialRecord]) -> str
     limit = settings.stop.wall_time_s
     if limit is None:
         return ""
-    outcomes = [outcome for trial in done for outcome in store.outcomes(study.identity, trial.theta).values()]
-    seconds = sum(outcome.seconds for outcome in outcomes) / settings.jobs
+    planned = [episode for trial in done for episode in plan(settings, trial.theta, settings.seed)]
+    seconds = sum(outcome.seconds for outcome in known_outcomes(study, store, planned).values()) / settings.jobs
     if seconds < limit:
         return ""
     return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {limit:g}; {FILE_REMEDY}"

@@ -17,9 +17,9 @@ from proxytune.report.study_table import study_table
 from proxytune.report.writing import save, write_text
 from proxytune.search.engines import make_proposer
 from proxytune.search.proposer import Proposer
+from proxytune.study import confirmation, preflight
 from proxytune.study.evaluate import Spent
 from proxytune.study.lock import locked
-from proxytune.study.preflight import most_episodes, preflight_of, run_preflight
 from proxytune.study.progress import Bars, Watcher
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import check_facts, run_study
@@ -42,11 +42,13 @@ def run(arguments: argparse.Namespace) -> Answer:
     study = open_study(folder)
     settings = study.settings
     proposer = _proposer(settings)
-    episodes = settings.budget * len(settings.agents) * settings.starts + most_episodes(settings)
+    episodes = preflight.most_episodes(settings) + confirmation.most_episodes(settings)
+    episodes += settings.budget * len(settings.agents) * settings.starts
     with locked(folder), Store.open(folder) as store:
         with Bars(episodes) as bars:
             spent = _prepared(study, store, bars)
             spent += run_study(study, store, proposer, bars)
+            spent += confirmation.run_confirmation(study, store, bars)
         result = result_of(study, store)
     figures, report = draw(result, folder)
     costs = _costs(result, spent, time.perf_counter() - begun)
@@ -58,8 +60,8 @@ def run(arguments: argparse.Namespace) -> Answer:
 def _prepared(study: Study, store: Store, watcher: Watcher) -> Spent:
     """Run the pre-flight and say at once which parameters do nothing: the study may be stopped for that."""
     check_facts(study, store)
-    spent = run_preflight(study, store, watcher)
-    found = preflight_of(study, store) if spent.episodes else None
+    spent = preflight.run_preflight(study, store, watcher)
+    found = preflight.preflight_of(study, store) if spent.episodes else None
     for warning in found.warnings if found else ():
         print(f"proxytune study: {warning}", file=sys.stderr)
     return spent

@@ -3,6 +3,7 @@
 from typing import Any
 
 from proxytune.report.score_document import document_of
+from proxytune.study.confirmation import Confirmation
 from proxytune.study.preflight import Preflight
 from proxytune.study.result import StudyResult
 from proxytune.study.settings import as_document
@@ -24,6 +25,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
             "prpv_normalised": measures["prpv_normalised"],
             "prpv_interval": measures["prpv_interval"],
             "ppv": measures["ppv"],
+            "fresh": _fresh(result.confirmation),
             "posterior_mean": best.posterior_mean,
             "posterior_deviation": best.posterior_deviation,
             "usefulness": measures,
@@ -35,6 +37,22 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         "failures": list(result.failures),
         "target": _target(result),
         "settings": dict(as_document(result.study.settings)),
+    }
+
+
+def _fresh(found: Confirmation | None) -> dict[str, Any] | None:
+    """What fresh episodes say of the answer and of its rivals."""
+    if found is None:
+        return None
+    measures = document_of(found.answer.assessment) if found.answer.assessment else {}
+    return {
+        **{key: measures.get(key) for key in ("prpv", "prpv_normalised", "prpv_interval", "ppv")},
+        "optimism": found.answer.optimism,
+        "episodes": found.episodes,
+        "candidates": [
+            {"index": one.trial.number, "prpv": round(one.trial.prpv or 0.0), "fresh_prpv": list(one.scores)}
+            for one in found.candidates
+        ],
     }
 
 

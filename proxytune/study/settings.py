@@ -16,8 +16,8 @@ FILE_NAME = "study.toml"
 FORMAT = 1
 KEYS = (
     "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
-    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "stop",
-    "parameters", "domain",
+    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
+    "stop", "parameters", "domain",
 )  # fmt: skip
 
 
@@ -56,6 +56,7 @@ class StudySettings:
         jobs: How many processes run episodes.
         stop_on_failure: Whether a failing episode stops the study.
         preflight: Whether each parameter is first shown to matter.
+        confirm: How often the best θ are driven again in fresh episodes when the search has ended.
         stop: When it ends before its budget is spent.
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
@@ -77,6 +78,7 @@ class StudySettings:
     jobs: int
     stop_on_failure: bool
     preflight: bool
+    confirm: int
     stop: StopRules
     space: Space
     domain: Section
@@ -119,6 +121,7 @@ def read_study_settings(path: Path) -> StudySettings:
         jobs=read.whole("jobs", 1, low=1, high=1024),
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
         preflight=read.flag("preflight", True),
+        confirm=read.whole("confirm", 1, high=1000),
         stop=_stop(read.section("stop")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
@@ -182,6 +185,7 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "jobs": settings.jobs,
         "on_failure": "stop" if settings.stop_on_failure else "continue",
         "preflight": settings.preflight,
+        "confirm": settings.confirm,
         "stop": {key: value for key, value in vars(settings.stop).items() if value is not None},
         "parameters": {i.name: [i.low, i.high] for i in settings.space.intervals},
     }

@@ -22,6 +22,8 @@ STUDY = {
     "initial": "5",
     "seed": "1",
     "jobs": "1",
+    "preflight": "false",
+    "confirm": "0",
 }
 PARAMETERS = {"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
 TRUTH = {"trim": 0.1, "delay": 0.12}

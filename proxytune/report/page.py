@@ -65,7 +65,8 @@ def _meaning(result: StudyResult) -> str:
     agents = len(result.study.settings.agents)
     return (
         f"PRPV counts how unlike the target the proxy ranks the {agents} agents, over ordered pairs. "
-        "The best θ is the visited one with the lowest mean of the surrogate given all trials."
+        "The best θ is the visited one with the lowest mean of the surrogate given all trials, and fresh episodes "
+        "where they were driven."
     )
 
 

@@ -1,6 +1,6 @@
 """Scoring one domain instance: all agents from all starts, compared with the target."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +64,12 @@ class Spent:
 
 
 def simulate(study: Study, store: Store, theta: Theta, watcher: Watcher, what: str) -> Spent:
-    """Run the episodes of a domain instance that are not in the store yet; each is there as soon as it is finished.
+    """Run the episodes of a domain instance that are not in the store yet, as in run_missing."""
+    return run_missing(study, store, plan(study.settings, theta, study.settings.seed), watcher, what)
+
+
+def run_missing(study: Study, store: Store, planned: Sequence[Episode], watcher: Watcher, what: str) -> Spent:
+    """Run the episodes that are not in the store yet; each is there as soon as it is finished.
 
     A failed episode counts as known where failures do not stop the study; where they do, it is tried again, since
     something is expected to have been mended.
@@ -72,20 +77,27 @@ def simulate(study: Study, store: Store, theta: Theta, watcher: Watcher, what: s
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
     """
-    settings, identity, spent = study.settings, study.identity, Spent()
-    known = store.outcomes(identity, theta)
-    planned = plan(settings, theta, settings.seed)
+    settings, spent = study.settings, Spent()
+    known = known_outcomes(study, store, planned)
     stop = settings.stop_on_failure
     missing = [episode for episode in planned if episode not in known or (stop and known[episode].failure)]
     watcher.begin(what, len(planned) - len(missing))
     with running(study.family, longest_first(missing, store.seconds()), settings.jobs) as outcomes:
         for outcome in outcomes:
-            store.save_outcome(identity, outcome)
+            store.save_outcome(study.identity, outcome)
             watcher.episode()
             spent += Spent(1, outcome.seconds)
             if stop and outcome.failure:
                 raise EpisodeError(f"{told(outcome)}; mend it and run again, or set on_failure = 'continue'")
     return spent
+
+
+def known_outcomes(study: Study, store: Store, planned: Sequence[Episode]) -> dict[Episode, Outcome]:
+    """Those of the episodes that the store has, with what became of them."""
+    known: dict[Episode, Outcome] = {}
+    for theta in dict.fromkeys(episode.theta for episode in planned):
+        known |= store.outcomes(study.identity, dict(theta))
+    return {episode: known[episode] for episode in planned if episode in known}
 
 
 def longest_first(episodes: list[Episode], seconds: Mapping[tuple[str, int], float]) -> list[Episode]:
@@ -99,11 +111,9 @@ def evaluation(study: Study, store: Store, theta: Theta) -> Evaluation | None:
     Each agent is scored over its own episodes that worked. A failed episode has no score, so none is made up for it;
     an agent without any cannot be compared, and then the instance has no score either.
     """
-    known = store.outcomes(study.identity, theta)
     planned = plan(study.settings, theta, study.settings.seed)
-    if not all(episode in known for episode in planned):
-        return None
-    return score(study, theta, [known[episode] for episode in planned])
+    known = known_outcomes(study, store, planned)
+    return score(study, theta, list(known.values())) if len(known) == len(planned) else None
 
 
 def score(study: Study, theta: Theta, outcomes: list[Outcome]) -> Evaluation:

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from proxytune.errors import RunError
 from proxytune.search.importance import Importance, importances
 from proxytune.search.profile import Profile, profiles
-from proxytune.search.surrogate import Surrogate, fit_surrogate
+from proxytune.search.surrogate import Surrogate, fit_surrogate, unit_array
+from proxytune.study.confirmation import Confirmation, confirmation_of
 from proxytune.study.evaluate import Evaluation, evaluation, told
+from proxytune.study.preflight import Preflight, preflight_of
 from proxytune.study.run import as_trials
 from proxytune.study.stopping import stopped
 from proxytune.study.store import Store, TrialRecord
@@ -21,13 +21,16 @@ FAILURES_TOLD = 10
 
 @dataclass(frozen=True)
 class Best:
-    """The visited θ with the lowest posterior mean: the trial with the lowest PRPV of all is partly luck.
+    """The answer: the θ that fresh episodes confirm, and until then the visited one with the lowest posterior mean.
+
+    It is never the trial with the lowest PRPV for that alone, which is partly luck.
 
     Attributes:
         trial: The trial that visited it.
         posterior_mean: Mean of PRPV there, given all trials.
         posterior_deviation: Its standard deviation.
-        assessment: How useful the proxy is there, by every measure, with noise floor and chance level.
+        assessment: How useful the proxy is there in the trial's own episodes, by every measure, with noise floor and
+            chance level.
     """
 
     trial: TrialRecord
@@ -46,6 +49,8 @@ class StudyResult:
         best: The best of them.
         profiles: What is known of each parameter, in the order of the box.
         importances: How much each parameter matters, in the order of the box.
+        confirmation: What fresh episodes say of it; None if they are off, or not all driven yet.
+        preflight: What was learnt of the parameters before the first trial; None if it is off or was never run.
         stopped: Why it runs no further; empty while it is not at its end.
         failures: The first failed episodes, told in one line each.
     """
@@ -55,6 +60,8 @@ class StudyResult:
     best: Best
     profiles: tuple[Profile, ...]
     importances: tuple[Importance, ...]
+    confirmation: Confirmation | None
+    preflight: Preflight | None
     stopped: str
     failures: tuple[str, ...]
 
@@ -70,8 +77,11 @@ class StudyResult:
 
     @property
     def episodes(self) -> int:
-        """How many episodes the trials took, failed ones counted."""
-        return len(self.trials) * len(self.study.settings.agents) * self.study.settings.starts
+        """How many episodes trials, pre-flight and confirmation took, failed ones counted."""
+        trials = len(self.trials) * len(self.study.settings.agents) * self.study.settings.starts
+        before = self.preflight.episodes if self.preflight else 0
+        after = self.confirmation.episodes * len(self.confirmation.candidates) if self.confirmation else 0
+        return before + trials + after
 
 
 def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | None = None) -> StudyResult:
@@ -86,28 +96,34 @@ def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | N
     if not scored:
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
         raise RunError(f"{store.path}: {reason}")
-    surrogate = fit_surrogate(study.settings.space, as_trials(study.settings.space, scored))
+    space = study.settings.space
+    surrogate = fit_surrogate(space, as_trials(space, scored))
+    confirmation = confirmation_of(study, store, trials)
+    answer = confirmation.answer.trial if confirmation else _favourite(scored, surrogate)
     return StudyResult(
         study=study,
         trials=trials,
-        best=_best(study, store, scored, surrogate),
-        profiles=profiles(surrogate),
+        best=_best(study, store, answer, surrogate),
+        profiles=profiles(surrogate, space.values(answer.theta)),
         importances=importances(surrogate),
+        confirmation=confirmation,
+        preflight=preflight_of(study, store),
         stopped=stopped(study, store, trials),
         failures=_failures(study, store, trials),
     )
 
 
-def _best(study: Study, store: Store, scored: list[TrialRecord], surrogate: Surrogate) -> Best:
-    space = study.settings.space
-    mean, deviation = surrogate.at_visited()
-    row = int(np.argmin(mean))
-    values = surrogate.visited[row].values
-    trial = next(trial for trial in scored if space.values(trial.theta) == values)
-    proxy = known_evaluation(study, store, trial).proxy
+def _favourite(scored: list[TrialRecord], surrogate: Surrogate) -> TrialRecord:
+    values, _ = surrogate.incumbent()
+    return next(trial for trial in scored if surrogate.space.values(trial.theta) == values)
+
+
+def _best(study: Study, store: Store, answer: TrialRecord, surrogate: Surrogate) -> Best:
+    mean, deviation = surrogate.predict(unit_array(surrogate.space, [surrogate.space.values(answer.theta)]))
+    proxy = known_evaluation(study, store, answer).proxy
     assert proxy is not None
     assessment = assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
-    return Best(trial, float(mean[row]), float(deviation[row]), assessment)
+    return Best(answer, float(mean[0]), float(deviation[0]), assessment)
 
 
 def known_evaluation(study: Study, store: Store, trial: TrialRecord) -> Evaluation:

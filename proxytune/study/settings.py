@@ -18,7 +18,8 @@ FORMAT = 1
 OBJECTIVES = ("prpv", "plv")
 KEYS = (
     "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
-    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "stop", "parameters", "domain", "teaching",
+    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
+    "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
 
 
@@ -56,6 +57,8 @@ class StudySettings:
         seed: Seed of the episodes and of the search.
         jobs: How many processes run episodes.
         stop_on_failure: Whether a failing episode stops the study.
+        preflight: Whether each parameter is first shown to matter.
+        confirm: How often the best θ are driven again in fresh episodes when the search has ended.
         stop: When it ends before its budget is spent.
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
@@ -77,6 +80,8 @@ class StudySettings:
     seed: int
     jobs: int
     stop_on_failure: bool
+    preflight: bool
+    confirm: int
     stop: StopRules
     space: Space
     domain: Section
@@ -119,6 +124,8 @@ def read_study_settings(path: Path) -> StudySettings:
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
+        preflight=read.flag("preflight", True),
+        confirm=read.whole("confirm", 1, high=1000),
         stop=_stop(read.section("stop")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
@@ -182,6 +189,8 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "seed": settings.seed,
         "jobs": settings.jobs,
         "on_failure": "stop" if settings.stop_on_failure else "continue",
+        "preflight": settings.preflight,
+        "confirm": settings.confirm,
         "stop": {key: value for key, value in vars(settings.stop).items() if value is not None},
         "parameters": {i.name: [i.low, i.high] for i in settings.space.intervals},
     }

@@ -74,6 +74,23 @@ def test_an_engine_that_is_not_installed_is_refused_by_file_and_key_and_nothing_
     assert not (folder / "study.db").exists()
 
 
+def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(make_study, capsys):
+    folder = make_study(
+        family='"planted:planted"', parameters={"matters": "[-1, 1]", "dead": "[0, 1]"}, preflight="true"
+    )
+    assert main(["study", str(folder), "--json"]) == 0
+    out, told = capsys.readouterr()
+    found = json.loads(out)["preflight"]
+    assert told == f"proxytune study: {found['warnings'][0]}\n"
+    assert "'dead' changes nothing at all" in told
+    assert {name: one["moves"] for name, one in found["parameters"].items()} == {"matters": True, "dead": False}
+    assert main(["study", str(folder)]) == 0
+    out, told = capsys.readouterr()
+    assert "pre-flight: 'dead' changes nothing at all" in out
+    assert f"0 episodes run, {7 * 18 + found['episodes']} reused" in out
+    assert told == ""
+
+
 def test_why_a_study_has_ended_is_said(make_study, capsys):
     folder = make_study(stop="{ no_improvement = 1e9 }")
     assert main(["study", str(folder)]) == 0

@@ -9,7 +9,7 @@ from types import ModuleType
 
 from rich.console import Console
 
-from proxytune.cli import compare, diagnose, listing, measure, plot, predict, record, score, study, sweep
+from proxytune.cli import compare, diagnose, listing, measure, plot, predict, record, score, study, sweep, teach
 from proxytune.cli.answer import Answer
 from proxytune.cli.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
 from proxytune.errors import InputError, ProxytuneError, RunError
@@ -18,6 +18,7 @@ COMMANDS: dict[str, tuple[ModuleType, str]] = {
     "study": (study, "run or resume a study; safe to repeat"),
     "score": (score, "usefulness of proxies from tables of scores"),
     "sweep": (sweep, "usefulness along one parameter"),
+    "teach": (teach, "learning curves and PLV: what a proxy is worth as a teacher"),
     "measure": (measure, "score a study's agents in the domain of a model file"),
     "record": (record, "drive a model file through manoeuvres and write the log"),
     "diagnose": (diagnose, "close the loop: from measured drives to the effect that the model lacks"),

@@ -174,8 +174,9 @@ def _difference(without: Array | float, needed: Array | float) -> Array:
 
 
 def _ratio(without: Array | float, needed: Array | float) -> Array:
+    """η(∅) / η(S); where η(S) is not reached it lies below anything known."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.divide(without, needed)
+        return np.where(np.isinf(needed), -np.inf, np.divide(without, needed))
 
 
 def _share(without: Array | float, needed: Array | float) -> Array:

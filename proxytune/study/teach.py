@@ -149,6 +149,11 @@ def learning_curves(
     return {name: _curve(school, [point for point in points if point.name == name]) for name in proxies}
 
 
+def points_of(school: School) -> int:
+    """How many points the learning curves of an experiment have together, the one without a proxy included."""
+    return (len(school.settings.proxies) + 1) * school.settings.seeds * len(school.settings.target_samples)
+
+
 def _curve(school: School, points: Sequence[Point]) -> Curve:
     scores = np.array([school.score(point) for point in points])
     return Curve(school.settings.target_samples, scores.reshape(school.settings.seeds, -1))

@@ -113,10 +113,11 @@ def test_a_folder_in_its_place_is_told(half, capsys):
     told_by_every_command(half, capsys, "is a folder, not a study's database; move it away")
 
 
-CUTS = [1, 50, 100, 512, 4096, 5000, 3 * 4096, -2 * 4096, -4096, -4095, -1]
+CUTS = [1, 4096, -4096, -1]
+MORE_CUTS = [50, 100, 512, 5000, 3 * 4096, -2 * 4096, -4095]
 
 
-@pytest.mark.parametrize("cut", CUTS)
+@pytest.mark.parametrize("cut", [*CUTS, *(pytest.param(cut, marks=slow) for cut in MORE_CUTS)])
 def test_a_truncated_database_is_told_wherever_it_is_cut(half, capsys, cut):
     path = half / "study.db"
     content = path.read_bytes()
@@ -253,6 +254,7 @@ def test_an_edited_study_is_refused_with_every_key_that_changed(half, make_study
     goes_on(half, finished)
 
 
+@slow
 def test_budget_and_jobs_may_be_raised(half, make_study):
     other = make_study("other", budget="9")
     assert main(["study", str(other)]) == 0

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from processes import ENVIRONMENT, FAKES, episodes, finished_episodes, start, trials, wait_for
 
+from proxytune.cli.main import main
 from proxytune.search.engines import STUDY_ENGINES, make_proposer
 from proxytune.study.progress import Silent
 from proxytune.study.run import run_study
@@ -184,15 +185,20 @@ def test_processes_of_a_killed_study_do_not_linger(make_study):
     assert process.returncode == -signal.SIGKILL
 
 
-def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(make_study):
-    folder = make_study(domain={"sleep": "0.2"})
+def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(make_study, capsys):
+    """A sweep too; looking at it is for everybody."""
+    folder = make_study(domain={"sleep": "0.05"}, budget="60")
     first = start("study", folder)
-    wait_for(folder, first, 2)
+    wait_for(folder, first, PER_TRIAL + 2)
     second = start("study", folder)
     out, told = second.communicate()
     assert (second.returncode, out) == (1, "")
-    whose = f"another process (process {first.pid}) is running this study; wait for it or stop it"
-    assert told == f"proxytune study: {folder}: {whose}\n"
+    line = f"{folder}: another process (process {first.pid}) is running this study; wait for it or stop it\n"
+    assert told == f"proxytune study: {line}"
+    assert main(["sweep", str(folder), "--parameter", "trim"]) == 1
+    assert capsys.readouterr() == ("", f"proxytune sweep: {line}")
+    assert main(["plot", str(folder), "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["trials"]) >= 1
     wait_for(folder, first, finished_episodes(folder) + 2)
     os.killpg(first.pid, signal.SIGINT)
     first.communicate()

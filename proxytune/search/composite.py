@@ -37,34 +37,33 @@ class Composite:
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point, a function of the set of trials and the seed alone; never a point visited before.
 
-        A trial without an outcome counts as the outcome of the worst score, so that the search moves away from it.
-
         Raises:
             RunError: If no trial has an outcome.
         """
+        told = sorted((trial.values, trial.outcome) for trial in trials if trial.outcome is not None)
+        if not told:
+            raise RunError("no trial has an outcome, so there is nothing to learn from")
+        visited, outcomes = unit_array(space, [values for values, _ in told]), np.array([found for _, found in told])
         drawn = proposal_seed(seed, len(trials))
         with threadpool_limits(limits=1):
-            visited, outcomes = _told(space, trials)
-            scores = _model(visited, outcomes, self.compose, drawn)
+            scores = composed_scores(visited, outcomes, self.compose, drawn)
             incumbent = float(scores(visited).mean(axis=0).min())
-            return from_unit(
-                space,
-                highest(lambda points: np.maximum(0.0, incumbent - scores(points)).mean(axis=0), visited, drawn)[0],
-            )
+            best, _ = highest(lambda points: np.maximum(0.0, incumbent - scores(points)).mean(axis=0), visited, drawn)
+            return from_unit(space, best)
 
 
-def _told(space: Space, trials: Sequence[Trial]) -> tuple[Array, Array]:
-    """Points of the unit cube and their outcomes, in an order that does not depend on that of the trials."""
-    known = [(trial.score, trial.outcome) for trial in trials if trial.outcome is not None and trial.score is not None]
-    if not known:
-        raise RunError("no trial has an outcome, so there is nothing to learn from")
-    _, worst = max(known)
-    told = sorted((trial.values, worst if trial.outcome is None else trial.outcome) for trial in trials)
-    return unit_array(space, [values for values, _ in told]), np.array([outcome for _, outcome in told])
+def composed_scores(visited: Array, outcomes: Array, compose: Compose, seed: int) -> Callable[[Array], Array]:
+    """Model the outcomes of visited points and draw scores anywhere.
 
+    Args:
+        visited: Points of the unit cube, shape (trials, parameters).
+        outcomes: What was found there, shape (trials, outputs).
+        compose: Scores of outcomes.
+        seed: Seeds the draws.
 
-def _model(visited: Array, outcomes: Array, compose: Compose, seed: int) -> Callable[[Array], Array]:
-    """Draws of the score, shape (draws, n), at points (n, parameters) of the unit cube."""
+    Returns:
+        A function of points (n, parameters) of the unit cube that gives draws of their scores, shape (draws, n).
+    """
     middle, spread = outcomes.mean(axis=0), outcomes.std(axis=0)
     spread[spread == 0.0] = 1.0
     model = GaussianProcessRegressor(prior_kernel(visited.shape[1]), optimizer=most_probable)
@@ -76,8 +75,9 @@ def _model(visited: Array, outcomes: Array, compose: Compose, seed: int) -> Call
     normal = np.random.default_rng(seed).standard_normal((DRAWS, 1, outcomes.shape[1]))
 
     def scores(points: Array) -> Array:
-        mean, deviation = model.predict(points, return_std=True)
-        smooth = np.sqrt(np.maximum(0.0, deviation**2 - noise)).reshape(mean.shape)
+        # The regressor drops the outputs' axis where there is but one.
+        mean, deviation = (found.reshape(len(points), -1) for found in model.predict(points, return_std=True))
+        smooth = np.sqrt(np.maximum(0.0, deviation**2 - noise))
         return np.stack([compose(middle + spread * (mean + smooth * row)) for row in normal])
 
     return scores

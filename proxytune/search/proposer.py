@@ -41,12 +41,15 @@ class Proposer(Protocol):
 
 
 def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:
-    """The trials, a failed one with the worst score seen, so that a search moves away from it; none without a score."""
-    scored = [trial.score for trial in trials if trial.score is not None]
+    """The trials, a failed one with score and outcome of the worst, so that a search moves away from it.
+
+    None at all if no trial has a score.
+    """
+    scored = [(trial.score, trial.values, trial.outcome) for trial in trials if trial.score is not None]
     if not scored:
         return []
-    worst = max(scored)
-    return [replace(trial, score=worst) if trial.score is None else trial for trial in trials]
+    score, _, outcome = max(scored, key=lambda found: found[:2])
+    return [replace(trial, score=score, outcome=outcome) if trial.score is None else trial for trial in trials]
 
 
 def proposal_seed(seed: int, count: int) -> int:

@@ -1,7 +1,7 @@
-"""Proposals that were tried against the default's, in paired seeds: `python tests/benchmarks/bench_proposals.py`.
+"""Proposals that were tried and dropped, against the default's, in paired seeds; studies/compare.md has the table.
 
-It prints a table like `compare`'s; give names of variants to run only those, `--seeds N` for fewer seeds. It takes
-minutes per variant.
+`python tests/benchmarks/bench_proposals.py analytic` (or ranking) prints it; names of variants restrict it to those,
+`--seeds N` takes fewer seeds. It takes minutes per variant.
 """
 
 import argparse
@@ -9,10 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from ranking import METRICS, Ranking
 from scipy.linalg import solve_triangular
 from scipy.stats import norm
-from sklearn.gaussian_process import GaussianProcessRegressor as MultiOutput
 from skopt.acquisition import gaussian_ei
 from skopt.learning import GaussianProcessRegressor
 from skopt.learning.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
@@ -22,6 +20,7 @@ from proxytune.search.comparison import Run, RunKey
 from proxytune.search.design import design_point, from_unit, unit_points
 from proxytune.search.gaussian_process import GaussianProcess, highest
 from proxytune.search.proposer import Trial, proposal_seed
+from proxytune.search.ranking import METRICS, Ranking
 from proxytune.search.summary import summarise
 from proxytune.search.surrogate import (
     AMPLITUDE,
@@ -32,7 +31,9 @@ from proxytune.search.surrogate import (
     most_probable,
     unit_array,
 )
+from proxytune.usefulness import compare
 from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.usefulness.resampling import bootstrap_means
 
 BUDGET, INITIAL = 40, 10
 QUANTILES = norm.ppf((np.arange(32) + 0.5) / 32)
@@ -73,9 +74,8 @@ def improvement(search, model=None):
     """The default's, with another model."""
     model = model or search.surrogate()
     _, incumbent = model.incumbent()
-    return highest(lambda points: gaussian_ei(points, model.model, y_opt=incumbent, xi=0.0), search.unit, search.draw)[
-        0
-    ]
+    gain = lambda points: gaussian_ei(points, model.model, y_opt=incumbent, xi=0.0)  # noqa: E731
+    return highest(gain, search.unit, search.draw)[0]
 
 
 def lower_bound(search):
@@ -169,44 +169,15 @@ def _root(search):
 
 
 def _bootstrapped(search):
-    variances = [search.objective.variance(trial.values, search.seed) for trial in search.trials]
+    variances = [_variance(search.objective, trial.values, search.seed) for trial in search.trials]
     return _fitted(search, variances=np.maximum(0.25, variances))
 
 
-# Modelling the metrics instead of the score
-
-
-@dataclass(frozen=True)
-class Composite:
-    """Gaussian processes of every agent's mean metrics, with one kernel; PRPV is of their draws."""
-
-    model: MultiOutput
-    target: np.ndarray
-    draws: np.ndarray
-
-    def prpv(self, points):
-        """Draws of PRPV, shape (draws, points)."""
-        mean, deviation = self.model.predict(points, return_std=True)
-        noise = self.model.kernel_.k2.noise_level * self.model._y_train_std**2
-        drawn = mean + np.sqrt(np.maximum(0.0, deviation**2 - noise)) * self.draws[:, None, :]
-        tables = drawn.reshape(*drawn.shape[:2], -1, len(METRICS))
-        return np.stack([prpv_of_means(table, self.target, METRICS) for table in tables])
-
-
-def _composite(search):
-    objective, seed = search.objective, search.seed
-    outputs = np.array([objective.table(trial.values, seed).means.ravel() for trial in search.trials])
-    model = MultiOutput(_kernel(2.5), optimizer=most_probable, normalize_y=True).fit(search.unit, outputs)
-    draws = np.random.default_rng(search.draw).normal(size=(24, outputs.shape[1]))
-    return Composite(model, objective.target(seed).means, draws)
-
-
-def composite(search):
-    """Expected improvement of PRPV over draws of the metrics."""
-    model = _composite(search)
-    incumbent = model.prpv(search.unit).mean(axis=0).min()
-    gain = lambda points: np.maximum(0.0, incumbent - model.prpv(points)).mean(axis=0)  # noqa: E731
-    return highest(gain, search.unit, search.draw)[0]
+def _variance(objective, values, seed):
+    """Of PRPV, from 200 bootstraps of the proxy's episodes; the target's are the same at every θ."""
+    inputs = compare(proxy=objective.table(values, seed), target=objective.target(seed), metrics=METRICS)
+    proxy, _ = bootstrap_means(inputs, resamples=200, seed=0)
+    return float(prpv_of_means(proxy, inputs.target.means, METRICS).var())
 
 
 ANALYTIC, RANKING = Analytic(), Ranking()
@@ -224,7 +195,6 @@ VARIANTS = {
     "ranking": {
         **BOTH,
         "bootstrapped variance": Variant(lambda search: improvement(search, _bootstrapped(search)), _bootstrapped),
-        "metrics instead of the score": Variant(composite),
     },
 }
 
@@ -253,6 +223,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=30)
     asked = parser.parse_args()
     objective, seeds = {"analytic": ANALYTIC, "ranking": RANKING}[asked.objective], range(1, asked.seeds + 1)
+    print("variant | at the floor | evaluations to it | saved against gp | regret against gp's | regret")
     default = [run(objective, "gp", DEFAULT, seed) for seed in seeds]
     told(summarise(default, default, objective.tolerance), "gp", default)
     for name in asked.variants or VARIANTS[asked.objective]:
@@ -269,7 +240,7 @@ def told(found, name, default):
 
 def _difference(found, sign):
     low, high = sorted((sign * found.low, sign * found.high))
-    return f"{sign * found.value:+.1f} ({low:+.1f} to {high:+.1f})"
+    return f"{sign * found.value + 0.0:+.1f} ({low + 0.0:+.1f} to {high + 0.0:+.1f})"
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ def test_rules_to_stop_are_read_each_on_its_own(make_study):
     assert as_document(settings)["stop"] == {"no_improvement": 0.2}
 
 
-@pytest.mark.parametrize("engine", ["gp", "random", "sobol", "tpe"])
+@pytest.mark.parametrize("engine", ["gp", "composite", "random", "sobol", "tpe"])
 def test_a_study_names_its_engine(make_study, engine):
     assert as_document(read_study_settings(make_study(engine=f'"{engine}"')))["engine"] == engine
 

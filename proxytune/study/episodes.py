@@ -8,11 +8,12 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import takewhile
 from typing import Any, cast
 
 from joblib import Parallel, delayed
@@ -27,7 +28,9 @@ OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.
 
 
 @contextmanager
-def running(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Iterator[Iterator[Outcome]]:
+def running(
+    family: DomainFamily, episodes: Sequence[Episode], jobs: int, over: Callable[[], bool] = lambda: False
+) -> Iterator[Iterator[Outcome]]:
     """Run episodes and give each outcome as soon as it is there, in no particular order.
 
     Which process runs an episode, and after which, does not change its outcome. With several jobs, joblib's backend is
@@ -37,11 +40,13 @@ def running(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Ite
         family: The domain family.
         episodes: What to run, in the order in which to begin.
         jobs: How many processes; with one, everything runs in this process.
+        over: Once this is true no further episode begins; those under way are still finished.
 
     Raises:
         RunError: If the machine fails rather than an episode: a process dies, memory or disk run out.
     """
-    outcomes = _spread(family, episodes, jobs) if min(jobs, len(episodes)) > 1 else _here(family, episodes)
+    begun = takewhile(lambda _: not over(), episodes)
+    outcomes = _spread(family, begun, jobs) if min(jobs, len(episodes)) > 1 else _here(family, begun)
     try:
         yield _told(outcomes)
     finally:
@@ -51,14 +56,15 @@ def running(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Ite
             outcomes.close()
 
 
-def _here(family: DomainFamily, episodes: Sequence[Episode]) -> Generator[Outcome, None, None]:
+def _here(family: DomainFamily, episodes: Iterable[Episode]) -> Generator[Outcome, None, None]:
     for episode in episodes:
         yield run_episode(family, episode)
 
 
-def _spread(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Generator[Outcome, None, None]:
+def _spread(family: DomainFamily, episodes: Iterable[Episode], jobs: int) -> Generator[Outcome, None, None]:
     recipe = _Recipe(pickle.dumps(family), tuple(sys.path), os.getpid())
-    parallel = Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered")
+    # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
+    parallel = Parallel(n_jobs=jobs, batch_size=1, pre_dispatch=jobs + 1, return_as="generator_unordered")
     outcomes = parallel(delayed(_run_pickled)(recipe, episode) for episode in episodes)
     return cast("Generator[Outcome, None, None]", outcomes)
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from proxytune.search.gaussian_process import expected_improvement
-from proxytune.search.proposer import Trial
-from proxytune.study.evaluate import known_outcomes, plan
+from proxytune.study.evaluate import known_outcomes
+from proxytune.study.history import as_trials, episodes_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
@@ -29,8 +29,8 @@ def _out_of_time(study: Study, store: Store, done: Sequence[TrialRecord]) -> str
     limit = settings.stop.wall_time_s
     if limit is None:
         return ""
-    planned = [episode for trial in done for episode in plan(settings, trial.theta, settings.seed)]
-    seconds = sum(outcome.seconds for outcome in known_outcomes(study, store, planned).values()) / settings.jobs
+    driven = [episode for trial in done for episode in episodes_of(settings, trial)]
+    seconds = sum(outcome.seconds for outcome in known_outcomes(study, store, driven).values()) / settings.jobs
     if seconds < limit:
         return ""
     return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {limit:g}; {FILE_REMEDY}"
@@ -40,7 +40,7 @@ def _nothing_to_gain(settings: StudySettings, done: Sequence[TrialRecord]) -> st
     limit = settings.stop.no_improvement
     if limit is None or len(done) < settings.initial or all(trial.prpv is None for trial in done):
         return ""
-    trials = [Trial(settings.space.values(trial.theta), trial.prpv) for trial in done]
+    trials = as_trials(settings.space, done)
     gain, noise = expected_improvement(settings.space, trials, settings.seed)
     if gain >= limit * noise:
         return ""

@@ -98,7 +98,7 @@ def _costs(result: StudyResult, spent: Spent, total: float) -> dict[str, Any]:
     return {
         "episodes": {
             "run": spent.episodes,
-            "reused": result.episodes - spent.episodes,
+            "reused": result.episodes - (spent.episodes - spent.unused),
             "failed": result.failed_episodes,
         },
         "seconds": {

@@ -77,6 +77,8 @@ def _trials(result: StudyResult) -> list[tuple[str, ...]]:
 def _trial_row(trial: TrialRecord, names: tuple[str, ...]) -> tuple[str, ...]:
     theta = (f"{trial.theta[name]:.4g}" for name in names)
     prpv = "failed" if trial.prpv is None else f"{trial.prpv:g}"
+    if trial.bound is not None:
+        prpv = f"cut off, at least {trial.bound:g}"
     ppv = "" if trial.ppv is None else f"{trial.ppv:.3g}"
     return (str(trial.number), *theta, prpv, ppv, str(trial.failed_episodes))
 

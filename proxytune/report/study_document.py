@@ -35,6 +35,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         "importance": {found.name: _importance(found) for found in result.importances},
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
+        "cut_off": {"trials": len(result.cut), "episodes": result.spared[0], "seconds": result.spared[1]},
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
         "target": _target(result),
@@ -83,7 +84,14 @@ def _trial(trial: TrialRecord) -> dict[str, Any]:
         "ppv": trial.ppv,
         "failed_episodes": trial.failed_episodes,
         "failure": trial.failure or None,
+        "cut_off": _cut(trial),
     }
+
+
+def _cut(trial: TrialRecord) -> dict[str, Any] | None:
+    if trial.state != "cut":
+        return None
+    return {"prpv_at_least": trial.bound, "prpv_estimate": trial.estimate, "agents": list(trial.decided)}
 
 
 def _target(result: StudyResult) -> dict[str, Any]:

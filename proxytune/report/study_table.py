@@ -25,10 +25,20 @@ def best_theta(result: StudyResult) -> list[tuple[str, str, str, str]]:
 
 
 def identity_lines(result: StudyResult) -> list[str]:
-    """What the pre-flight found, which parameters PRPV does not see, and how the study came to its end."""
+    """What the pre-flight found, which parameters PRPV does not see, what was cut off, and how the study ended."""
     names = ", ".join(result.unidentified)
     unseen = [f"unidentified: {names}; any value in the box is as good, beyond noise"] if names else []
-    return [*preflight_lines(result), *unseen, *([f"stopped: {result.stopped}"] if result.stopped else [])]
+    ended = [f"stopped: {result.stopped}"] if result.stopped else []
+    return [*preflight_lines(result), *unseen, *cut_lines(result), *ended]
+
+
+def cut_lines(result: StudyResult) -> list[str]:
+    """How many trials were cut off and what that spared; nothing where none was."""
+    if not result.cut:
+        return []
+    episodes, seconds = result.spared
+    saved = f"{episodes} episodes, about {seconds:.3g} s of simulation, saved"
+    return [f"cut off, since they could not be among the best: {len(result.cut)} trials; {saved}"]
 
 
 def preflight_lines(result: StudyResult) -> list[str]:
@@ -82,7 +92,7 @@ def failure_lines(result: StudyResult) -> list[str]:
     """How many episodes and trials failed, and the first of them; nothing where none did."""
     if not result.failed_episodes:
         return []
-    failed_trials = sum(trial.prpv is None for trial in result.trials)
+    failed_trials = sum(trial.state == "failed" for trial in result.trials)
     trials = f", and with them {failed_trials} of {len(result.trials)} trials" if failed_trials else ""
     head = f"{result.failed_episodes} of {result.episodes} episodes failed{trials}; the first:"
     return [head, *(f"  {line}" for line in result.failures)]

@@ -17,9 +17,9 @@ from proxytune.scores import ScoreTable
 from proxytune.search.proposer import Trial
 from proxytune.search.surrogate import fit_surrogate, unit_array
 from proxytune.study.evaluate import Spent, known_outcomes, plan, run_missing, score
+from proxytune.study.history import as_trials
 from proxytune.study.objective import FRESH
 from proxytune.study.progress import Watcher
-from proxytune.study.run import as_trials
 from proxytune.study.settings import StudySettings
 from proxytune.study.stopping import stopped
 from proxytune.study.store import Outcome, Store, TrialRecord
@@ -107,10 +107,11 @@ def candidates(study: Study, trials: Sequence[TrialRecord]) -> list[TrialRecord]
     """
     space = study.settings.space
     surrogate = fit_surrogate(space, as_trials(space, trials))
-    means, _ = surrogate.at_visited()
+    # Of a trial that was cut off it is certain that it is none of the best.
+    scored = list({space.values(trial.theta): trial for trial in trials if trial.prpv is not None}.values())
+    means, _ = surrogate.predict(unit_array(space, [space.values(trial.theta) for trial in scored]))
     near = [row for row in np.argsort(means, kind="stable") if means[row] - means.min() <= surrogate.noise_deviation]
-    scored = {space.values(trial.theta): trial for trial in reversed(trials) if trial.prpv is not None}
-    return [scored[values] for values in dict.fromkeys(surrogate.visited[row].values for row in near)][:CANDIDATES]
+    return [scored[row] for row in near[:CANDIDATES]]
 
 
 def per_candidate(settings: StudySettings) -> int:

@@ -4,7 +4,7 @@ import errno
 import functools
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -18,13 +18,15 @@ from proxytune.study.workers import working
 OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)
 
 
-def running(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> AbstractContextManager[Iterator[Outcome]]:
+def running(
+    family: DomainFamily, episodes: Sequence[Episode], jobs: int, over: Callable[[], bool] = lambda: False
+) -> AbstractContextManager[Iterator[Outcome]]:
     """Run episodes and give each outcome as soon as it is there, in no particular order; see `working`.
 
     Raises:
         RunError: If the machine fails rather than an episode: a process dies, memory or disk run out.
     """
-    return working(functools.partial(run_episode, family), episodes, jobs)
+    return working(functools.partial(run_episode, family), episodes, jobs, over)
 
 
 def run_episode(family: DomainFamily, episode: Episode) -> Outcome:

@@ -3,14 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from proxytune.errors import RunError
 from proxytune.search.importance import Importance, importances
 from proxytune.search.profile import Profile, profiles
 from proxytune.search.surrogate import Surrogate, fit_surrogate, unit_array
 from proxytune.study.confirmation import Confirmation, confirmation_of
-from proxytune.study.evaluate import Evaluation, evaluation, told
+from proxytune.study.cutting import spared
+from proxytune.study.evaluate import Evaluation, evaluation, known_outcomes, told
+from proxytune.study.history import as_trials, episodes_of
 from proxytune.study.preflight import Preflight, preflight_of
-from proxytune.study.run import as_trials
 from proxytune.study.stopping import stopped
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
@@ -52,6 +55,7 @@ class StudyResult:
         confirmation: What fresh episodes say of it; None if they are off, or not all driven yet.
         preflight: What was learnt of the parameters before the first trial; None if it is off or was never run.
         stopped: Why it runs no further; empty while it is not at its end.
+        spared: What the trials that were cut off did without: episodes, and about how many seconds of them.
         failures: The first failed episodes, told in one line each.
     """
 
@@ -63,6 +67,7 @@ class StudyResult:
     confirmation: Confirmation | None
     preflight: Preflight | None
     stopped: str
+    spared: tuple[int, float]
     failures: tuple[str, ...]
 
     @property
@@ -76,9 +81,14 @@ class StudyResult:
         return sum(trial.failed_episodes for trial in self.trials)
 
     @property
+    def cut(self) -> tuple[TrialRecord, ...]:
+        """The trials that were cut off."""
+        return tuple(trial for trial in self.trials if trial.state == "cut")
+
+    @property
     def episodes(self) -> int:
         """How many episodes trials, pre-flight and confirmation took, failed ones counted."""
-        trials = len(self.trials) * len(self.study.settings.agents) * self.study.settings.starts
+        trials = sum(len(episodes_of(self.study.settings, trial)) for trial in self.trials)
         before = self.preflight.episodes if self.preflight else 0
         after = self.confirmation.episodes * len(self.confirmation.candidates) if self.confirmation else 0
         return before + trials + after
@@ -97,7 +107,7 @@ def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | N
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
         raise RunError(f"{store.path}: {reason}")
     space = study.settings.space
-    surrogate = fit_surrogate(space, as_trials(space, scored))
+    surrogate = fit_surrogate(space, as_trials(space, trials))
     confirmation = confirmation_of(study, store, trials)
     answer = confirmation.answer.trial if confirmation else _favourite(scored, surrogate)
     return StudyResult(
@@ -109,13 +119,14 @@ def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | N
         confirmation=confirmation,
         preflight=preflight_of(study, store),
         stopped=stopped(study, store, trials),
+        spared=spared(study, store, trials),
         failures=_failures(study, store, trials),
     )
 
 
 def _favourite(scored: list[TrialRecord], surrogate: Surrogate) -> TrialRecord:
-    values, _ = surrogate.incumbent()
-    return next(trial for trial in scored if surrogate.space.values(trial.theta) == values)
+    means, _ = surrogate.predict(unit_array(surrogate.space, [surrogate.space.values(t.theta) for t in scored]))
+    return scored[int(np.argmin(means))]
 
 
 def _best(study: Study, store: Store, answer: TrialRecord, surrogate: Surrogate) -> Best:
@@ -142,7 +153,6 @@ def _failures(study: Study, store: Store, trials: tuple[TrialRecord, ...]) -> tu
     lines: list[str] = []
     for trial in trials:
         if trial.failed_episodes and len(lines) < FAILURES_TOLD:
-            lines += [
-                f"trial {trial.number}: {told(outcome)}" for outcome in known_evaluation(study, store, trial).failures
-            ]
+            driven = known_outcomes(study, store, episodes_of(study.settings, trial)).values()
+            lines += [f"trial {trial.number}: {told(outcome)}" for outcome in driven if outcome.metrics is None]
     return tuple(lines[:FAILURES_TOLD])

@@ -19,7 +19,7 @@ OBJECTIVES = ("prpv", "plv")
 KEYS = (
     "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
     "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
-    "stop", "parameters", "domain", "teaching",
+    "cut_off", "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
 
 
@@ -59,6 +59,7 @@ class StudySettings:
         stop_on_failure: Whether a failing episode stops the study.
         preflight: Whether each parameter is first shown to matter.
         confirm: How often the best θ are driven again in fresh episodes when the search has ended.
+        cut_off: Whether a trial ends once it cannot be among the best any more.
         stop: When it ends before its budget is spent.
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
@@ -82,6 +83,7 @@ class StudySettings:
     stop_on_failure: bool
     preflight: bool
     confirm: int
+    cut_off: bool
     stop: StopRules
     space: Space
     domain: Section
@@ -126,6 +128,7 @@ def read_study_settings(path: Path) -> StudySettings:
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
         preflight=read.flag("preflight", True),
         confirm=read.whole("confirm", 1, high=1000),
+        cut_off=read.flag("cut_off", True),
         stop=_stop(read.section("stop")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
@@ -191,6 +194,7 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "on_failure": "stop" if settings.stop_on_failure else "continue",
         "preflight": settings.preflight,
         "confirm": settings.confirm,
+        "cut_off": settings.cut_off,
         "stop": {key: value for key, value in vars(settings.stop).items() if value is not None},
         "parameters": {i.name: [i.low, i.high] for i in settings.space.intervals},
     }

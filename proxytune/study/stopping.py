@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from proxytune.search.gaussian_process import expected_improvement
-from proxytune.search.proposer import Trial
 from proxytune.study.evaluate import plan
+from proxytune.study.history import as_trials
 from proxytune.study.settings import StudySettings
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
@@ -40,7 +40,7 @@ def _nothing_to_gain(settings: StudySettings, done: Sequence[TrialRecord]) -> st
     limit = settings.stop.no_improvement
     if limit is None or len(done) < settings.initial or all(trial.prpv is None for trial in done):
         return ""
-    trials = [Trial(settings.space.values(trial.theta), trial.prpv) for trial in done]
+    trials = as_trials(settings.space, done)
     gain, noise = expected_improvement(settings.space, trials, settings.seed)
     if gain >= limit * noise:
         return ""

@@ -6,11 +6,12 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import takewhile
 from typing import Any, TypeVar, cast
 
 from joblib import Parallel, delayed
@@ -23,7 +24,9 @@ Result = TypeVar("Result")
 
 
 @contextmanager
-def working(work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int) -> Iterator[Iterator[Result]]:
+def working(
+    work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int, over: Callable[[], bool] = lambda: False
+) -> Iterator[Iterator[Result]]:
     """Do pieces of work and give each result as soon as it is there, in no particular order.
 
     Which process does a piece, and after which, must not change its result. With several jobs, joblib's backend is
@@ -33,11 +36,13 @@ def working(work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int)
         work: Does one piece; picklable.
         pieces: What to do, in the order in which to begin.
         jobs: How many processes; with one, everything is done in this process.
+        over: Once this is true no further piece begins; those under way are still finished.
 
     Raises:
         RunError: If a process dies.
     """
-    results = _spread(work, pieces, jobs) if min(jobs, len(pieces)) > 1 else _here(work, pieces)
+    begun = takewhile(lambda _: not over(), pieces)
+    results = _spread(work, begun, jobs) if min(jobs, len(pieces)) > 1 else _here(work, begun)
     try:
         yield _told(results)
     finally:
@@ -47,14 +52,15 @@ def working(work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int)
             results.close()
 
 
-def _here(work: Callable[[Piece], Result], pieces: Sequence[Piece]) -> Generator[Result, None, None]:
+def _here(work: Callable[[Piece], Result], pieces: Iterable[Piece]) -> Generator[Result, None, None]:
     for piece in pieces:
         yield work(piece)
 
 
-def _spread(work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int) -> Generator[Result, None, None]:
+def _spread(work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int) -> Generator[Result, None, None]:
     recipe = _Recipe(pickle.dumps(work), tuple(sys.path), os.getpid())
-    parallel = Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered")
+    # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
+    parallel = Parallel(n_jobs=jobs, batch_size=1, pre_dispatch=jobs + 1, return_as="generator_unordered")
     return cast("Generator[Result, None, None]", parallel(delayed(_do_pickled)(recipe, piece) for piece in pieces))
 
 

@@ -48,3 +48,34 @@ def planted(section: Section, *, model: Path | None) -> Planted:
     """The family."""
     section.only(())
     return Planted()
+
+
+@dataclass(frozen=True)
+class Ordered(Planted):
+    """Agents that the target ranks by number, and this family less and less so away from the middle of the box."""
+
+    identity: str = "ordered 1"
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        return {name: Parameter(name, "", 0.0, 1.0, 0.5) for name in ("first", "second")}
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        theta = dict(episode.theta)
+        number = int(episode.agent.removeprefix("agent"))
+        turned = 3.0 * np.hypot(theta["first"] - 0.4, theta["second"] - 0.55)
+        good = number * np.cos(turned) + 3.0 * np.sin(turned) * np.sin(7.0 * number)
+        draw = np.random.default_rng([episode.seed, episode.start, number]).normal(0.0, 0.5, 2)
+        return {"distance": float(good + draw[0]), "survival_time": float(2.0 * good + draw[1])}
+
+
+def ordered(section: Section, *, model: Path | None) -> Ordered:
+    """The family."""
+    section.only(())
+    return Ordered()
+
+
+ORDERED = "agent,episode,distance,survival_time\n" + "".join(
+    f"agent{number},{start},{number + 0.1 * start},{2 * number}\n" for number in range(8) for start in range(3)
+)
+"""The target of the ordered family."""

@@ -17,10 +17,11 @@ from proxytune.study.confirmation import (
     run_confirmation,
 )
 from proxytune.study.evaluate import plan
+from proxytune.study.history import as_trials
 from proxytune.study.objective import FRESH
 from proxytune.study.progress import Silent
 from proxytune.study.result import result_of
-from proxytune.study.run import as_trials, run_study
+from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
 from proxytune.study.store import Outcome, Store
 from proxytune.study.study import open_study

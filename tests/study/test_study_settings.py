@@ -22,11 +22,11 @@ def test_what_is_written_is_what_is_read(make_study):
 
 
 def test_what_may_be_left_out_has_a_default(make_study):
-    left_out = dict.fromkeys(("name", "family", "initial", "seed", "jobs", "preflight", "confirm"))
+    left_out = dict.fromkeys(("name", "family", "initial", "seed", "jobs", "preflight", "confirm", "cut_off"))
     settings = read_study_settings(make_study("mine", **left_out))
     assert (settings.name, settings.family, settings.proxy) == ("mine", DEFAULT_FAMILY, None)
     assert (settings.initial, settings.seed, settings.jobs, settings.stop_on_failure) == (8, 1, 1, False)
-    assert (settings.engine, settings.preflight, settings.confirm) == ("gp", True, 1)
+    assert (settings.engine, settings.preflight, settings.confirm, settings.cut_off) == ("gp", True, 1, True)
 
 
 def test_rules_to_stop_are_read_each_on_its_own(make_study):

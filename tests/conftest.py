@@ -75,7 +75,7 @@ def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
 @pytest.fixture(scope="session")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
-    from proxytune.search.gaussian_process import GaussianProcess
+    from proxytune.search.engines import make_proposer
     from proxytune.study.progress import Silent
     from proxytune.study.run import run_study
     from proxytune.study.store import Store
@@ -83,7 +83,7 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     folder = study_maker(tmp_path_factory.mktemp("finished"))()
     with Store.open(folder) as store:
-        run_study(open_study(folder), store, GaussianProcess(5), Silent())
+        run_study(open_study(folder), store, make_proposer("gp", 5), Silent())
     return folder
 
 

@@ -19,7 +19,8 @@ from proxytune.report.compare_figure import compare_figure
 from proxytune.report.writing import save, write_text
 from proxytune.search.analytic import Analytic, Objective
 from proxytune.search.comparison import Run, RunKey, run_document, run_engine, run_from, search_code
-from proxytune.search.engines import DEFAULT_ENGINE, ENGINES, STUDY_ENGINES, installed, make_proposer
+from proxytune.search.engines import DEFAULT_ENGINE, ENGINES, STUDY_ENGINES, why_not
+from proxytune.search.ranking import Ranking
 from proxytune.search.summary import EngineSummary, summarise
 from proxytune.study.lock import locked
 from proxytune.study.objective import StudyObjective, noise_floor
@@ -27,19 +28,18 @@ from proxytune.study.progress import Bars
 from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
-ANALYTIC = "analytic"
+STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking()}
 FILE_NAME = "runs.jsonl"
 BUDGET = 40
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the objective, the engines and how much to spend."""
-    parser.add_argument("study", metavar="STUDY", help=f"a study's folder, or '{ANALYTIC}' for the stand-in")
+    parser.add_argument("study", metavar="STUDY", help=f"a study's folder, or a stand-in: {' or '.join(STAND_INS)}")
     parser.add_argument(
         "--engines",
-        default=",".join(filter(installed, STUDY_ENGINES)),
         metavar="NAME,…",
-        help=f"of {', '.join(ENGINES)}; {DEFAULT_ENGINE} is always there [all of a study's]",
+        help=f"of {', '.join(ENGINES)}; {DEFAULT_ENGINE} is always there [all of a study's that can be used]",
     )
     parser.add_argument(
         "--seeds", type=int, default=30, metavar="N", help="runs per engine, the same seeds for all [30]"
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Run what is not finished yet of every engine and seed, and sum all up."""
     name = Path(arguments.study).absolute().name
     output = arguments.output or Path(f"compare_{name}")
-    engines = _engines(arguments.engines)
+    engines = _engines(arguments)
     _check(arguments)
     with locked(_made(output)), _objective(arguments, output) as (objective, budget, initial, jobs):
         keys = _keys(objective, engines, arguments.seeds, budget, initial)
@@ -75,14 +75,17 @@ def _answer(
     return Answer({**document, "figures": [str(figure)]}, Group(table, *(Text(line) for line in lines)))
 
 
-def _engines(text: str) -> list[str]:
+def _engines(arguments: argparse.Namespace) -> list[str]:
     """The engines asked for, the default first."""
-    named = [name.strip() for name in text.split(",") if name.strip()]
+    stand_in = STAND_INS.get(arguments.study)
+    composed = stand_in is None or stand_in.compose(1) is not None
+    if arguments.engines is None:
+        return [name for name in STUDY_ENGINES if not why_not(name, composed=composed)]
+    named = [name.strip() for name in arguments.engines.split(",") if name.strip()]
     for name in named:
-        try:
-            make_proposer(name, 1)
-        except InputError as problem:
-            raise InputError(f"--engines: {problem}") from None
+        reason = why_not(name, composed=composed)
+        if reason:
+            raise InputError(f"--engines: {reason}")
     return list(dict.fromkeys([DEFAULT_ENGINE, *named]))
 
 
@@ -96,14 +99,14 @@ def _check(arguments: argparse.Namespace) -> None:
 @contextmanager
 def _objective(arguments: argparse.Namespace, output: Path) -> Iterator[tuple[Objective, int, int, int]]:
     """The objective with budget, design and how many runs at a time: a study's own episodes run in parallel instead."""
-    if arguments.study == ANALYTIC:
-        yield Analytic(), *_spending(arguments, BUDGET, 10), 2
+    if arguments.study in STAND_INS:
+        yield STAND_INS[arguments.study], *_spending(arguments, BUDGET, 10), 2
         return
     study = open_study(study_folder(Path(arguments.study)))
     settings = study.settings
     budget, initial = _spending(arguments, settings.budget, settings.initial)
     per_run = (budget + 1) * len(settings.agents) * settings.starts
-    episodes = per_run * arguments.seeds * len(_engines(arguments.engines))
+    episodes = per_run * arguments.seeds * len(_engines(arguments))
     print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
     with Store.open(output) as store, Bars(episodes) as bars:
         yield StudyObjective(study, store, bars, noise_floor(study)), budget, initial, 1

@@ -10,6 +10,7 @@ from proxytune.cli.answer import Answer
 from proxytune.cli.study_folder import study_folder
 from proxytune.errors import InputError
 from proxytune.report.convergence import convergence
+from proxytune.report.importance_figure import importance_figure
 from proxytune.report.page import page
 from proxytune.report.search_figures import evaluations_figure, profiles_figure
 from proxytune.report.study_document import study_document
@@ -18,12 +19,12 @@ from proxytune.report.writing import save, write_text
 from proxytune.search.engines import make_proposer
 from proxytune.search.proposer import Proposer
 from proxytune.study import confirmation, preflight
+from proxytune.study.composition import compose_of
 from proxytune.study.evaluate import Spent
 from proxytune.study.lock import locked
 from proxytune.study.progress import Bars, Watcher
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import check_facts, run_study
-from proxytune.study.settings import StudySettings
 from proxytune.study.store import Store
 from proxytune.study.study import Study, open_study
 
@@ -41,7 +42,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     folder = study_folder(arguments.path)
     study = open_study(folder)
     settings = study.settings
-    proposer = _proposer(settings)
+    proposer = _proposer(study)
     episodes = preflight.most_episodes(settings) + confirmation.most_episodes(settings)
     episodes += settings.budget * len(settings.agents) * settings.starts
     with locked(folder), Store.open(folder) as store:
@@ -67,16 +68,22 @@ def _prepared(study: Study, store: Store, watcher: Watcher) -> Spent:
     return spent
 
 
-def _proposer(settings: StudySettings) -> Proposer:
+def _proposer(study: Study) -> Proposer:
+    settings = study.settings
     try:
-        return make_proposer(settings.engine, settings.initial)
+        return make_proposer(settings.engine, settings.initial, compose_of(study))
     except InputError as problem:
         raise settings.error("engine", str(problem)) from None
 
 
 def draw(result: StudyResult, folder: Path) -> tuple[list[Path], Path]:
     """Draw the study's figures and the report; their paths."""
-    drawn = {"convergence": convergence, "profiles": profiles_figure, "evaluations": evaluations_figure}
+    drawn = {
+        "convergence": convergence,
+        "profiles": profiles_figure,
+        "evaluations": evaluations_figure,
+        "importance": importance_figure,
+    }
     figures = [folder / "figures" / f"{name}.png" for name in drawn]
     report = folder / "report.html"
     for figure, draw_one in zip(figures, drawn.values(), strict=True):

@@ -6,17 +6,26 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from proxytune.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, dress
 from proxytune.search.comparison import Run
 from proxytune.search.summary import median_curve
 
 COLOURS = {
-    "gp": "#0072B2",
-    "random": "#999999",
-    "sobol": "#E69F00",
-    "tpe": "#009E73",
-    "skopt": "#CC79A7",
-}  # Okabe and Ito, safe for the colour-blind
-STYLES = {"gp": "-", "random": ":", "sobol": "-.", "tpe": "--", "skopt": (0, (5, 1, 1, 1, 1, 1))}
+    "gp": BLUE,
+    "composite": VERMILLION,
+    "random": GREY,
+    "sobol": ORANGE,
+    "tpe": GREEN,
+    "skopt": PURPLE,
+}
+STYLES = {
+    "gp": "-",
+    "composite": (0, (7, 1.5)),
+    "random": ":",
+    "sobol": "-.",
+    "tpe": "--",
+    "skopt": (0, (5, 1, 1, 1, 1, 1)),
+}
 
 
 def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure:
@@ -35,8 +44,7 @@ def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure
     axes.set_ylabel("lowest regret so far [ordered pairs]", fontsize=8)
     axes.set_xlim(1, key.budget)
     axes.set_ylim(bottom=0)
-    axes.tick_params(labelsize=7)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress(axes)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=7, frameon=False)
     return figure
 

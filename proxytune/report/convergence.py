@@ -5,9 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from proxytune.report.style import BLUE, GREEN, ORANGE, VERMILLION, dress
 from proxytune.study.result import StudyResult
-
-BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"  # Okabe and Ito, safe for the colour-blind
 
 
 def convergence(result: StudyResult) -> Figure:
@@ -26,8 +25,7 @@ def convergence(result: StudyResult) -> Figure:
     axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.tick_params(labelsize=7)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress(axes)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=7, frameon=False)
     return figure

@@ -12,7 +12,7 @@ from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.flexible import Curve
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, drawn_wheel_speeds, wheel_speeds
 from proxytune.report.diagnosis_means import ANY, GROUPS, MOTIONS, draw_means, means_figure, rates_of, retuned
-from proxytune.report.diagnosis_style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
+from proxytune.report.style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
 from proxytune.space import Theta
 
 HELD_S = 5.0

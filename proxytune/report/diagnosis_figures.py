@@ -12,7 +12,7 @@ from proxytune.diagnosis.search import LEAST_GAIN, P_VALUE, Tried
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.diagnosis_effect import effect_curve
 from proxytune.report.diagnosis_residual import residual_map, residual_over_time, strayed
-from proxytune.report.diagnosis_style import (
+from proxytune.report.style import (
     BEFORE,
     BLUE,
     GREEN,

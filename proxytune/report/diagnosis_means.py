@@ -13,7 +13,7 @@ from proxytune.diagnosis.fitting import Fit, placed, span
 from proxytune.diagnosis.flexible import Curve
 from proxytune.diagnosis.innovations import HUBER
 from proxytune.diagnosis.replay import disturbed, increments
-from proxytune.report.diagnosis_style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
+from proxytune.report.style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
 from proxytune.space import Theta
 
 BINS = 20

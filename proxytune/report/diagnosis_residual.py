@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.drives import Drives, Floats, Whole
 from proxytune.diagnosis.windows import cut, strays
-from proxytune.report.diagnosis_style import BEFORE, BLUE, GREY, VERMILLION, after, dress, legend_below
+from proxytune.report.style import BEFORE, BLUE, GREY, VERMILLION, after, dress, legend_below
 from proxytune.space import Theta
 
 HORIZON_S = 2.0

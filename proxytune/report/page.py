@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-from proxytune.report.study_table import BEST_COLUMNS, best_theta, identity_lines, usefulness_lines
+from proxytune.report.study_table import BEST_COLUMNS, best_theta, identity_lines, importance_line, usefulness_lines
 from proxytune.study.result import StudyResult
 from proxytune.study.store import TrialRecord
 
@@ -52,7 +52,8 @@ def page(result: StudyResult, figures: Sequence[Path]) -> str:
         summary=html.escape(f"{len(result.trials)} of {settings.budget} trials. " + _meaning(result)),
         best=_table(BEST_COLUMNS, best_theta(result)),
         usefulness="".join(
-            f"<li>{html.escape(line)}</li>" for line in [*identity_lines(result), *usefulness_lines(result)]
+            f"<li>{html.escape(line)}</li>"
+            for line in [*identity_lines(result), *usefulness_lines(result), importance_line(result)]
         ),
         figures="".join(_image(path) for path in figures),
         trials=_table(("trial", *settings.space.names, "PRPV", "PPV", "failed episodes"), _trials(result)),

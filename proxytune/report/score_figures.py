@@ -6,14 +6,14 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from proxytune.report.style import BLUE, LIGHT_GREY, ORANGE, VERMILLION, dress
 from proxytune.scores import Array, ScoreTable
 from proxytune.usefulness import Assessment, Comparison, Prpv
 
-BLUE, ORANGE, VERMILLION, GREY = "#0072B2", "#E69F00", "#D55E00", "#E6E6E6"  # Okabe and Ito, safe for the colour-blind
 PANEL = 3.4
 NEAR = 0.035
 """Agents nearer than this fraction of the axes share one label."""
-FLIP_COLOURS = {"same": GREY, "lost": BLUE, "invented": ORANGE, "reversed": VERMILLION}
+FLIP_COLOURS = {"same": LIGHT_GREY, "lost": BLUE, "invented": ORANGE, "reversed": VERMILLION}
 
 
 def scatter(assessment: Assessment) -> Figure:
@@ -63,8 +63,7 @@ def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
     name = inputs.metrics[column].name
     axes.set_xlabel(f"{name} on the target", fontsize=8)
     axes.set_ylabel(f"{name} in the proxy", fontsize=8)
-    axes.tick_params(labelsize=7)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress(axes)
     _label_agents(axes, inputs.agents, target, proxy)
 
 

@@ -8,10 +8,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from proxytune.report.style import BLUE, GREEN, ORANGE, VERMILLION, dress
 from proxytune.search.profile import LEVEL, Profile
 from proxytune.study.result import StudyResult
 
-BLUE, ORANGE, GREEN, VERMILLION = "#0072B2", "#E69F00", "#009E73", "#D55E00"  # Okabe and Ito, safe for the colour-blind
 PANEL = (2.6, 2.1)
 MOST_COLUMNS = 4
 COLOURS = "viridis"
@@ -20,9 +20,9 @@ COLOURS = "viridis"
 def profiles_figure(result: StudyResult) -> Figure:
     """Draw PRPV along each parameter as the surrogate has it.
 
-    Solid: the others at their best (the profile), with the band within which a fresh score may lie. Dashed: averaged
-    over the others (partial dependence), with the band of its mean. Shaded: values not worse than the best, as
-    far as is known.
+    Solid: the others at their best (the profile), with the band within which the lowest fresh score may lie, whatever
+    the others. Dashed: averaged over the others (partial dependence), with the band of its mean. Shaded: values not
+    worse than the best, as far as is known; that is where the solid line's band reaches down to it.
     """
     columns = min(MOST_COLUMNS, len(result.profiles))
     rows = ceil(len(result.profiles) / columns)
@@ -42,19 +42,18 @@ def profiles_figure(result: StudyResult) -> Figure:
 def _profile(axes: Axes, profile: Profile, result: StudyResult) -> None:
     low, high = profile.interval
     axes.axvspan(low, high, color=GREEN, alpha=0.12, linewidth=0, label="not worse")
-    for middle, spread, colour, style, label in (
-        (profile.average, profile.average_deviation, ORANGE, "--", "others averaged"),
-        (profile.lowest, profile.deviation, BLUE, "-", "others at their best"),
+    reach = LEVEL * profile.average_deviation
+    for middle, band, colour, style, label in (
+        (profile.average, (profile.average - reach, profile.average + reach), ORANGE, "--", "others averaged"),
+        (profile.lowest, (profile.low, profile.high), BLUE, "-", "others at their best"),
     ):
-        band = (middle - LEVEL * spread, middle + LEVEL * spread)
         axes.fill_between(profile.values, *band, color=colour, alpha=0.18, linewidth=0)
         axes.plot(profile.values, middle, style, color=colour, linewidth=1.4, label=label)
     axes.plot(profile.best, profile.incumbent, "o", color=VERMILLION, markersize=5, label="best θ")
     axes.set_xlabel(_named(profile.name, result), fontsize=8)
     axes.set_title("unidentified" if profile.unidentified else "", fontsize=8, color="0.35")
     axes.set_xlim(profile.values[0], profile.values[-1])
-    axes.tick_params(labelsize=7)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress(axes)
 
 
 def evaluations_figure(result: StudyResult) -> Figure:
@@ -98,11 +97,11 @@ def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normal
     scored = np.array([trial.score is not None for trial in result.trials])
     scores = [trial.score for trial in result.trials if trial.score is not None]
     across, up = points[scored].T
-    axes.scatter(across, up, c=scores, cmap=COLOURS, norm=norm, s=14, linewidths=0)
+    axes.scatter(across, up, c=scores, cmap=COLOURS, norm=norm, s=14, linewidths=0, clip_on=False)
     across, up = points[~scored].T
-    axes.scatter(across, up, marker="x", color=VERMILLION, s=12, linewidths=0.8)
+    axes.scatter(across, up, marker="x", color=VERMILLION, s=12, linewidths=0.8, clip_on=False)
     best = [result.best.trial.theta[name] for name in names]
-    axes.plot(*best, "o", color=VERMILLION, fillstyle="none", markersize=8)
+    axes.plot(*best, "o", color=VERMILLION, fillstyle="none", markersize=8, clip_on=False)
 
 
 def _dress(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
@@ -110,8 +109,8 @@ def _dress(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
     intervals = result.study.settings.space.intervals
     across, up = (intervals[place] for place in places)
     axes.set_xlim(across.low, across.high)
+    dress(axes)
     axes.tick_params(labelsize=6)
-    axes.spines[["top", "right"]].set_visible(False)
     if places[0] != places[1]:
         axes.set_ylim(up.low, up.high)
     else:

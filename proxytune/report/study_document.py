@@ -3,6 +3,7 @@
 from typing import Any
 
 from proxytune.report.score_document import document_of
+from proxytune.search.importance import Importance
 from proxytune.study.confirmation import Confirmation
 from proxytune.study.preflight import Preflight
 from proxytune.study.result import StudyResult
@@ -31,6 +32,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
             "usefulness": measures,
         },
         **{key: measures[key] for key in shared},
+        "importance": {found.name: _importance(found) for found in result.importances},
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
         "cut_off": {"trials": len(result.cut), "episodes": result.spared[0], "seconds": result.spared[1]},
@@ -39,6 +41,10 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         "target": _target(result),
         "settings": dict(as_document(result.study.settings)),
     }
+
+
+def _importance(found: Importance) -> dict[str, Any]:
+    return {"share": found.share, "interval": list(found.interval), "alone": found.alone}
 
 
 def _fresh(found: Confirmation | None) -> dict[str, Any] | None:

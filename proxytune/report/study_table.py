@@ -48,6 +48,17 @@ def preflight_lines(result: StudyResult) -> list[str]:
     return [*result.preflight.warnings] or ["pre-flight: every parameter changes the metrics beyond noise"]
 
 
+def importance_line(result: StudyResult) -> str:
+    """How much of PRPV's variance over the box each parameter takes part in, most first, with its interval."""
+    ordered = sorted(result.importances, key=lambda found: -found.share)
+    shares = [f"{found.name} {found.share:.0%} ({_ends(found.interval)})" for found in ordered]
+    return f"share in PRPV's variance over the box, alone or with others: {', '.join(shares)}"
+
+
+def _ends(interval: tuple[float, float]) -> str:
+    return f"{100 * interval[0]:.0f} to {100 * interval[1]:.0f}"
+
+
 def usefulness_lines(result: StudyResult) -> list[str]:
     """PRPV with its interval, PPV, noise floor and chance, one line each, then what to take with care."""
     found = result.best.assessment
@@ -101,6 +112,7 @@ def study_table(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Re
     lines = [
         *identity_lines(result),
         *usefulness_lines(result),
+        importance_line(result),
         spent,
         *(f"{what}: {path}" for what, path in files.items()),
     ]

@@ -7,12 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from proxytune.report.style import BLUE, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
 from proxytune.study.series import Series, series_of
 from proxytune.study.sweep import Curve, SweepPoint
 from proxytune.usefulness import Assessment
 
-BLUE, LIGHT_BLUE, GREEN = "#0072B2", "#56B4E9", "#009E73"  # Okabe and Ito, safe for the colour-blind
-ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 MARKERS = "osD^v"
 PANEL = (2.6, 2.0)
@@ -104,8 +103,7 @@ def bars_figure(curves: Sequence[Curve]) -> Figure:
     axes.set_xticks([spot for spot, _ in ticks], [text for _, text in ticks])
     axes.set_xlabel(" \n ", fontsize=8)
     axes.set_ylabel("PRPV [ordered pairs]", fontsize=8)
-    axes.tick_params(labelsize=7)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress(axes)
     return figure
 
 
@@ -209,8 +207,7 @@ def _levels(axes: Axes, found: Sequence[Assessment]) -> None:
 def _dress(axes: Axes, curve: Curve) -> None:
     if curve.parameter in curve.base:
         axes.axvline(curve.base[curve.parameter], color="0.6", linewidth=0.8, label=HELD)
-    axes.tick_params(labelsize=7)
-    axes.spines[["top", "right"]].set_visible(False)
+    dress(axes)
 
 
 def _explain(figure: Figure, axes: Axes) -> None:

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from proxytune.search.design import to_unit
-from proxytune.search.proposer import Values
+from proxytune.search.proposer import Compose, Values
 from proxytune.space import Interval, Space
 
 BOX = Space(
@@ -53,6 +53,14 @@ class Objective(Protocol):
         """The noisy score that an engine is told, the same whenever it is asked for; None where the trial fails."""
         ...
 
+    def outcome(self, values: Values, seed: int) -> Values | None:
+        """What that score is computed from; None where the trial fails, or a score has no such parts."""
+        ...
+
+    def compose(self, seed: int) -> Compose | None:
+        """How a score is computed from outcomes; None where it has no such parts."""
+        ...
+
     def regret(self, values: Values, seed: int) -> float | None:
         """How much worse than the optimum a visited point is, as well as that is known without further simulation."""
         ...
@@ -91,6 +99,12 @@ class Analytic:
         bits = np.frombuffer(np.array(values, dtype=float).tobytes(), dtype=np.uint32)
         noise = np.random.default_rng([seed, 2, *bits.tolist()]).integers(-NOISE, NOISE, endpoint=True)
         return max(0.0, self.regret(values, seed) + NOISE + float(noise))
+
+    def outcome(self, values: Values, seed: int) -> None:
+        """A formula has no parts."""
+
+    def compose(self, seed: int) -> None:
+        """A formula has no parts."""
 
     def regret(self, values: Values, seed: int) -> float:
         """The score without noise; 0 at the optimum."""

@@ -76,13 +76,13 @@ def run_engine(objective: Objective, key: RunKey) -> Run:
         InputError: If there is no such engine, or it needs a library that is not installed.
         RunError: If no trial has a score.
     """
-    proposer, space, spent = make_proposer(key.engine, key.initial), objective.space, 0.0
+    proposer, space, spent = make_proposer(key.engine, key.initial, objective.compose(key.seed)), objective.space, 0.0
     trials: list[Trial] = []
     for number in range(key.budget):
         begun = time.perf_counter()
         values = proposer.propose(space, trials, key.seed)
         spent += time.perf_counter() - begun if number >= key.initial else 0.0
-        trials.append(Trial(values, objective.score(values, key.seed)))
+        trials.append(Trial(values, objective.score(values, key.seed), objective.outcome(values, key.seed)))
     answer, _ = fit_surrogate(space, trials).incumbent()
     return Run(
         key=key,

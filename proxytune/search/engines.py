@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 
 from proxytune.errors import InputError
+from proxytune.search.composite import Composite
 from proxytune.search.design import design_point
 from proxytune.search.gaussian_process import GaussianProcess
-from proxytune.search.proposer import Proposer, Trial, Values, with_failures_as_worst
+from proxytune.search.proposer import Compose, Proposer, Trial, Values, with_failures_as_worst
 from proxytune.search.random_points import RandomPoints
 from proxytune.search.scikit_optimize import ScikitOptimize
 from proxytune.search.sobol import Sobol
@@ -16,7 +17,8 @@ from proxytune.settings import nearest
 from proxytune.space import Space
 
 DEFAULT_ENGINE = "gp"
-STUDY_ENGINES = (DEFAULT_ENGINE, "random", "sobol", "tpe")
+COMPOSITE = "composite"
+STUDY_ENGINES = (DEFAULT_ENGINE, COMPOSITE, "random", "sobol", "tpe")
 """What a study may name."""
 ENGINES = (*STUDY_ENGINES, "skopt")
 """What can be compared."""
@@ -44,26 +46,40 @@ class AfterDesign:
         return self.inner.propose(space, told, seed)
 
 
-def installed(engine: str) -> bool:
-    """Whether the library that an engine needs is there."""
-    return engine != "tpe" or find_spec("optuna") is not None
+def why_not(engine: str, *, composed: bool) -> str:
+    """Why an engine cannot be used, in one phrase; empty if it can.
+
+    Args:
+        engine: Its name.
+        composed: Whether the score is computed from outcomes that are known.
+    """
+    if engine not in ENGINES:
+        return f"unknown engine '{engine}'; {nearest(engine, ENGINES)}"
+    if engine == "tpe" and find_spec("optuna") is None:
+        return "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]', or use another engine"
+    if engine == COMPOSITE and not composed:
+        return f"'{COMPOSITE}' models what a score is computed from, and this one has no such parts; use another engine"
+    return ""
 
 
-def make_proposer(engine: str, initial: int) -> Proposer:
+def make_proposer(engine: str, initial: int, compose: Compose | None = None) -> Proposer:
     """The proposer of this name, with so many trials from the quasi-random design first: all engines share it.
 
+    Args:
+        engine: Its name.
+        initial: How many trials come from the design.
+        compose: How a score is computed from a trial's outcome; None where it has no such parts.
+
     Raises:
-        InputError: If there is no such engine, or it needs a library that is not installed.
+        InputError: If there is no such engine, or it cannot be used.
     """
-    if engine == DEFAULT_ENGINE:
-        return GaussianProcess(initial)
-    if engine not in ENGINES:
-        raise InputError(f"unknown engine '{engine}'; {nearest(engine, ENGINES)}")
-    if not installed(engine):
-        raise InputError(
-            "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]', or use another engine"
-        )
+    reason = why_not(engine, composed=compose is not None)
+    if reason:
+        raise InputError(reason)
+    if engine == COMPOSITE and compose is not None:
+        return AfterDesign(Composite(compose), initial)
     inner: dict[str, Proposer] = {
+        "gp": GaussianProcess(),
         "random": RandomPoints(),
         "sobol": Sobol(),
         "tpe": TreeParzen(),

@@ -1,13 +1,16 @@
-"""Bayesian optimisation: expected improvement over a Gaussian process of the finished trials."""
+"""Bayesian optimisation: expected improvement over a Gaussian process of the finished trials.
 
-from collections.abc import Sequence
+There are no pending trials to be told of: a study tries one θ at a time and spreads its episodes over the jobs.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from skopt.acquisition import gaussian_ei
 from threadpoolctl import threadpool_limits
 
-from proxytune.search.design import design_point, from_unit, unit_points
+from proxytune.search.design import from_unit, unit_points
 from proxytune.search.proposer import Trial, Values, proposal_seed, with_failures_as_worst
 from proxytune.search.surrogate import Array, Surrogate, fit_surrogate, unit_array
 from proxytune.space import Space
@@ -25,21 +28,17 @@ class GaussianProcess:
     """Proposes where the score is expected to improve most.
 
     The improvement is measured from the best posterior mean among the visited points: the lowest score itself is
-    partly luck. A failed trial counts as the worst score seen, so that the search moves away from it.
-
-    Attributes:
-        initial: How many trials come from the quasi-random design before the surrogate is asked.
+    partly luck.
     """
 
-    initial: int = 8
-
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point, a function of the set of trials and the seed alone; never a point visited before."""
-        filled = with_failures_as_worst(trials)
-        if len(trials) < self.initial or not filled:
-            return design_point(space, len(trials), seed)
+        """The next point, a function of the set of trials and the seed alone; never a point visited before.
+
+        Raises:
+            RunError: If no trial has a score.
+        """
         with threadpool_limits(limits=1):
-            return from_unit(space, _most_promising(fit_surrogate(space, filled), proposal_seed(seed, len(trials)))[0])
+            return from_unit(space, _most_promising(fit_surrogate(space, trials), proposal_seed(seed, len(trials)))[0])
 
 
 def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tuple[float, float]:
@@ -55,18 +54,29 @@ def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tu
 
 
 def _most_promising(surrogate: Surrogate, seed: int) -> tuple[Array, float]:
-    """The point of the unit cube with the highest expected improvement, and that: a Sobol cloud, then closer looks."""
-    visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
+    """The point of the unit cube with the highest expected improvement, and that."""
     _, incumbent = surrogate.incumbent()
+    visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
+    return highest(lambda points: gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0), visited, seed)
+
+
+def highest(gain: Callable[[Array], Array], visited: Array, seed: int) -> tuple[Array, float]:
+    """The unvisited point of the unit cube that promises the highest gain, and that: a Sobol cloud, then closer looks.
+
+    Args:
+        gain: What points (n, parameters) promise, shape (n,).
+        visited: The points that are not to be proposed again, shape (trials, parameters).
+        seed: Seeds the clouds.
+    """
     dimensions = visited.shape[1]
     points = _new(unit_points(dimensions, CLOUD, seed), visited)
-    gains = gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0)
+    gains = gain(points)
     offsets = 2.0 * unit_points(dimensions, CLOUD // 16, seed + 1) - 1.0
     for width in WIDTHS:
         leaders = points[np.argsort(-gains, kind="stable")[:REFINED]]
         around = np.clip(leaders[:, None, :] + width * offsets, 0.0, 1.0).reshape(-1, dimensions)
         points = np.concatenate([leaders, _new(around, visited)])
-        gains = gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0)
+        gains = gain(points)
     best = int(np.argmax(gains))
     return points[best], float(gains[best])
 

@@ -24,8 +24,9 @@ class Profile:
         values: The grid, from one bound to the other.
         lowest: Posterior mean of the score with the other parameters where that is lowest.
         deviation: Standard deviation of its difference to the incumbent's, the noise of a fresh score included.
-        nearest: How many standard deviations of that difference the least improbable θ lies above the incumbent, over
-            the other parameters: small also where no trial has been.
+        low: How low a fresh score may be, for some values of the other parameters, at the 95 % level: also where no
+            trial has been.
+        high: How high it may be at most, for some values of the other parameters.
         average: Posterior mean of the score, averaged over the other parameters: the partial dependence.
         average_deviation: Its standard deviation, noise excluded.
         best: The incumbent's value.
@@ -36,7 +37,8 @@ class Profile:
     values: Array
     lowest: Array
     deviation: Array
-    nearest: Array
+    low: Array
+    high: Array
     average: Array
     average_deviation: Array
     best: float
@@ -49,7 +51,7 @@ class Profile:
         Looking only where the posterior mean is lowest would leave out what has not been explored: on the analytic
         stand-in such an interval held the true blur in 7 of 12 searches, this one in all.
         """
-        return np.asarray(self.nearest <= LEVEL)
+        return np.asarray(self.low <= self.incumbent)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -74,16 +76,17 @@ def profiles(surrogate: Surrogate, answer: Values | None = None) -> tuple[Profil
 def _profile(surrogate: Surrogate, column: int, best: Array, incumbent: float) -> Profile:
     dimensions = len(best)
     places = np.linspace(0.0, 1.0, GRID)
-    lowest, deviation, nearest = _along(surrogate, column, places, best)
+    above, deviation, low, high = _along(surrogate, column, places, best)
     average, average_deviation = _averaged(surrogate, column, places, dimensions)
     interval = surrogate.space.intervals[column]
     ends = [np.where(np.arange(dimensions) == column, place, best) for place in places]
     return Profile(
         name=interval.name,
         values=np.array([from_unit(surrogate.space, end)[column] for end in ends]),
-        lowest=lowest,
+        lowest=incumbent + above,
         deviation=deviation,
-        nearest=nearest,
+        low=incumbent + low,
+        high=incumbent + high,
         average=average,
         average_deviation=average_deviation,
         best=interval.low + float(best[column]) * (interval.high - interval.low),
@@ -91,18 +94,21 @@ def _profile(surrogate: Surrogate, column: int, best: Array, incumbent: float) -
     )
 
 
-def _along(surrogate: Surrogate, column: int, places: Array, best: Array) -> tuple[Array, Array, Array]:
-    """The lowest posterior mean at each place of one parameter, its deviation, and the least improbable distance."""
+def _along(surrogate: Surrogate, column: int, places: Array, best: Array) -> Array:
+    """How far above the best one parameter's grid lies: rows lowest mean, its deviation, and both ends of the band.
+
+    The ends are lowest over the other parameters, each for itself, so that they do not jump where the lowest mean
+    moves from one valley to another.
+    """
     visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
     points = np.concatenate([visited, unit_points(visited.shape[1], CLOUD, 0)])
     found = []
     for place in places:
         points[:, column] = place
         above, deviation = _above(surrogate, points, best)
-        row = int(np.argmin(above))
-        found.append((above[row], deviation[row], (above / deviation).min()))
-    above, deviation, nearest = np.array(found).T
-    return above + surrogate.mean(best[None])[0], deviation, nearest
+        row, reach = int(np.argmin(above)), LEVEL * deviation
+        found.append((above[row], deviation[row], (above - reach).min(), (above + reach).min()))
+    return np.array(found).T
 
 
 def _averaged(surrogate: Surrogate, column: int, places: Array, dimensions: int) -> tuple[Array, Array]:

@@ -1,15 +1,19 @@
 """What proposes the next θ: a pure function of the space, the finished trials and the seed."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.space import Space
 
 Values = tuple[float, ...]
 """A point of the search box: one value per parameter, in the order of the box."""
+
+Compose = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""Scores, shape (…,), of outcomes, shape (…, outputs)."""
 
 
 @dataclass(frozen=True)
@@ -19,10 +23,13 @@ class Trial:
     Attributes:
         values: The point, in the order of the box.
         score: Its score, or None where the trial failed.
+        outcome: What the score was computed from, one value per output; None where the trial failed, or where the
+            score has no such parts.
     """
 
     values: Values
     score: float | None
+    outcome: Values | None = None
 
 
 class Proposer(Protocol):
@@ -34,12 +41,15 @@ class Proposer(Protocol):
 
 
 def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:
-    """The trials, a failed one with the worst score seen, so that a search moves away from it; none without a score."""
-    scored = [trial.score for trial in trials if trial.score is not None]
+    """The trials, a failed one with score and outcome of the worst, so that a search moves away from it.
+
+    None at all if no trial has a score.
+    """
+    scored = [(trial.score, trial.values, trial.outcome) for trial in trials if trial.score is not None]
     if not scored:
         return []
-    worst = max(scored)
-    return [Trial(trial.values, worst if trial.score is None else trial.score) for trial in trials]
+    score, _, outcome = max(scored, key=lambda found: found[:2])
+    return [replace(trial, score=score, outcome=outcome) if trial.score is None else trial for trial in trials]
 
 
 def proposal_seed(seed: int, count: int) -> int:

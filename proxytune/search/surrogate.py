@@ -111,7 +111,7 @@ def fit_surrogate(space: Space, trials: Sequence[Trial]) -> Surrogate:
     unit = unit_array(space, [trial.values for trial in visited])
     scores = np.array([trial.score for trial in visited], dtype=float)
     model = GaussianProcessRegressor(
-        kernel=_kernel(len(space.intervals)), optimizer=_most_probable, normalize_y=True, noise="gaussian"
+        kernel=prior_kernel(len(space.intervals)), optimizer=most_probable, normalize_y=True, noise="gaussian"
     )
     with threadpool_limits(limits=1), warnings.catch_warnings():
         # A hyperparameter at its bound is an answer, not a failure.
@@ -124,13 +124,14 @@ def unit_array(space: Space, points: Sequence[Values]) -> Array:
     return np.array([to_unit(space, values) for values in points]).reshape(-1, len(space.intervals))
 
 
-def _kernel(dimensions: int) -> ConstantKernel:
+def prior_kernel(dimensions: int) -> ConstantKernel:
+    """Covariance of a score over the unit cube, noise last, at the medians of its priors."""
     scales, bounds = np.full(dimensions, LENGTH_SCALE.median), [LENGTH_SCALE.bounds] * dimensions
     smooth = Matern(scales, length_scale_bounds=bounds, nu=2.5)
     return ConstantKernel(AMPLITUDE.median, AMPLITUDE.bounds) * smooth + WhiteKernel(NOISE.median, NOISE.bounds)
 
 
-def _most_probable(misfit: Callable[[Array], tuple[float, Array]], start: Array, bounds: Array) -> tuple[Array, float]:
+def most_probable(misfit: Callable[[Array], tuple[float, Array]], start: Array, bounds: Array) -> tuple[Array, float]:
     """The hyperparameters' logarithms of highest posterior density, as the regressor's optimiser.
 
     Args:

@@ -94,6 +94,8 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
     Raises:
         StoreError: If it is corrupt, is something else, comes from a newer proxytune, or cannot be written.
     """
+    if path.is_dir():
+        raise StoreError(f"{path}: is a folder, not a study's database; move it away")
     uri = f"{path.absolute().as_uri()}?mode={'rwc' if writable else 'ro'}"
     with told(path):
         connection = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None)
@@ -120,6 +122,8 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if (application, version, tables) == (0, 0, 0):
+        if path.stat().st_size:
+            raise _corrupt(path, "it has no tables")
         if not writable:
             raise StoreError(f"{path}: is empty; run the study first")
         connection.executescript(SCHEMA)
@@ -131,6 +135,8 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
     (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if verdict != "ok":
         raise _corrupt(path, str(verdict))
+    if _cut_off(connection, path):
+        raise _corrupt(path, "its end has been cut off")
     if version < FORMAT:
         converting, reading = zip(*STEPS[version - 1 :], strict=True)
         # Views of this connection alone leave the file as it is.
@@ -139,6 +145,16 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
 
 def _at_once(steps: Sequence[str]) -> str:
     return f"BEGIN;{''.join(steps)}PRAGMA user_version = {FORMAT};\nCOMMIT;"
+
+
+def _cut_off(connection: sqlite3.Connection, path: Path) -> bool:
+    """Whether the last page is not whole: SQLite would read zeros where the rest was.
+
+    With a write-ahead log that is no harm: a full disk leaves it so, and the log has the page.
+    """
+    (page,) = connection.execute("PRAGMA page_size").fetchone()
+    log = path.with_name(f"{path.name}-wal")
+    return path.stat().st_size % page > 0 and not (log.exists() and log.stat().st_size)
 
 
 @contextmanager

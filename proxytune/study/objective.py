@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-from proxytune.search.proposer import Values
+from proxytune.search.proposer import Compose, Values
 from proxytune.space import Space
+from proxytune.study.composition import compose_of, outcome_of
 from proxytune.study.evaluate import Evaluation, evaluation, simulate
 from proxytune.study.progress import Watcher
 from proxytune.study.store import Store
@@ -53,6 +54,14 @@ class StudyObjective:
     def score(self, values: Values, seed: int) -> float | None:
         """PRPV, with the placement noise of this seed; None where an agent has no episode that worked."""
         return self._evaluated(values, seed).prpv
+
+    def outcome(self, values: Values, seed: int) -> Values | None:
+        """Every agent's mean metrics; None where an agent has no episode that worked."""
+        return outcome_of(self.study, self._evaluated(values, seed))
+
+    def compose(self, seed: int) -> Compose:
+        """PRPV of mean metrics."""
+        return compose_of(self.study)
 
     def regret(self, values: Values, seed: int) -> float | None:
         """The score above the noise floor."""

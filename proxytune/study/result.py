@@ -1,10 +1,12 @@
 """What a study has found out: its best θ, how useful the proxy is there, and what that is worth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from proxytune.errors import RunError
+from proxytune.search.importance import Importance, importances
 from proxytune.search.profile import Profile, profiles
 from proxytune.search.surrogate import Surrogate, fit_surrogate, unit_array
 from proxytune.study.confirmation import Confirmation, confirmation_of
@@ -49,6 +51,7 @@ class StudyResult:
         trials: Its finished and failed trials, in order.
         best: The best of them.
         profiles: What is known of each parameter, in the order of the box.
+        importances: How much each parameter matters, in the order of the box.
         confirmation: What fresh episodes say of it; None if they are off, or not all driven yet.
         preflight: What was learnt of the parameters before the first trial; None if it is off or was never run.
         stopped: Why it runs no further; empty while it is not at its end.
@@ -60,6 +63,7 @@ class StudyResult:
     trials: tuple[TrialRecord, ...]
     best: Best
     profiles: tuple[Profile, ...]
+    importances: tuple[Importance, ...]
     confirmation: Confirmation | None
     preflight: Preflight | None
     stopped: str
@@ -90,13 +94,14 @@ class StudyResult:
         return before + trials + after
 
 
-def result_of(study: Study, store: Store) -> StudyResult:
-    """Sum up what the store has; nothing is simulated.
+def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | None = None) -> StudyResult:
+    """Sum up what the store has, or the same trials scored anew; nothing is simulated.
 
     Raises:
         RunError: If no trial has a score.
     """
-    trials = tuple(trial for trial in store.trials() if trial.state != "open")
+    known = store.trials() if scored_anew is None else scored_anew
+    trials = tuple(trial for trial in known if trial.state != "open")
     scored = [trial for trial in trials if trial.prpv is not None]
     if not scored:
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
@@ -110,6 +115,7 @@ def result_of(study: Study, store: Store) -> StudyResult:
         trials=trials,
         best=_best(study, store, answer, surrogate),
         profiles=profiles(surrogate, space.values(answer.theta)),
+        importances=importances(surrogate),
         confirmation=confirmation,
         preflight=preflight_of(study, store),
         stopped=stopped(study, store, trials),
@@ -125,13 +131,18 @@ def _favourite(scored: list[TrialRecord], surrogate: Surrogate) -> TrialRecord:
 
 def _best(study: Study, store: Store, answer: TrialRecord, surrogate: Surrogate) -> Best:
     mean, deviation = surrogate.predict(unit_array(surrogate.space, [surrogate.space.values(answer.theta)]))
-    proxy = _known(study, store, answer).proxy
+    proxy = known_evaluation(study, store, answer).proxy
     assert proxy is not None
     assessment = assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
     return Best(answer, float(mean[0]), float(deviation[0]), assessment)
 
 
-def _known(study: Study, store: Store, trial: TrialRecord) -> Evaluation:
+def known_evaluation(study: Study, store: Store, trial: TrialRecord) -> Evaluation:
+    """What a finished trial's episodes came to.
+
+    Raises:
+        RunError: If the store lacks some of them.
+    """
     found = evaluation(study, store, trial.theta)
     if found is None:
         raise RunError(f"{store.path}: lacks episodes of trial {trial.number}; move it away and run the study again")

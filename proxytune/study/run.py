@@ -5,11 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 from proxytune.errors import RunError, SettingsError
-from proxytune.search.proposer import Proposer
+from proxytune.search.proposer import Proposer, Trial
 from proxytune.space import Theta
+from proxytune.study.composition import trial_of
 from proxytune.study.cutting import Reference, reference, run_or_cut
 from proxytune.study.evaluate import Evaluation, Spent, evaluation, known_outcomes, simulate
-from proxytune.study.history import as_trials, episodes_of
+from proxytune.study.history import episodes_of
 from proxytune.study.progress import Watcher
 from proxytune.study.stopping import stopped
 from proxytune.study.store import State, Store, TrialRecord
@@ -32,16 +33,18 @@ def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) 
     spent = Spent()
     trials = store.trials()
     done = [trial for trial in trials if trial.state != "open"]
+    told = [trial_of(study, store, trial) for trial in done]
     while not stopped(study, store, done):
         _check_hope(study, done)
         number = len(done) + 1
-        theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, done)
+        theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, told)
         store.save_trial(study.identity, TrialRecord(number, theta))
         against = reference(study, store, done)
         cost, ended = _evaluated(study, store, TrialRecord(number, theta), against, watcher)
         spent += cost
         done.append(ended)
         store.save_trial(study.identity, done[-1])
+        told.append(trial_of(study, store, done[-1]))
         _tell_best(watcher, done)
     return spent
 
@@ -56,7 +59,7 @@ def _evaluated(
     else:
         spent, cut = run_or_cut(study, store, trial, against, watcher, what)
     if cut is None:
-        return spent, _record(trial.number, evaluation(study, store, trial.theta))
+        return spent, record(trial.number, evaluation(study, store, trial.theta))
     ended = replace(trial, state="cut", decided=cut.decided, bound=cut.bound, estimate=cut.estimate)
     outcomes = known_outcomes(study, store, episodes_of(study.settings, ended)).values()
     return spent, replace(ended, failed_episodes=sum(outcome.metrics is None for outcome in outcomes))
@@ -102,12 +105,13 @@ def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsE
     )
 
 
-def _propose(study: Study, proposer: Proposer, done: Sequence[TrialRecord]) -> Theta:
+def _propose(study: Study, proposer: Proposer, told: Sequence[Trial]) -> Theta:
     space = study.settings.space
-    return space.theta(proposer.propose(space, as_trials(space, done), study.settings.seed))
+    return space.theta(proposer.propose(space, told, study.settings.seed))
 
 
-def _record(number: int, found: Evaluation | None) -> TrialRecord:
+def record(number: int, found: Evaluation | None) -> TrialRecord:
+    """A trial as the store keeps it, from what its episodes came to."""
     assert found is not None
     state: State = "failed" if found.failure else "finished"
     return TrialRecord(number, found.theta, state, found.prpv, found.ppv, len(found.failures), found.failure)

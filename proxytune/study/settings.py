@@ -10,14 +10,16 @@ from proxytune.scores import Metric
 from proxytune.search.engines import DEFAULT_ENGINE, STUDY_ENGINES
 from proxytune.settings import Section, read_settings
 from proxytune.space import Interval, Space
+from proxytune.study.teaching import TeachingSettings, read_teaching
 
 DEFAULT_FAMILY = "proxytune.driving.family:lane_following"
 FILE_NAME = "study.toml"
 FORMAT = 1
+OBJECTIVES = ("prpv", "plv")
 KEYS = (
     "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
     "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
-    "cut_off", "stop", "parameters", "domain",
+    "cut_off", "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
 
 
@@ -61,6 +63,7 @@ class StudySettings:
         stop: When it ends before its budget is spent.
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
+        teaching: How a proxy's worth as a teacher is measured, if it is.
     """
 
     path: Path
@@ -84,6 +87,7 @@ class StudySettings:
     stop: StopRules
     space: Space
     domain: Section
+    teaching: TeachingSettings | None = None
 
     @property
     def folder(self) -> Path:
@@ -112,7 +116,7 @@ def read_study_settings(path: Path) -> StudySettings:
         family=read.text("family", DEFAULT_FAMILY),
         proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
         target=path.parent / read.text("target"),
-        objective=read.text("objective", "prpv", choices=("prpv",)),
+        objective=read.text("objective", "prpv", choices=OBJECTIVES),
         metrics=_metrics(read),
         agents=_agents(read),
         starts=read.whole("starts", low=1),
@@ -128,6 +132,7 @@ def read_study_settings(path: Path) -> StudySettings:
         stop=_stop(read.section("stop")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
+        teaching=read_teaching(read.section("teaching")),
     )
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from proxytune.search.gaussian_process import expected_improvement
-from proxytune.study.evaluate import known_outcomes
-from proxytune.study.history import as_trials, episodes_of
+from proxytune.study.evaluate import plan
+from proxytune.study.history import as_trials
 from proxytune.study.settings import StudySettings
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
@@ -20,17 +20,17 @@ def stopped(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
     """
     settings = study.settings
     if len(done) >= settings.budget:
-        return f"the budget of {settings.budget} trials is spent"
-    return _out_of_time(study, store, done) or _nothing_to_gain(settings, done)
+        kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
+        return f"the budget of {settings.budget} trials is spent{kept}"
+    return _out_of_time(settings, store, done) or _nothing_to_gain(settings, done)
 
 
-def _out_of_time(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
-    settings = study.settings
+def _out_of_time(settings: StudySettings, store: Store, done: Sequence[TrialRecord]) -> str:
     limit = settings.stop.wall_time_s
     if limit is None:
         return ""
-    driven = [episode for trial in done for episode in episodes_of(settings, trial)]
-    seconds = sum(outcome.seconds for outcome in known_outcomes(study, store, driven).values()) / settings.jobs
+    seeds = {episode.seed for episode in plan(settings, {}, settings.seed)}
+    seconds = store.seconds_of_trials(len(done), seeds) / settings.jobs
     if seconds < limit:
         return ""
     return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {limit:g}; {FILE_REMEDY}"

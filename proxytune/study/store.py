@@ -2,7 +2,7 @@
 
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -191,6 +191,14 @@ class Store:
         """How long the episodes of each agent and start took on average."""
         rows = self._all("SELECT agent, start, avg(seconds) FROM episodes GROUP BY agent, start")
         return {(agent, start): mean for agent, start, mean in rows}
+
+    def seconds_of_trials(self, last: int, seeds: Collection[int]) -> float:
+        """How long the episodes with these seeds took of all trials up to this one."""
+        query = (
+            "SELECT total(seconds) FROM trials JOIN episodes ON episodes.instance = trials.instance"
+            f" WHERE number <= ? AND seed IN ({', '.join('?' * len(seeds))})"
+        )
+        return float(self._all(query, (last, *seeds))[0][0])
 
     def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
         """Remember that a sweep has been asked for in the domain family with this identity."""

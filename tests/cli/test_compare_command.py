@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from proxytune.cli.compare import read_runs
+from proxytune.cli.compare import _engines, read_runs
 from proxytune.cli.main import main, parser
 from proxytune.search import engines
 
@@ -75,7 +75,14 @@ def test_a_study_is_compared_on_its_own_episodes_which_are_simulated_once(make_s
     assert journal.read_text().splitlines() == episodes
 
 
+def test_an_engine_that_models_metrics_is_compared_where_there_are_metrics(tmp_path, capsys):
+    few = ("--engines", "composite", "--seeds", "2", "--budget", "7", "--initial", "5")
+    assert compare("ranking", *few, "--output", tmp_path / "out", "--json") == 0
+    assert [row["engine"] for row in json.loads(capsys.readouterr().out)["engines"]] == ["gp", "composite"]
+
+
 BAD = {
+    "an engine of metrics where there are none": (("--engines", "composite"), "'composite' models what a score is"),
     "an unknown engine": (("--engines", "gp,tpr"), "--engines: unknown engine 'tpr'"),
     "one seed": (("--seeds", "1"), "--seeds 1: give at least 2"),
     "no budget": (("--budget", "0"), "--budget 0: give at least 2"),
@@ -103,7 +110,9 @@ def test_tpe_without_optuna_is_told_before_anything_runs(tmp_path, capsys, monke
 
 def test_without_optuna_the_other_engines_are_compared_unless_named(monkeypatch):
     monkeypatch.setattr(engines, "find_spec", lambda name: None)
-    assert parser().parse_args(["compare", "analytic"]).engines == "gp,random,sobol"
+    assert _engines(parser().parse_args(["compare", "analytic"])) == ["gp", "random", "sobol"]
+    assert _engines(parser().parse_args(["compare", "ranking"])) == ["gp", "composite", "random", "sobol"]
+    assert _engines(parser().parse_args(["compare", "quickstart"])) == ["gp", "composite", "random", "sobol"]
 
 
 def test_a_place_that_cannot_be_written_is_one_line_and_exit_1(tmp_path, capsys):

@@ -24,7 +24,7 @@ from proxytune.report.diagnosis_effect import STATIC, TRANSIENT, effect_curve
 from proxytune.report.diagnosis_figures import SHOWN, diagnosis_figures
 from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, MOTIONS, retuned
 from proxytune.report.diagnosis_residual import MANY_WINDOWS, residual_map, residual_over_time, strayed
-from proxytune.report.diagnosis_style import BEFORE
+from proxytune.report.style import BEFORE
 
 WIDTH = 0.12
 AFTER = "with dead band"

@@ -19,13 +19,13 @@ def result(finished):
 
 def flat(profile):
     level = np.full_like(profile.lowest, profile.incumbent)
-    return replace(profile, lowest=level, nearest=np.zeros_like(level))
+    return replace(profile, lowest=level, low=level)
 
 
 def steep(profile):
     far = np.abs(profile.values - profile.best) > 0.05
     lowest = profile.incumbent + 1000.0 * far
-    return replace(profile, lowest=lowest, deviation=np.ones_like(lowest), nearest=1000.0 * far)
+    return replace(profile, lowest=lowest, deviation=np.ones_like(lowest), low=lowest - 2.0)
 
 
 def test_every_parameter_has_its_profile_and_partial_dependence_with_units(result):

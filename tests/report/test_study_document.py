@@ -6,7 +6,7 @@ import pytest
 from proxytune.report.page import page
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import best_theta, cut_lines, failure_lines, identity_lines, usefulness_lines
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines import make_proposer
 from proxytune.space import Interval
 from proxytune.study.preflight import Movement, Preflight
 from proxytune.study.progress import Silent
@@ -88,7 +88,7 @@ def test_what_was_cut_off_and_saved_is_told(result):
 def test_failed_episodes_are_told_with_the_first_of_them(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6")
     with Store.open(folder) as store:
-        run_study(open_study(folder), store, GaussianProcess(5), Silent())
+        run_study(open_study(folder), store, make_proposer("gp", 5), Silent())
         result = result_of(open_study(folder), store)
     head, first, *_ = failure_lines(result)
     assert head == "6 of 108 episodes failed; the first:"

@@ -3,50 +3,40 @@ import importlib.util
 
 import numpy as np
 import pytest
+from steps import SPACE, search, steps, whole
 
 from proxytune.errors import InputError
 from proxytune.search import engines
 from proxytune.search.design import design_point
 from proxytune.search.engines import ENGINES, STUDY_ENGINES, AfterDesign, make_proposer
 from proxytune.search.proposer import Trial
-from proxytune.space import Interval, Space
 
-SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
 WITHOUT = () if HAS_OPTUNA else ("tpe",)
 HERE = [name for name in ENGINES if name not in WITHOUT]
 
 
-def steps(values):
-    """An integer score with its lowest step around (0.1, 0.1), like PRPV's."""
-    return float(np.floor(40 * (abs(values[0] - 0.1) + abs(values[1] - 0.1))))
-
-
-def search(proposer, budget, seed, score=steps):
-    trials = []
-    for _ in range(budget):
-        values = proposer.propose(SPACE, trials, seed)
-        trials.append(Trial(values, score(values)))
-    return trials
+def made(engine, initial):
+    return make_proposer(engine, initial, whole)
 
 
 @pytest.mark.parametrize("engine", HERE)
 def test_every_engine_begins_with_the_same_design(engine):
-    trials = search(make_proposer(engine, 4), 4, seed=9)
+    trials = search(made(engine, 4), 4, seed=9)
     assert [trial.values for trial in trials] == [design_point(SPACE, index, 9) for index in range(4)]
 
 
 @pytest.mark.parametrize("engine", HERE)
 def test_resuming_anywhere_with_a_new_proposer_proposes_what_an_uninterrupted_search_does(engine):
-    whole = search(make_proposer(engine, 3), 8, seed=3)
+    whole = search(made(engine, 3), 8, seed=3)
     for stop in (0, 3, 5, 7):
-        assert make_proposer(engine, 3).propose(SPACE, whole[:stop], 3) == whole[stop].values
+        assert made(engine, 3).propose(SPACE, whole[:stop], 3) == whole[stop].values
 
 
 @pytest.mark.parametrize("engine", HERE)
 def test_every_proposal_lies_in_the_box_and_is_a_new_one(engine):
     """Also where the best is at its corner."""
-    trials = search(make_proposer(engine, 3), 8, seed=1, score=lambda values: -100 * values[0] - values[1])
+    trials = search(made(engine, 3), 8, seed=1, score=lambda values: -100 * values[0] - values[1])
     assert len({trial.values for trial in trials}) == 8
     for trial in trials:
         assert 0.0 <= trial.values[0] <= 0.3
@@ -55,14 +45,14 @@ def test_every_proposal_lies_in_the_box_and_is_a_new_one(engine):
 
 @pytest.mark.parametrize("engine", HERE)
 def test_another_seed_gives_another_search(engine):
-    told = [Trial(design_point(SPACE, index, 1), float(index)) for index in range(3)]
-    proposer = make_proposer(engine, 3)
+    told = [Trial(design_point(SPACE, index, 1), float(index), (float(index),)) for index in range(3)]
+    proposer = made(engine, 3)
     assert proposer.propose(SPACE, told, 1) != proposer.propose(SPACE, told, 2)
 
 
 @pytest.mark.parametrize("engine", HERE)
 def test_failed_trials_do_not_stop_an_engine(engine):
-    trials = search(make_proposer(engine, 3), 7, seed=1, score=lambda v: None if v[0] > 0.15 else steps(v))
+    trials = search(made(engine, 3), 7, seed=1, score=lambda v: None if v[0] > 0.15 else steps(v))
     assert any(trial.score is None for trial in trials)
     assert len({trial.values for trial in trials}) == 7
 
@@ -70,7 +60,7 @@ def test_failed_trials_do_not_stop_an_engine(engine):
 @pytest.mark.parametrize("engine", HERE)
 def test_while_every_trial_has_failed_the_design_goes_on(engine):
     failed = [Trial(design_point(SPACE, index, 1), None) for index in range(5)]
-    assert make_proposer(engine, 3).propose(SPACE, failed, 1) == design_point(SPACE, 5, 1)
+    assert made(engine, 3).propose(SPACE, failed, 1) == design_point(SPACE, 5, 1)
 
 
 def test_an_engine_is_told_of_a_failed_trial_as_the_worst_and_only_after_the_design():
@@ -91,7 +81,7 @@ def test_an_engine_is_told_of_a_failed_trial_as_the_worst_and_only_after_the_des
 
 def test_random_and_sobol_learn_nothing():
     for engine in ("random", "sobol"):
-        low, high = (search(make_proposer(engine, 2), 6, 1, score) for score in (steps, lambda values: 100.0))
+        low, high = (search(made(engine, 2), 6, 1, score) for score in (steps, lambda values: 100.0))
         assert [trial.values for trial in low] == [trial.values for trial in high]
 
 
@@ -119,10 +109,10 @@ def test_no_other_engine_needs_optuna(monkeypatch):
         return whole(name, *arguments, **more)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    told = [Trial(design_point(SPACE, index, 1), float(index)) for index in range(3)]
+    told = [Trial(design_point(SPACE, index, 1), float(index), (float(index),)) for index in range(3)]
     for engine in ENGINES:
         if engine != "tpe":
-            assert len(make_proposer(engine, 3).propose(SPACE, told, 1)) == 2
+            assert len(made(engine, 3).propose(SPACE, told, 1)) == 2
 
 
 def test_an_unknown_engine_is_refused_with_the_nearest_name():

@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
+from steps import SPACE
 
 from proxytune.search.design import design_point
 from proxytune.search.profile import GRID, profiles
 from proxytune.search.proposer import Trial
 from proxytune.search.surrogate import fit_surrogate
-from proxytune.space import Interval, Space
-
-SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
 
 
 def found(score, count=40):
@@ -43,6 +41,23 @@ def test_the_profile_never_lies_above_the_average_over_the_others():
         assert profile.values.shape == profile.lowest.shape == profile.average.shape == (GRID,)
         assert (profile.lowest <= profile.average + 1e-9).all()
         assert (profile.deviation > 0).all()
+
+
+def test_the_band_holds_the_profile_and_does_not_jump_where_another_valley_becomes_the_lowest():
+    """Two valleys; the band around the lowest mean alone jumps by up to 0.15 of its width from one to the other."""
+
+    def valleys(values):
+        left = abs(values[0] - 0.05) / 0.3 + abs(values[1] + 0.2)
+        right = abs(values[0] - 0.25) / 0.3 + abs(values[1] - 0.2)
+        return float(round(60 * min(left, right)))
+
+    for seed in (2, 4):
+        points = [design_point(SPACE, index, seed) for index in range(6)]
+        for profile in profiles(fit_surrogate(SPACE, [Trial(point, valleys(point)) for point in points])):
+            assert (profile.low <= profile.lowest).all()
+            assert (profile.lowest <= profile.high).all()
+            width = np.ptp(np.concatenate([profile.low, profile.high]))
+            assert max(np.abs(np.diff(end)).max() for end in (profile.low, profile.high)) < 0.1 * width
 
 
 def test_the_average_of_a_sum_has_the_shape_of_its_own_term():

@@ -1,18 +1,11 @@
 import numpy as np
 import pytest
+from steps import SPACE, steps
 
 from proxytune.errors import RunError
 from proxytune.search.design import design_point
 from proxytune.search.proposer import Trial
 from proxytune.search.surrogate import fit_surrogate, unit_array
-from proxytune.space import Interval, Space
-
-SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
-
-
-def steps(values):
-    """An integer score with its lowest step around (0.1, 0.1), like PRPV's."""
-    return float(np.floor(40 * (abs(values[0] - 0.1) + abs(values[1] - 0.1))))
 
 
 def visited(count, score=steps):

@@ -7,7 +7,7 @@ import pytest
 from proxytune.errors import EpisodeError
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import fresh_lines
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines import make_proposer
 from proxytune.search.surrogate import fit_surrogate
 from proxytune.study.confirmation import (
     CANDIDATES,
@@ -111,7 +111,7 @@ def test_trials_do_not_depend_on_it(finished, make_study):
     trials = []
     for study in (longer, other):
         with Store.open(study.settings.folder) as store:
-            run_study(study, store, GaussianProcess(5), Silent())
+            run_study(study, store, make_proposer("gp", 5), Silent())
             trials.append(store.trials())
     assert trials[0] == trials[1]
     assert trials[0][:7] == before
@@ -164,7 +164,7 @@ def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, fi
     folder = make_study("ruled")
     study = opened(folder, stop=StopRules(no_improvement=1e9))
     with Store.open(folder) as store:
-        run_study(study, store, GaussianProcess(5), Silent())
+        run_study(study, store, make_proposer("gp", 5), Silent())
         assert len(store.trials()) == 5
     assert confirmed(folder, stop=StopRules(no_improvement=1e9))[0].episodes >= ONE
 

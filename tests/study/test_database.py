@@ -231,3 +231,32 @@ def test_a_database_that_another_program_writes_to_is_told(tmp_path, monkeypatch
     with pytest.raises(StoreError, match="another program holds it open"):
         connect(path, writable=True)
     other.close()
+
+
+def test_a_part_of_a_page_is_refused_but_not_beside_the_log_that_has_the_whole_one(tmp_path):
+    """A full disk may leave it so."""
+    path = filled(tmp_path / "study.db")
+    content = path.read_bytes()
+    path.write_bytes(content[:-1])
+    refused(path, "is damaged (its end has been cut off)")
+    path.write_bytes(content)
+    writer = connect(path, writable=True)
+    writer.execute("INSERT INTO facts VALUES ('seed', '1')")
+    with path.open("ab") as main_file:
+        main_file.write(b"?" * 100)
+    reader = connect(path, writable=False)
+    assert reader.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
+    assert reader.execute("SELECT count(*) FROM instances").fetchall() == [(3000,)]
+    reader.close()
+    writer.close()
+
+
+def test_a_file_without_tables_is_refused_and_not_begun_anew(tmp_path):
+    (tmp_path / "study.db").write_bytes(b"S")
+    refused(tmp_path / "study.db", "is damaged (it has no tables)")
+
+
+def test_a_folder_is_refused(tmp_path):
+    (tmp_path / "study.db").mkdir()
+    with pytest.raises(StoreError, match=r"study\.db: is a folder, not a study's database; move it away"):
+        connect(tmp_path / "study.db", writable=True)

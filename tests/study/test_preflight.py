@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proxytune.errors import EpisodeError
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines import make_proposer
 from proxytune.space import Interval
 from proxytune.study.preflight import LEVEL, LOOKS, PAIRS, judge, most_episodes, preflight_of, run_preflight
 from proxytune.study.progress import Silent
@@ -116,7 +116,7 @@ def test_the_trials_are_those_of_a_study_without_it(make_study, finished):
     trials = []
     for one in (folder, finished):
         with Store.open(one) as store:
-            run_study(open_study(one), store, GaussianProcess(5), Silent())
+            run_study(open_study(one), store, make_proposer("gp", 5), Silent())
             trials.append(store.trials())
     assert trials[0] == trials[1]
 

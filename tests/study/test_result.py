@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from proxytune.errors import RunError
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines import make_proposer
 from proxytune.study.evaluate import simulate
 from proxytune.study.progress import Silent
 from proxytune.study.result import result_of
@@ -21,7 +21,7 @@ def result(folder):
 def run(folder):
     study = open_study(folder)
     with Store.open(folder) as store:
-        run_study(study, store, GaussianProcess(study.settings.initial), Silent())
+        run_study(study, store, make_proposer("gp", study.settings.initial), Silent())
     return result(folder)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from proxytune.errors import EpisodeError, RunError, SettingsError
 from proxytune.search.engines import make_proposer
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.study.composition import compose_of
 from proxytune.study.history import as_trials
 from proxytune.study.progress import Silent
 from proxytune.study.run import as_stored, check_facts, run_study
@@ -17,7 +17,7 @@ def run(folder, **changes):
     study = open_study(folder)
     study = replace(study, settings=replace(study.settings, **changes))
     with Store.open(folder) as store:
-        spent = run_study(study, store, GaussianProcess(study.settings.initial), Silent())
+        spent = run_study(study, store, make_proposer("gp", study.settings.initial), Silent())
         return spent.episodes, store.trials()
 
 
@@ -66,7 +66,7 @@ def test_an_interrupted_study_loses_no_finished_episode_and_goes_on_to_the_same_
     study = replace(study, settings=replace(study.settings, jobs=jobs))
     for episodes in (5, 40, 40):
         with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-            run_study(study, store, GaussianProcess(5), Stopping(episodes))
+            run_study(study, store, make_proposer("gp", 5), Stopping(episodes))
     with sqlite3.connect(folder / "study.db") as plain:
         assert plain.execute("SELECT count(*) FROM episodes").fetchone() == (85,)
     episodes, trials = run(folder, jobs=jobs)
@@ -185,25 +185,25 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
     folder = make_study()
     study = open_study(folder)
     with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-        run_study(study, store, GaussianProcess(5), Stopping(4))
+        run_study(study, store, make_proposer("gp", 5), Stopping(4))
     make_study(seed="2")
     assert len(run(folder)[1]) == 7
 
 
-@pytest.mark.parametrize("engine", ["gp", "random", "sobol", "tpe"])
+@pytest.mark.parametrize("engine", ["gp", "composite", "random", "sobol", "tpe"])
 def test_with_every_engine_an_interrupted_study_goes_on_to_the_same_trials(make_study, engine):
     if engine == "tpe":
         pytest.importorskip("optuna")
     folders = [make_study(called, engine=f'"{engine}"') for called in ("whole", "stopped")]
     whole, stopped_one = (open_study(folder) for folder in folders)
     with Store.open(folders[0]) as store:
-        run_study(whole, store, make_proposer(engine, 5), Silent())
+        run_study(whole, store, make_proposer(engine, 5, compose_of(whole)), Silent())
         expected = store.trials()
     for episodes in (30, 70):
         with Store.open(folders[1]) as store, pytest.raises(KeyboardInterrupt):
-            run_study(stopped_one, store, make_proposer(engine, 5), Stopping(episodes))
+            run_study(stopped_one, store, make_proposer(engine, 5, compose_of(whole)), Stopping(episodes))
     with Store.open(folders[1]) as store:
-        run_study(stopped_one, store, make_proposer(engine, 5), Silent())
+        run_study(stopped_one, store, make_proposer(engine, 5, compose_of(whole)), Silent())
         assert store.trials() == expected
     assert len(expected) == 7
 

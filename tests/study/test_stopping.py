@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines import make_proposer
 from proxytune.study.progress import Silent
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
@@ -21,7 +21,7 @@ def ruled(folder, **rules):
 def run(study):
     """The trials, and why there are no more."""
     with Store.open(study.settings.folder) as store:
-        run_study(study, store, GaussianProcess(study.settings.initial), Silent())
+        run_study(study, store, make_proposer("gp", study.settings.initial), Silent())
         return store.trials(), stopped(study, store, store.trials())
 
 

@@ -37,7 +37,7 @@ def test_rules_to_stop_are_read_each_on_its_own(make_study):
     assert as_document(settings)["stop"] == {"no_improvement": 0.2}
 
 
-@pytest.mark.parametrize("engine", ["gp", "random", "sobol", "tpe"])
+@pytest.mark.parametrize("engine", ["gp", "composite", "random", "sobol", "tpe"])
 def test_a_study_names_its_engine(make_study, engine):
     assert as_document(read_study_settings(make_study(engine=f'"{engine}"')))["engine"] == engine
 
@@ -67,7 +67,7 @@ BAD = {
     "an unknown objective": ({"objective": '"prvp"'}, "objective: unknown value 'prvp'; did you mean 'prpv'?"),
     "an unknown rule": ({"on_failure": '"stopp"'}, "on_failure: unknown value 'stopp'; did you mean 'stop'?"),
     "an unknown engine": ({"engine": '"tpr"'}, "engine: unknown value 'tpr'; did you mean 'tpe'?"),
-    "an engine for comparison only": ({"engine": '"skopt"'}, "engine: unknown value 'skopt'; known are: gp"),
+    "an engine for comparison only": ({"engine": '"skopt"'}, "engine: unknown value 'skopt'; known are: composite, gp"),
     "an unknown rule to stop": (
         {"stop": "{ wall_time = 5 }"},
         "stop.wall_time: unknown key; did you mean 'wall_time_s'",

@@ -1,4 +1,4 @@
-"""What the figures of a diagnosis share: colours, axes, legends, and what models are called."""
+"""What figures share: colours, axes, legends, and what those of a diagnosis call models."""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -6,7 +6,9 @@ from matplotlib.figure import Figure
 from proxytune.diagnosis.diagnosis import Diagnosis
 
 BLUE, LIGHT_BLUE, GREEN = "#0072B2", "#56B4E9", "#009E73"  # Okabe and Ito, safe for the colour-blind
-VERMILLION, PURPLE, GREY = "#D55E00", "#CC79A7", "0.55"
+ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
+GREY, LIGHT_GREY = "0.55", "0.9"
+
 BEFORE = "declared model"
 LONGEST = 45
 """Characters of added effects that are named one by one."""

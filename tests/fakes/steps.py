@@ -1,0 +1,28 @@
+"""A score with steps over a box of two parameters, and a search of it: what the tests of the search share."""
+
+import numpy as np
+
+from proxytune.search.proposer import Trial
+from proxytune.space import Interval, Space
+
+SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
+
+
+def steps(values):
+    """An integer score with its lowest step around (0.1, 0.1), like PRPV's."""
+    return float(np.floor(40 * (abs(values[0] - 0.1) + abs(values[1] - 0.1))))
+
+
+def whole(outcomes):
+    """The score of an outcome that is the score itself."""
+    return outcomes[..., 0]
+
+
+def search(proposer, budget, seed, score=steps):
+    """The trials of an uninterrupted search."""
+    trials = []
+    for _ in range(budget):
+        values = proposer.propose(SPACE, trials, seed)
+        found = score(values)
+        trials.append(Trial(values, found, None if found is None else (found,)))
+    return trials

@@ -1,0 +1,45 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proxytune.report.importance_figure import importance_figure
+from proxytune.report.page import page
+from proxytune.report.study_document import study_document
+from proxytune.report.study_table import importance_line
+from proxytune.search.importance import Importance
+from proxytune.study.result import result_of
+from proxytune.study.store import Store
+from proxytune.study.study import open_study
+
+
+@pytest.fixture
+def result(finished):
+    with Store.read(finished) as store:
+        found = result_of(open_study(finished), store)
+    planted = (Importance("delay", 0.25, (0.1, 0.4), 0.125), Importance("trim", 0.75, (0.5, 1.0), 0.5))
+    return replace(found, importances=planted)
+
+
+def test_a_study_has_the_importance_of_each_of_its_parameters(finished):
+    with Store.read(finished) as store:
+        found = result_of(open_study(finished), store).importances
+    assert [importance.name for importance in found] == ["delay", "trim"]
+
+
+def test_bars_have_the_shares_and_their_intervals_most_important_on_top(result):
+    (axes,) = importance_figure(result).axes
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["delay", "trim"]
+    assert [bar.get_width() for bar in axes.patches] == [0.25, 0.75, 0.125, 0.5]
+    ends = [path.vertices[:, 0] for path in axes.collections[0].get_paths()]
+    assert np.allclose(ends, [(0.1, 0.4), (0.5, 1.0)])
+
+
+def test_the_document_the_table_and_the_page_say_the_same(result):
+    assert study_document(result)["importance"] == {
+        "delay": {"share": 0.25, "interval": [0.1, 0.4], "alone": 0.125},
+        "trim": {"share": 0.75, "interval": [0.5, 1.0], "alone": 0.5},
+    }
+    line = importance_line(result)
+    assert line.endswith(": trim 75% (50 to 100), delay 25% (10 to 40)")
+    assert line.replace("'", "&#x27;") in page(result, [])

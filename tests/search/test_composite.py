@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+from steps import SPACE, search, steps, whole
+
+from proxytune.errors import InputError, RunError
+from proxytune.search.composite import Composite, composed_scores
+from proxytune.search.design import design_point
+from proxytune.search.engines import make_proposer
+from proxytune.search.proposer import Trial, with_failures_as_worst
+
+
+def needle(outcomes):
+    """0 within a small box around (0.1, 0.1), 10 everywhere else: a score alone does not tell where to look."""
+    return np.where(np.abs(outcomes - 0.1).max(axis=-1) < 0.01, 0.0, 10.0)
+
+
+def told(values):
+    """A trial whose outcome is smooth: the parameters themselves."""
+    return Trial(values, float(needle(np.array(values))), values)
+
+
+def test_it_finds_at_once_what_the_score_alone_does_not_show():
+    for seed in range(3):
+        trials = [told(design_point(SPACE, index, seed)) for index in range(10)]
+        assert {trial.score for trial in trials} == {10.0}
+        for _ in range(3):
+            trials.append(told(Composite(needle).propose(SPACE, trials, seed)))
+        assert min(trial.score for trial in trials) == 0.0
+
+
+def test_a_proposal_does_not_depend_on_the_order_in_which_trials_are_told():
+    trials = search(make_proposer("composite", 5, whole), 8, seed=2)
+    assert Composite(whole).propose(SPACE, trials[::-1], 2) == Composite(whole).propose(SPACE, trials, 2)
+
+
+def test_a_failed_trial_keeps_the_search_away():
+    """Everything beyond 0.15 s fails; the search goes there less than the design would."""
+    trials = search(make_proposer("composite", 6, whole), 20, seed=1, score=lambda v: None if v[0] > 0.15 else steps(v))
+    assert sum(trial.values[0] > 0.15 for trial in trials[6:]) < 14 / 3
+
+
+def test_a_failed_trial_counts_as_the_outcome_of_the_worst_score():
+    trials = [Trial((0.1, 0.0), 3.0, (1.0,)), Trial((0.2, 0.0), None), Trial((0.3, 0.0), 8.0, (2.0,))]
+    assert [(trial.score, trial.outcome) for trial in with_failures_as_worst(trials)] == [
+        (3.0, (1.0,)),
+        (8.0, (2.0,)),
+        (8.0, (2.0,)),
+    ]
+
+
+def test_draws_agree_with_the_outcomes_at_visited_points_and_spread_elsewhere():
+    visited = np.random.default_rng(1).uniform(0.0, 0.4, (30, 2))
+    scores = composed_scores(visited, np.column_stack([100.0 + visited[:, 0], visited[:, 1]]), whole, 1)
+    assert np.allclose(scores(visited).mean(axis=0), 100.0 + visited[:, 0], atol=0.02)
+    near, far = scores(np.array([[0.2, 0.2], [1.0, 1.0]])).std(axis=0)
+    assert 5 * near < far
+
+
+def test_an_output_that_never_changes_does_no_harm():
+    trials = [Trial(trial.values, trial.score, (*trial.outcome, 60.0)) for trial in search(Composed(), 6, 1)]
+    assert len(Composite(whole).propose(SPACE, trials, 1)) == 2
+
+
+class Composed:
+    """The design alone."""
+
+    def propose(self, space, trials, seed):
+        return design_point(space, len(trials), seed)
+
+
+def test_without_an_outcome_it_says_so():
+    with pytest.raises(RunError, match="no trial has an outcome"):
+        Composite(whole).propose(SPACE, [Trial((0.1, 0.1), 3.0)], 1)
+
+
+def test_where_a_score_has_no_parts_the_engine_is_refused():
+    with pytest.raises(InputError, match="'composite' models what a score is computed from"):
+        make_proposer("composite", 3)

@@ -9,8 +9,11 @@ from proxytune.usefulness.prpv import prpv_of_means
 
 
 def trial_of(study: Study, store: Store, done: TrialRecord) -> Trial:
-    """A finished trial as the search sees it; with its outcome, unless it was cut off."""
-    found = evaluation(study, store, done.theta)
+    """A finished trial as the search sees it; with its outcome, unless it was cut off.
+
+    Of one that was, the store may happen to have every episode: other processes had begun them.
+    """
+    found = None if done.state == "cut" else evaluation(study, store, done.theta)
     outcome = None if found is None else outcome_of(study, found)
     return Trial(study.settings.space.values(done.theta), done.score, outcome)
 

@@ -92,7 +92,8 @@ def run_missing(
     settings, spent = study.settings, Spent()
     known = known_outcomes(study, store, planned)
     stop = settings.stop_on_failure
-    missing = [episode for episode in planned if episode not in known or (stop and known[episode].failure)]
+    known = {episode: outcome for episode, outcome in known.items() if not (stop and outcome.failure)}
+    missing = [episode for episode in planned if episode not in known]
     watcher.begin(what, len(planned) - len(missing))
     over = bool(enough and enough(known))
     order = longest_first(missing, store.seconds())

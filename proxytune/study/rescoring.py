@@ -6,10 +6,11 @@ from dataclasses import replace
 from proxytune.errors import InputError
 from proxytune.scores import Metric
 from proxytune.settings import nearest
+from proxytune.study.cutting import by_other_metrics
 from proxytune.study.result import StudyResult, known_evaluation, result_of
 from proxytune.study.run import record
 from proxytune.study.stopping import stopped
-from proxytune.study.store import Store
+from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study, read_target
 
 
@@ -38,5 +39,11 @@ def rescored(study: Study, store: Store, metrics: Sequence[Metric]) -> StudyResu
     """
     own = [trial for trial in store.trials() if trial.state != "open"]
     other = with_metrics(study, metrics)
-    trials = [record(trial.number, known_evaluation(other, store, trial)) for trial in own]
+    trials = [_rescored(other, store, trial) for trial in own]
     return replace(result_of(other, store, trials), stopped=stopped(study, store, own))
+
+
+def _rescored(other: Study, store: Store, trial: TrialRecord) -> TrialRecord:
+    if trial.state == "cut":
+        return by_other_metrics(other, store, trial)
+    return record(trial.number, known_evaluation(other, store, trial))

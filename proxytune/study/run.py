@@ -71,7 +71,7 @@ def check_facts(study: Study, store: Store) -> None:
     Raises:
         SettingsError: If there are finished trials and what they depend on has changed.
     """
-    before, after = store.facts(), facts(study)
+    before, after = _facts_before(study, store), facts(study)
     if before == after:
         return
     if any(trial.state != "open" for trial in store.trials()):
@@ -85,11 +85,17 @@ def as_stored(study: Study, store: Store) -> Study:
     Raises:
         SettingsError: If anything else that the finished trials depend on has changed.
     """
-    before = store.facts()
+    before = _facts_before(study, store)
     then = replace(study, identity=before.get("identity", study.identity))
     if before and before != facts(then):
         raise _changed(then, store, before)
     return then
+
+
+def _facts_before(study: Study, store: Store) -> dict[str, Any]:
+    """What the trials in the store were made by; before there was cutting off, nothing was said of it."""
+    before = store.facts()
+    return {"cut_off": study.settings.cut_off, **before} if before else {}
 
 
 def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsError:

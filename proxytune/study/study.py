@@ -15,9 +15,6 @@ from proxytune.settings import nearest
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
 
-UNSAID = {"engine": DEFAULT_ENGINE, "cut_off": False}
-"""What facts do not say."""
-
 
 @dataclass(frozen=True)
 class Study:
@@ -67,8 +64,7 @@ def facts(study: Study) -> dict[str, Any]:
     """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
 
     Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
-    identity covers it. The default engine goes without saying, as it did when there was no other, and so does that
-    trials are not cut off.
+    identity covers it. The default engine goes without saying, as it did when there was no other.
     """
     settings = study.settings
     engine = {} if settings.engine == DEFAULT_ENGINE else {"engine": settings.engine}
@@ -82,7 +78,7 @@ def facts(study: Study) -> dict[str, Any]:
         "initial": settings.initial,
         "seed": settings.seed,
         **engine,
-        **({"cut_off": True} if settings.cut_off else {}),
+        "cut_off": settings.cut_off,
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
         "identity": study.identity,
@@ -103,7 +99,8 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
 def _change(key: str, before: Any, after: Any) -> str:
     if key == "target":
         return "target (its contents)"
-    before = UNSAID.get(key) if before is None else before
+    if key == "engine" and before is None:
+        before = DEFAULT_ENGINE
     shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
     return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
 

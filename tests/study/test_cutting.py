@@ -9,11 +9,14 @@ from pathlib import Path
 import pytest
 from planted import ORDERED
 
+from proxytune.scores import Metric
 from proxytune.search.engines import make_proposer
+from proxytune.study.composition import compose_of, trial_of
 from proxytune.study.cutting import reference, spared
 from proxytune.study.evaluate import evaluation, simulate
 from proxytune.study.history import as_trials, episodes_of
 from proxytune.study.progress import Silent
+from proxytune.study.rescoring import rescored
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
 from proxytune.study.store import Store, TrialRecord
@@ -211,3 +214,31 @@ def test_a_trial_stands_on_the_episodes_of_its_decided_agents(done):
     assert {episode.agent for episode in driven} == {"agent2", "agent5"}
     assert len(driven) == 6
     assert len(episodes_of(found.study.settings, replace(trial, state="finished", decided=()))) == ALL
+
+
+def test_the_composite_engine_is_told_every_agent_s_metrics_so_nothing_is_cut_off(cutting):
+    folder = cutting(engine='"composite"', budget="7")
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        run_study(study, store, make_proposer("composite", 5, compose_of(study)), Silent())
+        assert {trial.state for trial in store.trials()} == {"finished"}
+
+
+def test_of_a_trial_that_was_cut_off_the_search_has_no_outcome_even_where_all_its_episodes_are_known(done):
+    _, trials, found = done
+    cut = next(trial for trial in trials if trial.state == "cut")
+    with Store.open(found.study.settings.folder) as store:
+        before = trial_of(found.study, store, cut)
+        simulate(found.study, store, cut.theta, Silent(), "")
+        assert trial_of(found.study, store, cut) == before
+    assert before.outcome is None
+
+
+def test_by_other_metrics_a_cut_trial_is_bounded_by_its_own_agents_and_by_its_own_it_keeps_its_bound(done):
+    _, trials, found = done
+    with Store.read(found.study.settings.folder) as store:
+        own = rescored(found.study, store, found.study.settings.metrics)
+        other = rescored(found.study, store, [Metric.parse("distance:max:2")])
+    assert [trial.bound for trial in own.trials] == [trial.bound for trial in trials]
+    assert [trial.state for trial in other.trials] == [trial.state for trial in trials]
+    assert [trial.bound for trial in other.trials] != [trial.bound for trial in trials]

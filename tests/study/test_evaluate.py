@@ -1,7 +1,18 @@
+from dataclasses import replace
+
 import pytest
 
 from proxytune.errors import EpisodeError
-from proxytune.study.evaluate import episode_seed, evaluation, longest_first, plan, score, simulate
+from proxytune.study.evaluate import (
+    episode_seed,
+    evaluation,
+    known_outcomes,
+    longest_first,
+    plan,
+    run_missing,
+    score,
+    simulate,
+)
 from proxytune.study.progress import Silent
 from proxytune.study.store import Outcome, Store
 from proxytune.study.study import open_study
@@ -101,3 +112,39 @@ def test_scoring_does_not_depend_on_the_order_of_the_outcomes(make_study):
     outcomes = [Outcome(e, study.family.run(e), "", 0.0) for e in plan(study.settings, THETA, 1)]
     forth, back = score(study, THETA, outcomes), score(study, THETA, outcomes[::-1])
     assert (forth.prpv, forth.ppv) == (back.prpv, pytest.approx(back.ppv, abs=1e-12))
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(make_study, jobs):
+    study = open_study(make_study(jobs=str(jobs)))
+    planned = plan(study.settings, THETA, 1)
+    with Store.open(study.settings.folder) as store:
+        spent = run_missing(study, store, planned, Silent(), "", lambda known: len(known) >= 5)
+        known = known_outcomes(study, store, planned)
+        assert spent.episodes == len(known)
+        assert len(known) == 5 if jobs == 1 else len(known) >= 5
+        assert run_missing(study, store, planned, Silent(), "", lambda known: len(known) >= 5).episodes == 0
+        assert run_missing(study, store, planned, Silent(), "").episodes == len(planned) - len(known)
+
+
+def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp_path):
+    journal = tmp_path / "journal"
+    study = open_study(make_study(domain={"journal": f'"{journal}"'}))
+    planned = plan(study.settings, THETA, 1)[::-1]
+    with Store.open(study.settings.folder) as store:
+        simulate(study, store, {"trim": 0.0, "delay": 0.0}, Silent(), "")  # tells which episodes take longest
+        journal.unlink()
+        run_missing(study, store, planned, Silent(), "", lambda known: False)
+    driven = [line.split()[0] for line in journal.read_text().splitlines()]
+    assert driven == [episode.agent for episode in planned]
+
+
+def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
+    folder = make_study(domain={"faults": '["agent3:1:raises"]'})
+    study = open_study(folder)
+    planned = plan(study.settings, THETA, 1)
+    with Store.open(folder) as store:
+        run_missing(study, store, planned, Silent(), "")
+        stopping = replace(study, settings=replace(study.settings, stop_on_failure=True))
+        with pytest.raises(EpisodeError, match="agent 'agent3'"):
+            run_missing(stopping, store, planned, Silent(), "", lambda known: len(known) == len(planned))

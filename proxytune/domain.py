@@ -1,8 +1,11 @@
 """What a study needs of a domain family, and nothing about how it simulates."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.space import Parameter, Theta
 
@@ -63,5 +66,51 @@ class DomainFamily(Protocol):
         Raises:
             EpisodeError: If the agent raises or answers with something that is not a command; who runs the episode
                 adds the agent's name.
+        """
+        ...
+
+
+class Demonstration(NamedTuple):
+    """What an expert has shown: samples to imitate.
+
+    Attributes:
+        observations: What an agent would have seen before each command, (samples, …).
+        commands: What the expert would do, (samples, channels).
+    """
+
+    observations: NDArray[Any]
+    commands: NDArray[np.float64]
+
+
+Policy = Callable[[NDArray[Any]], NDArray[np.float64]]
+"""What has been learnt: from one observation to one command."""
+
+
+class Classroom(DomainFamily, Protocol):
+    """A domain family that can also teach: it has an expert to imitate, and a score for who has learnt.
+
+    Attributes:
+        best_score: What a flawless episode scores.
+    """
+
+    @property
+    def best_score(self) -> float: ...  # noqa: D102 - described above
+
+    def demonstrate(self, episode: Episode, seconds: float) -> tuple[Demonstration, int]:
+        """Let the expert drive in place of the episode's agent for some time [s].
+
+        Returns:
+            The samples worth imitating, in the order of time; and how many there would be had it kept to the road.
+
+        Raises:
+            EpisodeError: If the domain fails.
+        """
+        ...
+
+    def examine(self, episode: Episode, policy: Policy) -> float:
+        """The score of a policy that drives in place of the episode's agent.
+
+        Raises:
+            EpisodeError: If the policy raises or answers with something that is not a command.
         """
         ...

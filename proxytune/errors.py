@@ -4,7 +4,8 @@
     ├── InputError           what was given cannot be used (exit status 2)
     │   ├── ScoresError      a table of scores
     │   ├── SettingsError    a study.toml, model.toml or robot.toml
-    │   └── LogError         a log of commands and poses
+    │   ├── LogError         a log of commands and poses
+    │   └── LearnerError     samples or weights that a learner cannot use
     └── RunError             something failed on the way (exit status 1)
         ├── EpisodeError     an agent or a domain failed in one episode
         ├── StoreError       study.db cannot be read or written
@@ -17,6 +18,7 @@ __all__ = [
     "BusyError",
     "EpisodeError",
     "InputError",
+    "LearnerError",
     "LogError",
     "ProxytuneError",
     "RunError",
@@ -44,6 +46,10 @@ class SettingsError(InputError):
 
 class LogError(InputError):
     """A log of commands and poses is malformed or cannot bear the question asked."""
+
+
+class LearnerError(InputError):
+    """Samples or weights that a learner cannot use."""
 
 
 class RunError(ProxytuneError):

@@ -62,6 +62,13 @@ class Section:
             raise self.error(key, f"must be between {low} and {high}, got {value}")
         return value
 
+    def flag(self, key: str, default: bool) -> bool:
+        """True or false."""
+        value = self.values.get(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"must be true or false, without quotes, got {value!r}")
+        return value
+
     def text(self, key: str, default: str | None = None, *, choices: Iterable[str] = ()) -> str:
         """A piece of text, one of the choices where there are any."""
         value = self._get(key, default)

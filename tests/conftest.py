@@ -22,6 +22,9 @@ STUDY = {
     "initial": "5",
     "seed": "1",
     "jobs": "1",
+    "preflight": "false",
+    "confirm": "0",
+    "cut_off": "false",
 }
 PARAMETERS = {"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
 TRUTH = {"trim": 0.1, "delay": 0.12}
@@ -61,6 +64,12 @@ def study_maker(parent: Path) -> MakeStudy:
 def make_study(tmp_path: Path) -> MakeStudy:
     """Write a study's folder; call it again to edit the study.toml."""
     return study_maker(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
+    """The same for studies that the tests of a module share."""
+    return study_maker(tmp_path_factory.mktemp("studies"))
 
 
 @pytest.fixture(scope="session")

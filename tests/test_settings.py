@@ -20,6 +20,7 @@ def section(path, **values):
         (lambda s: s.number("n", low=5), "n: must be between 5 and inf, got 3"),
         (lambda s: s.whole("half"), "half: must be a whole number, got 0.5"),
         (lambda s: s.whole("n", high=2), "n: must be between 0 and 2, got 3"),
+        (lambda s: s.flag("text", True), "text: must be true or false, without quotes, got 'x'"),
         (lambda s: s.text("n"), "n: must be text in quotes, got 3"),
         (lambda s: s.text("text", choices=("xy", "z")), "text: unknown value 'x'; did you mean 'xy'?"),
         (lambda s: s.texts("n"), "n: must be a list of texts in quotes"),
@@ -46,6 +47,7 @@ def test_good_values_are_taken_as_they_are(tmp_path):
     assert (s.number("n"), s.whole("n"), s.number("x"), s.text("t"), s.texts("ts")) == (3.0, 3, 0.5, "a", ("a", "b"))
     assert s.bounds("b") == (1.0, 2.5)
     assert s.section("deep").whole("k") == 1
+    assert (s.flag("yes", True), s.flag("none", False)) == (True, False)
     assert s.section("none").values == {}
     assert (s.number("gone", 2.0), s.text("gone", "d"), s.texts("gone", ("e",))) == (2.0, "d", ("e",))
 

@@ -9,13 +9,16 @@ from types import ModuleType
 
 from rich.console import Console
 
-from proxytune.cli import compare, diagnose, listing, measure, plot, predict, record, score, study, sweep
-from proxytune.errors import InputError, ProxytuneError
+from proxytune.cli import compare, diagnose, listing, measure, plot, predict, record, score, study, sweep, teach
+from proxytune.cli.answer import Answer
+from proxytune.cli.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
+from proxytune.errors import InputError, ProxytuneError, RunError
 
 COMMANDS: dict[str, tuple[ModuleType, str]] = {
     "study": (study, "run or resume a study; safe to repeat"),
     "score": (score, "usefulness of proxies from tables of scores"),
     "sweep": (sweep, "usefulness along one parameter"),
+    "teach": (teach, "learning curves and PLV: what a proxy is worth as a teacher"),
     "measure": (measure, "score a study's agents in the domain of a model file"),
     "record": (record, "drive a model file through manoeuvres and write the log"),
     "diagnose": (diagnose, "close the loop: from measured drives to the effect that the model lacks"),
@@ -25,7 +28,7 @@ COMMANDS: dict[str, tuple[ModuleType, str]] = {
     "list": (listing, "robots, effects, agents or metrics"),
 }
 
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 
 def parser() -> argparse.ArgumentParser:
@@ -46,26 +49,46 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        0 done, 1 failed, 2 bad input or usage, 130 interrupted with everything finished kept.
+        0 done, 1 failed, 2 bad input or usage; 130 interrupted (Ctrl-C) and 143 terminated (SIGTERM), with everything
+        finished kept.
     """
     arguments = parser().parse_args(argv)
     try:
-        answer = COMMANDS[arguments.command][0].run(arguments)
-        if arguments.json:
+        with sigterm_as_interrupt():
+            _print(COMMANDS[arguments.command][0].run(arguments), arguments.json)
+    except ProxytuneError as problem:
+        _complain(arguments.command, str(problem))
+        return BAD_INPUT if isinstance(problem, InputError) else FAILED
+    except KeyboardInterrupt as problem:
+        word, status = ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
+        _complain(arguments.command, f"{word}; what was finished is kept, the same command goes on")
+        return status
+    return DONE
+
+
+def _print(answer: Answer, as_json: bool) -> None:
+    """Print a command's answer on standard output, of which a reader may have seen enough.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    try:
+        if as_json:
             print(json.dumps(answer.document, indent=2, allow_nan=False, ensure_ascii=False))
         else:
             Console().print(answer.shown)
         sys.stdout.flush()
-    except ProxytuneError as problem:
-        print(f"proxytune {arguments.command}: {problem}", file=sys.stderr)
-        return BAD_INPUT if isinstance(problem, InputError) else FAILED
-    except KeyboardInterrupt:
-        print(
-            f"proxytune {arguments.command}: interrupted; what was finished is kept, the same command goes on",
-            file=sys.stderr,
-        )
-        return INTERRUPTED
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DONE
-    return DONE
+        _discard_the_rest()
+    except OSError as problem:
+        _discard_the_rest()
+        raise RunError(f"standard output: cannot be written ({problem.strerror}); make room and run again") from None
+
+
+def _discard_the_rest() -> None:
+    """What is still in the buffer would raise once more when Python ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _complain(command: str, line: str) -> None:
+    print(f"proxytune {command}: {line}", file=sys.stderr)

@@ -1,36 +1,50 @@
-"""`plot`: draw a study's figures again from study.db; nothing is simulated."""
+"""`plot`: draw a study's figures again from study.db, also by other metrics; nothing is simulated."""
 
 import argparse
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rich.console import Group, RenderableType
 from rich.text import Text
 
 from proxytune.cli.answer import Answer
 from proxytune.cli.study import draw
 from proxytune.cli.sweep import draw_curves
 from proxytune.report.study_document import study_document
-from proxytune.study.result import result_of
+from proxytune.report.study_table import study_table
+from proxytune.scores import Metric
+from proxytune.study.rescoring import rescored, with_metrics
+from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import as_stored
 from proxytune.study.store import Store
-from proxytune.study.study import open_study
-from proxytune.study.sweep import all_curves
+from proxytune.study.study import Study, open_study
+from proxytune.study.sweep import Curve, all_curves
+
+RESCORED = "rescored"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study."""
+    """Add the study, and other metrics."""
     parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder, also while the study runs")
+    parser.add_argument(
+        "--metric",
+        action="append",
+        default=[],
+        metavar="NAME:max|min[:TOLERANCE]",
+        help="score every trial and sweep by this instead of the study's metrics; repeat it for several; figures and"
+        f" report go to PATH/{RESCORED}/METRICS, the study's own stay as they are",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """Draw the study's own figures, the report and every finished sweep."""
+    """Draw the study's figures, the report and every finished sweep; by other metrics into a folder of their own."""
+    metrics = [Metric.parse(text) for text in arguments.metric]
     opened = open_study(arguments.path)
-    folder = opened.settings.folder
-    with Store.read(folder) as store:
-        study = as_stored(opened, store)
-        curves = all_curves(study, store)
-        only_swept = bool(curves) and not store.trials()
-        result = None if only_swept else result_of(study, store)
+    with Store.read(opened.settings.folder) as store:
+        result, curves = _found(as_stored(opened, store), store, metrics)
+    folder = _folder(opened.settings.folder, metrics)
     figures = draw_curves(curves, folder / "figures")
     document: dict[str, Any] = {}
     if result:
@@ -38,4 +52,25 @@ def run(arguments: argparse.Namespace) -> Answer:
         figures = [*drawn, *figures]
         document = {**study_document(result), "report": str(report)}
     paths = [str(path) for path in figures]
-    return Answer({**document, "figures": paths}, Text("\n".join([*paths, *([document["report"]] if result else [])])))
+    files = Text("\n".join([*paths, *([document["report"]] if result else [])]))
+    return Answer({**document, "figures": paths}, _by_other_metrics(result, files) if result and metrics else files)
+
+
+def _found(study: Study, store: Store, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:
+    """The study's result, if it has any trial or no sweep either, and its curves."""
+    curves = all_curves(with_metrics(study, metrics) if metrics else study, store)
+    if curves and not store.trials():
+        return None, curves
+    return rescored(study, store, metrics) if metrics else result_of(study, store), curves
+
+
+def _folder(study: Path, metrics: Sequence[Metric]) -> Path:
+    """Where figures go: another folder for every other choice of metrics."""
+    names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
+    return study / RESCORED / "+".join(names) if names else study
+
+
+def _by_other_metrics(result: StudyResult, files: Text) -> RenderableType:
+    named = ", ".join(str(metric) for metric in result.study.settings.metrics)
+    note = f"scored by {named}; nothing simulated, and the trials are still those that the study's own metrics led to"
+    return Group(study_table(result, note, {}), files)

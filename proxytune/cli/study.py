@@ -1,6 +1,7 @@
 """`study`: run or resume a study, and sum it up."""
 
 import argparse
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,13 @@ from proxytune.report.study_table import study_table
 from proxytune.report.writing import save, write_text
 from proxytune.search.engines import make_proposer
 from proxytune.search.proposer import Proposer
+from proxytune.study import confirmation, preflight
 from proxytune.study.composition import compose_of
 from proxytune.study.evaluate import Spent
 from proxytune.study.lock import locked
-from proxytune.study.progress import Bars
+from proxytune.study.progress import Bars, Watcher
 from proxytune.study.result import StudyResult, result_of
-from proxytune.study.run import run_study
+from proxytune.study.run import check_facts, run_study
 from proxytune.study.store import Store
 from proxytune.study.study import Study, open_study
 
@@ -41,16 +43,29 @@ def run(arguments: argparse.Namespace) -> Answer:
     study = open_study(folder)
     settings = study.settings
     proposer = _proposer(study)
-    episodes = settings.budget * len(settings.agents) * settings.starts
+    episodes = preflight.most_episodes(settings) + confirmation.most_episodes(settings)
+    episodes += settings.budget * len(settings.agents) * settings.starts
     with locked(folder), Store.open(folder) as store:
         with Bars(episodes) as bars:
-            spent = run_study(study, store, proposer, bars)
+            spent = _prepared(study, store, bars)
+            spent += run_study(study, store, proposer, bars)
+            spent += confirmation.run_confirmation(study, store, bars)
         result = result_of(study, store)
     figures, report = draw(result, folder)
     costs = _costs(result, spent, time.perf_counter() - begun)
     document = {**study_document(result), **costs, "figures": [str(path) for path in figures], "report": str(report)}
     files = {"figure": figures[0], "report": report}
     return Answer(document, study_table(result, _told(costs), files))
+
+
+def _prepared(study: Study, store: Store, watcher: Watcher) -> Spent:
+    """Run the pre-flight and say at once which parameters do nothing: the study may be stopped for that."""
+    check_facts(study, store)
+    spent = preflight.run_preflight(study, store, watcher)
+    found = preflight.preflight_of(study, store) if spent.episodes else None
+    for warning in found.warnings if found else ():
+        print(f"proxytune study: {warning}", file=sys.stderr)
+    return spent
 
 
 def _proposer(study: Study) -> Proposer:
@@ -83,7 +98,7 @@ def _costs(result: StudyResult, spent: Spent, total: float) -> dict[str, Any]:
     return {
         "episodes": {
             "run": spent.episodes,
-            "reused": result.episodes - spent.episodes,
+            "reused": result.episodes - (spent.episodes - spent.unused),
             "failed": result.failed_episodes,
         },
         "seconds": {

@@ -11,7 +11,7 @@ from proxytune.settings import nearest
 from proxytune.shipped import shipped
 from proxytune.study.settings import FILE_NAME
 
-MADE = ("study.db*", "study.lock", "figures", "report.html", "__pycache__")
+MADE = ("study.db*", "study.lock", "figures", "rescored", "teaching", "report.html", "__pycache__")
 """What running a study adds: not copied."""
 
 

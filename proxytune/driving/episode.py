@@ -3,12 +3,12 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.agents import Agent, Command, Picture
+from proxytune.driving.agents import Command, Picture
 from proxytune.driving.cameras import Camera
 from proxytune.driving.drivetrain import Drivetrain
 from proxytune.driving.plant import Plant
@@ -39,6 +39,30 @@ class Instance:
     measurement: Chain
 
 
+class Sight(NamedTuple):
+    """What an expert sees, who need not make do with the picture.
+
+    Attributes:
+        picture: The newest picture.
+        pose: Where the robot truly is, (3,): x [m], y [m], heading [rad].
+    """
+
+    picture: Picture
+    pose: Signal
+
+
+class Driver(Protocol):
+    """Who drives: an agent, who sees pictures, or an expert, who sees the pose as well."""
+
+    def begin(self, robot: Robot, /) -> Any:
+        """The memory before the first command."""
+        ...
+
+    def act(self, seen: Any, memory: Any, /) -> tuple[Command, Any]:
+        """The next command, and the memory for the one after it."""
+        ...
+
+
 class Drive(NamedTuple):
     """What an episode leaves behind.
 
@@ -46,7 +70,7 @@ class Drive(NamedTuple):
         poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
         commands: What the agent issued, (control steps, 2).
         crashed: Whether it ended by hitting something or falling over.
-        memory: What the agent remembered in the end.
+        memory: What the driver remembered in the end.
     """
 
     poses: Signal
@@ -100,8 +124,26 @@ class _View:
         return np.asarray(signal[-1].reshape(self._shape))
 
 
-def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Drive:
+def picture_only(picture: Picture, pose: Signal) -> Picture:
+    """All that an agent sees."""
+    return picture
+
+
+def drive(
+    instance: Instance,
+    plant: Plant,
+    driver: Driver,
+    course: Course,
+    sees: Callable[[Picture, Signal], Any] = picture_only,
+) -> Drive:
     """Drive until the time is over, the robot crashes or the course ends.
+
+    Args:
+        instance: What bends commands, motion and pictures.
+        plant: What moves, at its start.
+        driver: Who drives.
+        course: What it drives.
+        sees: What the driver is shown of the picture and the true pose; an expert's is `Sight`.
 
     Raises:
         EpisodeError: If the agent raises, or its answer is not two finite duties.
@@ -110,10 +152,11 @@ def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Dri
     hold = round(TICK_HZ / figures["control_rate"])
     memory = instance.drivetrain.begin(Setting(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:]))
     view = _View(instance, course.start, course.seed)
-    driver = _begin(agent, instance.robot)
-    poses, commands, crashed = [course.start[None]], [], False
+    remembered = _begin(driver, instance.robot)
+    moved, crashed = course.start[None], False
+    poses, commands = [moved], []
     for step in range(round(course.seconds * figures["control_rate"])):
-        command, driver = _ask(agent, view.picture, driver, step / figures["control_rate"])
+        command, remembered = _ask(driver, sees(view.picture, moved[-1]), remembered, step / figures["control_rate"])
         twists, memory = instance.drivetrain.apply(np.repeat(command[None], hold, axis=0), memory)
         moved, crashed = plant.move(twists)
         view.pass_by(moved)
@@ -121,7 +164,7 @@ def drive(instance: Instance, plant: Plant, agent: Agent, course: Course) -> Dri
         commands.append(command)
         if crashed or course.ended(float(moved[-1, 0]), float(moved[-1, 1])):
             break
-    return Drive(np.concatenate(poses), np.array(commands), crashed, driver)
+    return Drive(np.concatenate(poses), np.array(commands), crashed, remembered)
 
 
 def measured(instance: Instance, poses: Signal, seed: int) -> Signal:
@@ -130,16 +173,16 @@ def measured(instance: Instance, poses: Signal, seed: int) -> Signal:
     return instance.measurement.apply(poses, instance.measurement.begin(setting))[0]
 
 
-def _begin(agent: Agent, robot: Robot) -> Any:
+def _begin(driver: Driver, robot: Robot) -> Any:
     try:
-        return agent.begin(robot)
+        return driver.begin(robot)
     except Exception as problem:
         raise EpisodeError(f"raised {type(problem).__name__} before the first picture: {problem}") from problem
 
 
-def _ask(agent: Agent, picture: Picture, memory: Any, time_s: float) -> tuple[Command, Any]:
+def _ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command, Any]:
     try:
-        answer, memory = agent.act(picture, memory)
+        answer, memory = driver.act(seen, memory)
         command = np.asarray(answer, dtype=float)
     except Exception as problem:
         raise EpisodeError(f"raised {type(problem).__name__} at {time_s:.2f} s: {problem}") from problem

@@ -2,24 +2,26 @@
 
 import functools
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.domain import Episode
+from proxytune.domain import Demonstration, Episode, Policy
 from proxytune.driving import task
-from proxytune.driving.agents import Agent
+from proxytune.driving.agents import Picture
 from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.agents.playback import Playback
+from proxytune.driving.agents.pupil import Pupil
 from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
-from proxytune.driving.episode import TICK_HZ, Course, Drive, Instance, drive, measured
+from proxytune.driving.episode import TICK_HZ, Course, Drive, Driver, Instance, Sight, drive, measured, picture_only
+from proxytune.driving.expert import Expert
 from proxytune.driving.lane import off_map
 from proxytune.driving.maps import MAPS
 from proxytune.driving.planar import PlanarPlant
@@ -131,8 +133,40 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        course = Course(self._start(episode), self.seconds, episode.seed, functools.partial(off_map, MAPS[self.map]))
-        return self._drive(episode, load_agent(episode.agent, self.folder), course)
+        return self._drive(episode, load_agent(episode.agent, self.folder), self._course(episode, self.seconds))
+
+    @property
+    def best_score(self) -> float:
+        """Both wheels in the lane until time is over."""
+        return self.seconds
+
+    def demonstrate(self, episode: Episode, seconds: float) -> tuple[Demonstration, int]:
+        """Let the robot's expert drive for some time [s]; steps off the road are not worth imitating.
+
+        Raises:
+            SettingsError: If the robot has no expert.
+        """
+        robot = read_robot(self.robot)
+        expert = Expert(MAPS[self.map], *robot.expert_figures(), seed=episode.seed)
+        shown = self._drive(episode, expert, self._course(episode, seconds), Sight).memory
+        kept = np.array(shown.on_road)
+        samples = Demonstration(np.stack(shown.pictures)[kept], np.stack(shown.commands)[kept])
+        return samples, round(seconds * robot.figures["control_rate"])
+
+    def examine(self, episode: Episode, policy: Policy) -> float:
+        """The paper's driving score of a policy, from −`seconds` to `seconds`.
+
+        Raises:
+            EpisodeError: If the policy raises or does not answer with two finite duties.
+        """
+        driven = self._drive(episode, Pupil(policy), self._course(episode, self.seconds))
+        return task.driving_score(
+            MAPS[self.map],
+            driven.poses,
+            wheel_distance=read_robot(self.robot).figures["wheel_distance"],
+            tick_s=1.0 / TICK_HZ,
+            seconds=self.seconds,
+        )
 
     def measured(self, episode: Episode, driven: Drive) -> Signal:
         """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
@@ -152,10 +186,15 @@ class LaneFollowing:
         noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
         return np.asarray(task.start_pose(MAPS[self.map], episode.start, seed=episode.seed, **noise))
 
-    def _drive(self, episode: Episode, agent: Agent, course: Course) -> Drive:
+    def _course(self, episode: Episode, seconds: float) -> Course:
+        return Course(self._start(episode), seconds, episode.seed, functools.partial(off_map, MAPS[self.map]))
+
+    def _drive(
+        self, episode: Episode, driver: Driver, course: Course, sees: Callable[[Picture, Signal], Any] = picture_only
+    ) -> Drive:
         instance = self.instance(dict(episode.theta))
         with self.plant_at(instance.robot, course.start) as plant:
-            return drive(instance, plant, agent, course)
+            return drive(instance, plant, driver, course, sees)
 
     def instance(self, theta: Theta) -> Instance:
         """The domain instance S_θ: nominal effects, then the family's, then θ."""

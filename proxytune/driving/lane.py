@@ -72,6 +72,27 @@ def lane_pose(road: LoopMap, positions: Values, headings: Values) -> LanePose:
     )
 
 
+def lane_point(road: LoopMap, counter_clockwise: Flags | bool, along: Values | float) -> Values:
+    """Where on the map a lane's centre line is after so much of a lap: `lane_pose` the other way round.
+
+    Args:
+        road: The map.
+        counter_clockwise: Whether it is the outer lane, else the inner one.
+        along: Arc length in the lane's direction [m], shape (…); whole laps make no difference.
+
+    Returns:
+        x and y [m], shape (…, 2).
+    """
+    edge, radius = (road.tiles - 2) * road.tile, _corner_radius(road, counter_clockwise)
+    quarter = edge + radius * np.pi / 2.0
+    side, past = np.divmod(np.where(counter_clockwise, along, -np.asarray(along)), quarter)
+    turned = np.clip(past - edge, 0.0, None) / radius
+    out = edge / 2.0 + radius * np.cos(turned)
+    up = np.minimum(past, edge) - edge / 2.0 + radius * np.sin(turned)
+    cosine, sine = np.cos(side * np.pi / 2.0), np.sin(side * np.pi / 2.0)
+    return np.stack((cosine * out - sine * up, sine * out + cosine * up), axis=-1) + road.side / 2.0
+
+
 def off_map(road: LoopMap, x: float, y: float) -> bool:
     """Whether a point [m] lies beyond the map's edge; a point that is not a number does."""
     return not (0.0 <= x <= road.side and 0.0 <= y <= road.side)

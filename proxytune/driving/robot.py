@@ -32,6 +32,10 @@ UNITS: Mapping[str, str] = MappingProxyType(
         "camera_height": "m",
         "camera_pitch": "deg",
         "field_of_view": "deg",
+        "expert_look_ahead": "m",
+        "expert_speed": "m/s",
+        "expert_gain": "",
+        "expert_disturbance": "duty",
     }
 )
 """Every figure that a robot.toml may state, with its unit."""
@@ -52,6 +56,9 @@ CAMERA = (
     "field_of_view",
 )
 """What an agent's view needs."""
+
+EXPERT = ("expert_look_ahead", "expert_speed", "expert_gain", "expert_disturbance")
+"""What the expert that teaches to drive it needs."""
 
 WITHOUT_BODY = 'use plant = "planar"'
 
@@ -104,6 +111,16 @@ class Robot:
             field_of_view_deg=figures["field_of_view"],
             k1=0.0,
         )
+
+    def expert_figures(self) -> tuple[float, float, float, float]:
+        """Look-ahead [m], speed [m/s], gain and disturbance [duty] of the expert that teaches to drive this robot.
+
+        Raises:
+            SettingsError: If the robot has none.
+        """
+        self._need(EXPERT, "expert", "add them, or teach with a robot that has one")
+        look_ahead, speed, gain, disturbance = (self.figures[name] for name in EXPERT)
+        return look_ahead, speed, gain, disturbance
 
     def _need(self, names: tuple[str, ...], part: str, otherwise: str) -> None:
         missing = [name for name in names if name not in self.figures]

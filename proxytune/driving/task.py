@@ -78,6 +78,30 @@ def score_trajectory(road: LoopMap, poses: Values, *, tick_s: float, seconds: fl
     }
 
 
+def driving_score(road: LoopMap, poses: Values, *, wheel_distance: float, tick_s: float, seconds: float) -> float:
+    """Score a drive as the paper's learning experiment does: seconds driven, less those with a wheel out of the lane.
+
+    Each second with one wheel outside the lane takes one off, each with both wheels two, so 60 s are worth −60 to 60.
+    It ends where the robot leaves the map. Standing still in the lane counts as driving, as it does in the paper.
+
+    Args:
+        road: The map.
+        poses: x [m], y [m], heading [rad] at a constant rate, shape (samples, 3).
+        wheel_distance: Distance between the wheels [m].
+        tick_s: Time between two poses [s].
+        seconds: When time is over [s].
+
+    Raises:
+        EpisodeError: If a pose is not finite.
+    """
+    driven = _driven(road, poses, tick_s=tick_s, seconds=seconds)
+    headings = driven[:, 2]
+    aside = wheel_distance / 2.0 * np.stack((-np.sin(headings), np.cos(headings)), axis=-1)
+    wheels = np.stack((driven[:, :2] + aside, driven[:, :2] - aside))
+    out = np.abs(lane_pose(road, wheels, np.stack((headings, headings))).deviation) > road.lane_width / 2.0
+    return tick_s * float(np.sum(1.0 - _over_steps(out.sum(axis=0).astype(float))))
+
+
 def _driven(road: LoopMap, poses: Values, *, tick_s: float, seconds: float) -> Values:
     """The poses until time is over or the first one is off the map, that one included."""
     in_time = poses[: math.floor(seconds / tick_s + 1e-9) + 1]  # 1e-9: a whole number of ticks may divide to just less

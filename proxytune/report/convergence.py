@@ -13,7 +13,8 @@ def convergence(result: StudyResult) -> Figure:
     """Draw the observed PRPV of every trial and the lowest so far, with the target's noise floor and chance level.
 
     Filled points were proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that
-    failed; the ring is the best θ, which is the surrogate's and need not be the lowest point.
+    failed, triangles what PRPV of those cut off cannot be below; the ring is the best θ, which is the surrogate's and
+    need not be the lowest point.
     """
     figure = Figure(figsize=(5.2, 3.2), layout="constrained")
     axes = figure.subplots()
@@ -41,12 +42,15 @@ def _levels(axes: Axes, result: StudyResult) -> None:
 
 def _trials(axes: Axes, result: StudyResult) -> None:
     scored = [(trial.number, trial.prpv) for trial in result.trials if trial.prpv is not None]
-    failed = [trial.number for trial in result.trials if trial.prpv is None]
+    failed = [trial.number for trial in result.trials if trial.state == "failed"]
+    bounds = [(trial.number, trial.bound) for trial in result.trials if trial.bound is not None]
     initial = result.study.settings.initial
     _points(axes, [point for point in scored if point[0] <= initial], "white", "design")
     _points(axes, [point for point in scored if point[0] > initial], BLUE, "proposed")
     if failed:
         axes.plot(failed, np.zeros(len(failed)), "x", color=VERMILLION, markersize=4, label="failed")
+    if bounds:
+        axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="cut off, at least")
     numbers, scores = zip(*scored, strict=True)
     lowest = np.minimum.accumulate(scores)
     last = result.trials[-1].number

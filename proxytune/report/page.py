@@ -65,7 +65,8 @@ def _meaning(result: StudyResult) -> str:
     agents = len(result.study.settings.agents)
     return (
         f"PRPV counts how unlike the target the proxy ranks the {agents} agents, over ordered pairs. "
-        "The best θ is the visited one with the lowest mean of the surrogate given all trials."
+        "The best θ is the visited one with the lowest mean of the surrogate given all trials, and fresh episodes "
+        "where they were driven."
     )
 
 
@@ -76,6 +77,8 @@ def _trials(result: StudyResult) -> list[tuple[str, ...]]:
 def _trial_row(trial: TrialRecord, names: tuple[str, ...]) -> tuple[str, ...]:
     theta = (f"{trial.theta[name]:.4g}" for name in names)
     prpv = "failed" if trial.prpv is None else f"{trial.prpv:g}"
+    if trial.bound is not None:
+        prpv = f"cut off, at least {trial.bound:g}"
     ppv = "" if trial.ppv is None else f"{trial.ppv:.3g}"
     return (str(trial.number), *theta, prpv, ppv, str(trial.failed_episodes))
 

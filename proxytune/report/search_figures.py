@@ -59,14 +59,15 @@ def _profile(axes: Axes, profile: Profile, result: StudyResult) -> None:
 def evaluations_figure(result: StudyResult) -> Figure:
     """Draw where the trials went: each pair of parameters below the diagonal, each parameter's histogram on it.
 
-    The darker a point, the lower its PRPV; crosses are trials that failed; the ring is the best θ.
+    The darker a point, the lower its PRPV, or its estimate where a trial was cut off; crosses are trials that failed;
+    the ring is the best θ.
     """
     intervals = result.study.settings.space.intervals
     count = len(intervals)
     side = max(3.4, 1.5 * count + 0.7)
     figure = Figure(figsize=(side, side * 0.9), layout="constrained")
     panels = figure.subplots(count, count, squeeze=False)
-    scores = [trial.prpv for trial in result.trials if trial.prpv is not None]
+    scores = [trial.score for trial in result.trials if trial.score is not None]
     norm = Normalize(min(scores), max(scores))
     for row in range(count):
         for column in range(count):
@@ -93,8 +94,8 @@ def _histogram(axes: Axes, result: StudyResult, place: int) -> None:
 def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normalize) -> None:
     names = [result.study.settings.space.names[place] for place in places]
     points = np.array([[trial.theta[name] for name in names] for trial in result.trials])
-    scored = np.array([trial.prpv is not None for trial in result.trials])
-    scores = [trial.prpv for trial in result.trials if trial.prpv is not None]
+    scored = np.array([trial.score is not None for trial in result.trials])
+    scores = [trial.score for trial in result.trials if trial.score is not None]
     across, up = points[scored].T
     axes.scatter(across, up, c=scores, cmap=COLOURS, norm=norm, s=14, linewidths=0, clip_on=False)
     across, up = points[~scored].T

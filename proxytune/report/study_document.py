@@ -4,6 +4,8 @@ from typing import Any
 
 from proxytune.report.score_document import document_of
 from proxytune.search.importance import Importance
+from proxytune.study.confirmation import Confirmation
+from proxytune.study.preflight import Preflight
 from proxytune.study.result import StudyResult
 from proxytune.study.settings import as_document
 from proxytune.study.store import TrialRecord
@@ -24,13 +26,16 @@ def study_document(result: StudyResult) -> dict[str, Any]:
             "prpv_normalised": measures["prpv_normalised"],
             "prpv_interval": measures["prpv_interval"],
             "ppv": measures["ppv"],
+            "fresh": _fresh(result.confirmation),
             "posterior_mean": best.posterior_mean,
             "posterior_deviation": best.posterior_deviation,
             "usefulness": measures,
         },
         **{key: measures[key] for key in shared},
         "importance": {found.name: _importance(found) for found in result.importances},
+        "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
+        "cut_off": {"trials": len(result.cut), "episodes": result.spared[0], "seconds": result.spared[1]},
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
         "target": _target(result),
@@ -42,6 +47,35 @@ def _importance(found: Importance) -> dict[str, Any]:
     return {"share": found.share, "interval": list(found.interval), "alone": found.alone}
 
 
+def _fresh(found: Confirmation | None) -> dict[str, Any] | None:
+    """What fresh episodes say of the answer and of its rivals."""
+    if found is None:
+        return None
+    measures = document_of(found.answer.assessment) if found.answer.assessment else {}
+    return {
+        **{key: measures.get(key) for key in ("prpv", "prpv_normalised", "prpv_interval", "ppv")},
+        "optimism": found.answer.optimism,
+        "episodes": found.episodes,
+        "candidates": [
+            {"index": one.trial.number, "prpv": round(one.trial.prpv or 0.0), "fresh_prpv": list(one.scores)}
+            for one in found.candidates
+        ],
+    }
+
+
+def _preflight(found: Preflight | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    keys = ("moves", "p_value", "metric", "change", "noise", "pairs")
+    moved = {one.interval.name: {key: getattr(one, key) for key in keys} for one in found.movements}
+    return {
+        "base": dict(found.base),
+        "episodes": found.episodes,
+        "parameters": moved,
+        "warnings": list(found.warnings),
+    }
+
+
 def _trial(trial: TrialRecord) -> dict[str, Any]:
     return {
         "index": trial.number,
@@ -50,7 +84,14 @@ def _trial(trial: TrialRecord) -> dict[str, Any]:
         "ppv": trial.ppv,
         "failed_episodes": trial.failed_episodes,
         "failure": trial.failure or None,
+        "cut_off": _cut(trial),
     }
+
+
+def _cut(trial: TrialRecord) -> dict[str, Any] | None:
+    if trial.state != "cut":
+        return None
+    return {"prpv_at_least": trial.bound, "prpv_estimate": trial.estimate, "agents": list(trial.decided)}
 
 
 def _target(result: StudyResult) -> dict[str, Any]:

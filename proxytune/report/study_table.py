@@ -25,10 +25,27 @@ def best_theta(result: StudyResult) -> list[tuple[str, str, str, str]]:
 
 
 def identity_lines(result: StudyResult) -> list[str]:
-    """Which parameters PRPV does not see, and how the study came to its end; nothing where there is nothing to say."""
+    """What the pre-flight found, which parameters PRPV does not see, what was cut off, and how the study ended."""
     names = ", ".join(result.unidentified)
     unseen = [f"unidentified: {names}; any value in the box is as good, beyond noise"] if names else []
-    return [*unseen, *([f"stopped: {result.stopped}"] if result.stopped else [])]
+    ended = [f"stopped: {result.stopped}"] if result.stopped else []
+    return [*preflight_lines(result), *unseen, *cut_lines(result), *ended]
+
+
+def cut_lines(result: StudyResult) -> list[str]:
+    """How many trials were cut off and what that spared; nothing where none was."""
+    if not result.cut:
+        return []
+    episodes, seconds = result.spared
+    saved = f"{episodes} episodes, about {seconds:.3g} s of simulation, saved"
+    return [f"cut off, since they could not be among the best: {len(result.cut)} trials; {saved}"]
+
+
+def preflight_lines(result: StudyResult) -> list[str]:
+    """Which parameters do nothing beyond noise, or that all do; nothing where there was no pre-flight."""
+    if result.preflight is None:
+        return []
+    return [*result.preflight.warnings] or ["pre-flight: every parameter changes the metrics beyond noise"]
 
 
 def importance_line(result: StudyResult) -> str:
@@ -48,7 +65,7 @@ def usefulness_lines(result: StudyResult) -> list[str]:
     inner, floor = found.prpv_interval, found.noise_floor
     interval = "" if inner.low is None else f", interval {inner.low:.1f} to {inner.high:.1f}"
     worst = found.prpv.range[1]
-    lines = [f"PRPV {found.prpv.value} of at most {worst}{interval}; lower is better"]
+    lines = [f"PRPV {found.prpv.value} of at most {worst}{interval}; lower is better", *fresh_lines(result)]
     if found.ppv.value is not None:
         lines.append(f"PPV {found.ppv.value:.3g}; lower is better")
     if floor.value is not None:
@@ -57,11 +74,25 @@ def usefulness_lines(result: StudyResult) -> list[str]:
     return [*lines, *found.notes, *failure_lines(result)]
 
 
+def fresh_lines(result: StudyResult) -> list[str]:
+    """PRPV of the best θ on fresh episodes, and how much of the search's own was luck; nothing without them."""
+    if result.confirmation is None:
+        return []
+    answer, rivals = result.confirmation.answer, len(result.confirmation.candidates) - 1
+    if answer.assessment is None or answer.optimism is None:
+        return ["fresh episodes: no PRPV, since an agent failed in all of them"]
+    inner = answer.assessment.prpv_interval
+    interval = "" if inner.low is None else f", interval {inner.low:.1f} to {inner.high:.1f}"
+    luck = f"{answer.optimism:.3g} of it was luck" if answer.optimism > 0 else "it was not luck"
+    compared = f"; confirmed against {rivals} θ nearly as good" if rivals else ""
+    return [f"on fresh episodes PRPV {answer.assessment.prpv.value}{interval}: {luck}{compared}"]
+
+
 def failure_lines(result: StudyResult) -> list[str]:
     """How many episodes and trials failed, and the first of them; nothing where none did."""
     if not result.failed_episodes:
         return []
-    failed_trials = sum(trial.prpv is None for trial in result.trials)
+    failed_trials = sum(trial.state == "failed" for trial in result.trials)
     trials = f", and with them {failed_trials} of {len(result.trials)} trials" if failed_trials else ""
     head = f"{result.failed_episodes} of {result.episodes} episodes failed{trials}; the first:"
     return [head, *(f"  {line}" for line in result.failures)]

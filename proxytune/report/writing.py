@@ -34,7 +34,9 @@ def _whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write(draft)
         draft.replace(path)
-    except OSError as problem:
+    except BaseException as problem:
         with contextlib.suppress(OSError):
             draft.unlink()
-        raise RunError(f"{path}: {what}cannot be written ({problem.strerror})") from None
+        if not isinstance(problem, OSError):
+            raise
+        raise RunError(f"{path}: {what}cannot be written ({problem.strerror}); mend that and run again") from None

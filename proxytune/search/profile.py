@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.search.design import from_unit, unit_points
+from proxytune.search.proposer import Values
 from proxytune.search.surrogate import Array, Surrogate, unit_array
 
 GRID = 31
@@ -64,10 +65,11 @@ class Profile:
         return bool((self.lowest - self.incumbent <= LEVEL * self.deviation).all())
 
 
-def profiles(surrogate: Surrogate) -> tuple[Profile, ...]:
-    """The profile of every parameter, in the order of the box: a function of the surrogate alone."""
-    values, incumbent = surrogate.incumbent()
+def profiles(surrogate: Surrogate, answer: Values | None = None) -> tuple[Profile, ...]:
+    """The profile of every parameter, in the order of the box, against the answer or, without one, the incumbent."""
+    values = surrogate.incumbent()[0] if answer is None else answer
     best = unit_array(surrogate.space, [values])[0]
+    incumbent = float(surrogate.mean(best[None])[0])
     return tuple(_profile(surrogate, column, best, incumbent) for column in range(len(best)))
 
 

@@ -9,10 +9,10 @@ from proxytune.usefulness.prpv import prpv_of_means
 
 
 def trial_of(study: Study, store: Store, done: TrialRecord) -> Trial:
-    """A finished trial as the search sees it; with its outcome."""
+    """A finished trial as the search sees it; with its outcome, unless it was cut off."""
     found = evaluation(study, store, done.theta)
     outcome = None if found is None else outcome_of(study, found)
-    return Trial(study.settings.space.values(done.theta), done.prpv, outcome)
+    return Trial(study.settings.space.values(done.theta), done.score, outcome)
 
 
 def outcome_of(study: Study, found: Evaluation) -> Values | None:

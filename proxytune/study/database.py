@@ -4,9 +4,11 @@ The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_versi
 
     facts      key, value (JSON)                  what determines the trials: settings, target and domain family
     instances  id, identity, theta (JSON)         domain instances S_θ: the family's identity and the parameters
-    trials     number (from 1), instance, state   'open', 'finished' or 'failed'
+    trials     number (from 1), instance, state   'open', 'finished', 'failed' or 'cut'
                prpv, ppv, failed_episodes         its scores, and how many of its episodes failed
                failure                            why it has no score
+               decided (JSON), bound, estimate    of one that was cut off: the agents driven, what its PRPV cannot be
+                                                  below, what it is expected to be
     episodes   instance, agent, start, seed       what determines an episode: the key, so none is ever run twice
                metrics (JSON) or failure          what it scored, or why it failed
                seconds                            how long it took
@@ -18,18 +20,19 @@ The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_versi
 `study.db-wal` first (SQLite's write-ahead log: a commit costs no wait for the disk, and survives a `kill -9`). That
 file belongs to study.db until the next clean end of a run, which leaves the one file.
 
-Format 1 had neither `target_model` nor `replays`. It is still read, and becomes format 2 when next written to; its
-sweeps are then drawn again without POD until they are asked for once more, which simulates nothing anew.
+Earlier formats are still read, and become the present one when next written to. Format 1 had neither `target_model`
+nor `replays`; its sweeps are drawn again without POD until they are asked for once more, which simulates nothing anew.
+Up to format 2 no trial was cut off.
 """
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from proxytune.errors import StoreError
 
-FORMAT = 2
+FORMAT = 3
 APPLICATION = 0x70747564  # "ptud"
 PATIENCE_S = 30.0
 
@@ -38,15 +41,18 @@ CREATE TABLE sweeps (
     number INTEGER PRIMARY KEY, parameter TEXT NOT NULL, base TEXT NOT NULL, points TEXT NOT NULL,
     identity TEXT NOT NULL, target_model TEXT NOT NULL DEFAULT '', replays TEXT NOT NULL DEFAULT '',
     UNIQUE (parameter, base, points, identity, replays));"""
+TRIALS = """
+CREATE TABLE trials (
+    number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
+    state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed', 'cut')),
+    prpv REAL, ppv REAL, failed_episodes INTEGER NOT NULL DEFAULT 0, failure TEXT NOT NULL DEFAULT '',
+    decided TEXT NOT NULL DEFAULT '[]', bound REAL, estimate REAL);"""
 SCHEMA = f"""
 BEGIN;
 CREATE TABLE facts (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE instances (
     id INTEGER PRIMARY KEY, identity TEXT NOT NULL, theta TEXT NOT NULL, UNIQUE (identity, theta));
-CREATE TABLE trials (
-    number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
-    state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed')),
-    prpv REAL, ppv REAL, failed_episodes INTEGER NOT NULL DEFAULT 0, failure TEXT NOT NULL DEFAULT '');
+{TRIALS}
 CREATE TABLE episodes (
     instance INTEGER NOT NULL REFERENCES instances (id), agent TEXT NOT NULL, start INTEGER NOT NULL,
     seed INTEGER NOT NULL, metrics TEXT, failure TEXT, seconds REAL NOT NULL,
@@ -57,20 +63,29 @@ PRAGMA user_version = {FORMAT};
 COMMIT;
 """
 FROM_1 = f"""
-BEGIN;
 ALTER TABLE sweeps RENAME TO sweeps_1;
 {SWEEPS}
 INSERT INTO sweeps (parameter, base, points, identity)
     SELECT parameter, base, points, identity FROM sweeps_1 ORDER BY parameter, base, points, identity;
 DROP TABLE sweeps_1;
-PRAGMA user_version = {FORMAT};
-COMMIT;
+"""
+FROM_2 = f"""
+ALTER TABLE trials RENAME TO trials_2;
+{TRIALS}
+INSERT INTO trials (number, instance, state, prpv, ppv, failed_episodes, failure)
+    SELECT number, instance, state, prpv, ppv, failed_episodes, failure FROM trials_2;
+DROP TABLE trials_2;
 """
 AS_FROM_1 = """
 CREATE TEMP VIEW sweeps AS
     SELECT row_number() OVER (ORDER BY parameter, base, points, identity) AS number,
         *, '' AS target_model, '' AS replays FROM main.sweeps;
 """
+AS_FROM_2 = """
+CREATE TEMP VIEW trials AS SELECT *, '[]' AS decided, NULL AS bound, NULL AS estimate FROM main.trials;
+"""
+STEPS = ((FROM_1, AS_FROM_1), (FROM_2, AS_FROM_2))
+"""From each format to the next: how a file is converted, and how it is read as it is."""
 
 
 def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
@@ -79,6 +94,8 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
     Raises:
         StoreError: If it is corrupt, is something else, comes from a newer proxytune, or cannot be written.
     """
+    if path.is_dir():
+        raise StoreError(f"{path}: is a folder, not a study's database; move it away")
     uri = f"{path.absolute().as_uri()}?mode={'rwc' if writable else 'ro'}"
     with told(path):
         connection = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None)
@@ -105,6 +122,8 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if (application, version, tables) == (0, 0, 0):
+        if path.stat().st_size:
+            raise _corrupt(path, "it has no tables")
         if not writable:
             raise StoreError(f"{path}: is empty; run the study first")
         connection.executescript(SCHEMA)
@@ -116,9 +135,26 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
     (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if verdict != "ok":
         raise _corrupt(path, str(verdict))
+    if _cut_off(connection, path):
+        raise _corrupt(path, "its end has been cut off")
     if version < FORMAT:
-        # A view of this connection alone leaves the file as it is.
-        connection.executescript(FROM_1 if writable else AS_FROM_1)
+        converting, reading = zip(*STEPS[version - 1 :], strict=True)
+        # Views of this connection alone leave the file as it is.
+        connection.executescript(_at_once(converting) if writable else "".join(reading))
+
+
+def _at_once(steps: Sequence[str]) -> str:
+    return f"BEGIN;{''.join(steps)}PRAGMA user_version = {FORMAT};\nCOMMIT;"
+
+
+def _cut_off(connection: sqlite3.Connection, path: Path) -> bool:
+    """Whether the last page is not whole: SQLite would read zeros where the rest was.
+
+    With a write-ahead log that is no harm: a full disk leaves it so, and the log has the page.
+    """
+    (page,) = connection.execute("PRAGMA page_size").fetchone()
+    log = path.with_name(f"{path.name}-wal")
+    return path.stat().st_size % page > 0 and not (log.exists() and log.stat().st_size)
 
 
 @contextmanager

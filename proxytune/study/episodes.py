@@ -1,99 +1,32 @@
-"""Running episodes, in this process or spread over several, and catching what fails."""
+"""Running episodes, and catching what fails."""
 
 import errno
+import functools
 import math
-import os
-import pickle
-import sys
-import threading
 import time
-import warnings
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, cast
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import Any
 
-from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import EpisodeError, RunError
 from proxytune.study.store import Outcome
+from proxytune.study.workers import working
 
-WATCH_S = 0.5
 OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)
 
 
-@contextmanager
-def running(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Iterator[Iterator[Outcome]]:
-    """Run episodes and give each outcome as soon as it is there, in no particular order.
-
-    Which process runs an episode, and after which, does not change its outcome. With several jobs, joblib's backend is
-    the caller's choice (processes of this machine by default). Leaving the context drops the episodes not yet done.
-
-    Args:
-        family: The domain family.
-        episodes: What to run, in the order in which to begin.
-        jobs: How many processes; with one, everything runs in this process.
+def running(
+    family: DomainFamily, episodes: Sequence[Episode], jobs: int, over: Callable[[], bool] = lambda: False
+) -> AbstractContextManager[Iterator[Outcome]]:
+    """Run episodes and give each outcome as soon as it is there, in no particular order; see `working`.
 
     Raises:
         RunError: If the machine fails rather than an episode: a process dies, memory or disk run out.
     """
-    outcomes = _spread(family, episodes, jobs) if min(jobs, len(episodes)) > 1 else _here(family, episodes)
-    try:
-        yield _told(outcomes)
-    finally:
-        with warnings.catch_warnings():
-            # joblib warns of episodes it has finished in vain; whoever leaves early knows.
-            warnings.simplefilter("ignore", UserWarning)
-            outcomes.close()
-
-
-def _here(family: DomainFamily, episodes: Sequence[Episode]) -> Generator[Outcome, None, None]:
-    for episode in episodes:
-        yield run_episode(family, episode)
-
-
-def _spread(family: DomainFamily, episodes: Sequence[Episode], jobs: int) -> Generator[Outcome, None, None]:
-    recipe = _Recipe(pickle.dumps(family), tuple(sys.path), os.getpid())
-    parallel = Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered")
-    outcomes = parallel(delayed(_run_pickled)(recipe, episode) for episode in episodes)
-    return cast("Generator[Outcome, None, None]", outcomes)
-
-
-@dataclass(frozen=True)
-class _Recipe:
-    """A family pickled once, where its modules are found, and whose it is: a process unpickles it once."""
-
-    pickled: bytes
-    folders: tuple[str, ...]
-    owner: int
-
-
-def _run_pickled(recipe: _Recipe, episode: Episode) -> Outcome:
-    if os.getppid() == recipe.owner:
-        _end_with(recipe.owner)
-    return run_episode(_unpickled(recipe), episode)
-
-
-@lru_cache
-def _end_with(parent: int) -> None:
-    """End this process soon after its parent: after a `kill -9` it would wait for work for minutes."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(WATCH_S)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-@lru_cache(maxsize=1)
-def _unpickled(recipe: _Recipe) -> DomainFamily:
-    sys.path.extend(folder for folder in recipe.folders if folder not in sys.path)
-    return cast("DomainFamily", pickle.loads(recipe.pickled))
+    return working(functools.partial(run_episode, family), episodes, jobs, over)
 
 
 def run_episode(family: DomainFamily, episode: Episode) -> Outcome:
@@ -126,12 +59,3 @@ def _checked(family: DomainFamily, episode: Episode, result: Any) -> dict[str, f
             raise EpisodeError(f"agent '{episode.agent}': the domain family gave no finite '{name}'")
         metrics[name] = value
     return metrics
-
-
-def _told(outcomes: Iterator[Outcome]) -> Iterator[Outcome]:
-    try:
-        yield from outcomes
-    except BrokenExecutor:
-        raise RunError(
-            "a process that ran episodes was killed (out of memory?); run again to go on, perhaps with jobs = 1"
-        ) from None

@@ -1,6 +1,6 @@
 """Scoring one domain instance: all agents from all starts, compared with the target."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,9 @@ from proxytune.study.settings import StudySettings
 from proxytune.study.store import Outcome, Store
 from proxytune.study.study import Study
 from proxytune.usefulness import ppv, prpv
+
+Enough = Callable[[Mapping[Episode, Outcome]], bool]
+"""Whether the outcomes known so far are enough."""
 
 
 @dataclass(frozen=True)
@@ -54,38 +57,67 @@ def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
 
 @dataclass(frozen=True)
 class Spent:
-    """What a run has cost: episodes simulated, and their time summed over all processes."""
+    """What a run has cost: episodes simulated, their time summed over all processes, and how many of them in vain."""
 
     episodes: int = 0
     seconds: float = 0.0
+    unused: int = 0
 
     def __add__(self, other: "Spent") -> "Spent":
-        return Spent(self.episodes + other.episodes, self.seconds + other.seconds)
+        return Spent(self.episodes + other.episodes, self.seconds + other.seconds, self.unused + other.unused)
 
 
 def simulate(study: Study, store: Store, theta: Theta, watcher: Watcher, what: str) -> Spent:
-    """Run the episodes of a domain instance that are not in the store yet; each is there as soon as it is finished.
+    """Run the episodes of a domain instance that are not in the store yet, as in run_missing."""
+    return run_missing(study, store, plan(study.settings, theta, study.settings.seed), watcher, what)
+
+
+def run_missing(
+    study: Study,
+    store: Store,
+    planned: Sequence[Episode],
+    watcher: Watcher,
+    what: str,
+    enough: Enough | None = None,
+) -> Spent:
+    """Run the episodes that are not in the store yet; each is there as soon as it is finished.
 
     A failed episode counts as known where failures do not stop the study; where they do, it is tried again, since
-    something is expected to have been mended.
+    something is expected to have been mended. Where it is asked whether what is known is enough, episodes begin in
+    their order, and none more begins after a yes.
 
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
     """
-    settings, identity, spent = study.settings, study.identity, Spent()
-    known = store.outcomes(identity, theta)
-    planned = plan(settings, theta, settings.seed)
+    settings, spent = study.settings, Spent()
+    known = known_outcomes(study, store, planned)
     stop = settings.stop_on_failure
     missing = [episode for episode in planned if episode not in known or (stop and known[episode].failure)]
     watcher.begin(what, len(planned) - len(missing))
-    with running(study.family, longest_first(missing, store.seconds()), settings.jobs) as outcomes:
+    over = bool(enough and enough(known))
+    order = longest_first(missing, store.seconds())
+    if enough:
+        # Agent by agent as planned; only within an agent the longest come first.
+        place = {agent: number for number, agent in enumerate(dict.fromkeys(episode.agent for episode in planned))}
+        order.sort(key=lambda episode: place[episode.agent])
+    with running(study.family, order, settings.jobs, lambda: over) as outcomes:
         for outcome in outcomes:
-            store.save_outcome(identity, outcome)
+            store.save_outcome(study.identity, outcome)
             watcher.episode()
             spent += Spent(1, outcome.seconds)
             if stop and outcome.failure:
                 raise EpisodeError(f"{told(outcome)}; mend it and run again, or set on_failure = 'continue'")
+            known[outcome.episode] = outcome
+            over = over or bool(enough and enough(known))
     return spent
+
+
+def known_outcomes(study: Study, store: Store, planned: Sequence[Episode]) -> dict[Episode, Outcome]:
+    """Those of the episodes that the store has, with what became of them."""
+    known: dict[Episode, Outcome] = {}
+    for theta in dict.fromkeys(episode.theta for episode in planned):
+        known |= store.outcomes(study.identity, dict(theta))
+    return {episode: known[episode] for episode in planned if episode in known}
 
 
 def longest_first(episodes: list[Episode], seconds: Mapping[tuple[str, int], float]) -> list[Episode]:
@@ -99,11 +131,9 @@ def evaluation(study: Study, store: Store, theta: Theta) -> Evaluation | None:
     Each agent is scored over its own episodes that worked. A failed episode has no score, so none is made up for it;
     an agent without any cannot be compared, and then the instance has no score either.
     """
-    known = store.outcomes(study.identity, theta)
     planned = plan(study.settings, theta, study.settings.seed)
-    if not all(episode in known for episode in planned):
-        return None
-    return score(study, theta, [known[episode] for episode in planned])
+    known = known_outcomes(study, store, planned)
+    return score(study, theta, list(known.values())) if len(known) == len(planned) else None
 
 
 def score(study: Study, theta: Theta, outcomes: list[Outcome]) -> Evaluation:

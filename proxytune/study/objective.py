@@ -47,7 +47,8 @@ class StudyObjective:
     @property
     def identity(self) -> str:
         """All that its figures depend on, apart from the seed."""
-        kept = {key: value for key, value in facts(self.study).items() if key not in ("seed", "initial", "engine")}
+        of_the_search = ("seed", "initial", "engine", "cut_off")
+        kept = {key: value for key, value in facts(self.study).items() if key not in of_the_search}
         return repr(sorted(kept.items()))
 
     def score(self, values: Values, seed: int) -> float | None:

@@ -36,18 +36,18 @@ class Silent:
 
 
 class Bars:
-    """One bar of episodes on standard error, with what is being done, time left and the best score.
+    """One bar on standard error, of episodes unless said otherwise: what is being done, time left and the best score.
 
     Use as a context; where standard error is no terminal, nothing is shown.
     """
 
-    def __init__(self, episodes: int) -> None:
+    def __init__(self, total: int, unit: str = "episodes") -> None:
         console = Console(stderr=True)
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("episodes"),
+            TextColumn(unit),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
@@ -57,7 +57,7 @@ class Bars:
             speed_estimate_period=900.0,
             transient=True,
         )
-        self._task = self._progress.add_task("", total=episodes, best="")
+        self._task = self._progress.add_task("", total=total, best="")
 
     def __enter__(self) -> "Bars":
         self._progress.start()

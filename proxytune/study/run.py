@@ -6,9 +6,11 @@ from typing import Any
 
 from proxytune.errors import RunError, SettingsError
 from proxytune.search.proposer import Proposer, Trial
-from proxytune.space import Space, Theta
+from proxytune.space import Theta
 from proxytune.study.composition import trial_of
-from proxytune.study.evaluate import Evaluation, Spent, evaluation, simulate
+from proxytune.study.cutting import Reference, reference, run_or_cut
+from proxytune.study.evaluate import Evaluation, Spent, evaluation, known_outcomes, simulate
+from proxytune.study.history import episodes_of
 from proxytune.study.progress import Watcher
 from proxytune.study.stopping import stopped
 from proxytune.study.store import State, Store, TrialRecord
@@ -28,7 +30,7 @@ def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) 
         StoreError: If the database cannot be written.
     """
     check_facts(study, store)
-    budget, spent = study.settings.budget, Spent()
+    spent = Spent()
     trials = store.trials()
     done = [trial for trial in trials if trial.state != "open"]
     told = [trial_of(study, store, trial) for trial in done]
@@ -37,12 +39,30 @@ def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) 
         number = len(done) + 1
         theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, told)
         store.save_trial(study.identity, TrialRecord(number, theta))
-        spent += simulate(study, store, theta, watcher, f"trial {number} of {budget}")
-        done.append(_record(number, evaluation(study, store, theta)))
+        against = reference(study, store, done)
+        cost, ended = _evaluated(study, store, TrialRecord(number, theta), against, watcher)
+        spent += cost
+        done.append(ended)
         store.save_trial(study.identity, done[-1])
         told.append(trial_of(study, store, done[-1]))
         _tell_best(watcher, done)
     return spent
+
+
+def _evaluated(
+    study: Study, store: Store, trial: TrialRecord, against: Reference | None, watcher: Watcher
+) -> tuple[Spent, TrialRecord]:
+    """Simulate a trial to its end, or until it is cut off; what it cost and how it ended."""
+    what = f"trial {trial.number} of {study.settings.budget}"
+    if against is None:
+        spent, cut = simulate(study, store, trial.theta, watcher, what), None
+    else:
+        spent, cut = run_or_cut(study, store, trial, against, watcher, what)
+    if cut is None:
+        return spent, record(trial.number, evaluation(study, store, trial.theta))
+    ended = replace(trial, state="cut", decided=cut.decided, bound=cut.bound, estimate=cut.estimate)
+    outcomes = known_outcomes(study, store, episodes_of(study.settings, ended)).values()
+    return spent, replace(ended, failed_episodes=sum(outcome.metrics is None for outcome in outcomes))
 
 
 def check_facts(study: Study, store: Store) -> None:
@@ -79,17 +99,13 @@ def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsE
     )
 
 
-def as_trials(space: Space, done: Sequence[TrialRecord]) -> list[Trial]:
-    """Finished trials as the search sees them."""
-    return [Trial(space.values(trial.theta), trial.prpv) for trial in done]
-
-
 def _propose(study: Study, proposer: Proposer, told: Sequence[Trial]) -> Theta:
     space = study.settings.space
     return space.theta(proposer.propose(space, told, study.settings.seed))
 
 
-def _record(number: int, found: Evaluation | None) -> TrialRecord:
+def record(number: int, found: Evaluation | None) -> TrialRecord:
+    """A trial as the store keeps it, from what its episodes came to."""
     assert found is not None
     state: State = "failed" if found.failure else "finished"
     return TrialRecord(number, found.theta, state, found.prpv, found.ppv, len(found.failures), found.failure)

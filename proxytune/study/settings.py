@@ -10,13 +10,16 @@ from proxytune.scores import Metric
 from proxytune.search.engines import DEFAULT_ENGINE, STUDY_ENGINES
 from proxytune.settings import Section, read_settings
 from proxytune.space import Interval, Space
+from proxytune.study.teaching import TeachingSettings, read_teaching
 
 DEFAULT_FAMILY = "proxytune.driving.family:lane_following"
 FILE_NAME = "study.toml"
 FORMAT = 1
+OBJECTIVES = ("prpv", "plv")
 KEYS = (
     "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
-    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "stop", "parameters", "domain",
+    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
+    "cut_off", "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
 
 
@@ -54,9 +57,13 @@ class StudySettings:
         seed: Seed of the episodes and of the search.
         jobs: How many processes run episodes.
         stop_on_failure: Whether a failing episode stops the study.
+        preflight: Whether each parameter is first shown to matter.
+        confirm: How often the best θ are driven again in fresh episodes when the search has ended.
+        cut_off: Whether a trial ends once it cannot be among the best any more.
         stop: When it ends before its budget is spent.
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
+        teaching: How a proxy's worth as a teacher is measured, if it is.
     """
 
     path: Path
@@ -74,9 +81,13 @@ class StudySettings:
     seed: int
     jobs: int
     stop_on_failure: bool
+    preflight: bool
+    confirm: int
+    cut_off: bool
     stop: StopRules
     space: Space
     domain: Section
+    teaching: TeachingSettings | None = None
 
     @property
     def folder(self) -> Path:
@@ -105,7 +116,7 @@ def read_study_settings(path: Path) -> StudySettings:
         family=read.text("family", DEFAULT_FAMILY),
         proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
         target=path.parent / read.text("target"),
-        objective=read.text("objective", "prpv", choices=("prpv",)),
+        objective=read.text("objective", "prpv", choices=OBJECTIVES),
         metrics=_metrics(read),
         agents=_agents(read),
         starts=read.whole("starts", low=1),
@@ -115,9 +126,13 @@ def read_study_settings(path: Path) -> StudySettings:
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
+        preflight=read.flag("preflight", True),
+        confirm=read.whole("confirm", 1, high=1000),
+        cut_off=read.flag("cut_off", True),
         stop=_stop(read.section("stop")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
+        teaching=read_teaching(read.section("teaching")),
     )
 
 
@@ -177,6 +192,9 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "seed": settings.seed,
         "jobs": settings.jobs,
         "on_failure": "stop" if settings.stop_on_failure else "continue",
+        "preflight": settings.preflight,
+        "confirm": settings.confirm,
+        "cut_off": settings.cut_off,
         "stop": {key: value for key, value in vars(settings.stop).items() if value is not None},
         "parameters": {i.name: [i.low, i.high] for i in settings.space.intervals},
     }

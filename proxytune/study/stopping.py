@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from proxytune.search.gaussian_process import expected_improvement
-from proxytune.search.proposer import Trial
+from proxytune.study.evaluate import plan
+from proxytune.study.history import as_trials
 from proxytune.study.settings import StudySettings
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
@@ -14,22 +15,22 @@ FILE_REMEDY = "raise it or take it out to go on"
 def stopped(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
     """Why a study with these finished trials runs no further, in one phrase; empty while it goes on.
 
-    Only finished trials and the time of their episodes count, never the clock of this process: a study that was
+    Only finished trials and the time of their own episodes count, never the clock of this process: a study that was
     stopped stays so when it is run again, and without the rule it goes on to the trials it would have had anyway.
     """
     settings = study.settings
     if len(done) >= settings.budget:
-        return f"the budget of {settings.budget} trials is spent"
-    return _out_of_time(study, store, done) or _nothing_to_gain(settings, done)
+        kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
+        return f"the budget of {settings.budget} trials is spent{kept}"
+    return _out_of_time(settings, store, done) or _nothing_to_gain(settings, done)
 
 
-def _out_of_time(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
-    settings = study.settings
+def _out_of_time(settings: StudySettings, store: Store, done: Sequence[TrialRecord]) -> str:
     limit = settings.stop.wall_time_s
     if limit is None:
         return ""
-    outcomes = [outcome for trial in done for outcome in store.outcomes(study.identity, trial.theta).values()]
-    seconds = sum(outcome.seconds for outcome in outcomes) / settings.jobs
+    seeds = {episode.seed for episode in plan(settings, {}, settings.seed)}
+    seconds = store.seconds_of_trials(len(done), seeds) / settings.jobs
     if seconds < limit:
         return ""
     return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {limit:g}; {FILE_REMEDY}"
@@ -39,7 +40,7 @@ def _nothing_to_gain(settings: StudySettings, done: Sequence[TrialRecord]) -> st
     limit = settings.stop.no_improvement
     if limit is None or len(done) < settings.initial or all(trial.prpv is None for trial in done):
         return ""
-    trials = [Trial(settings.space.values(trial.theta), trial.prpv) for trial in done]
+    trials = as_trials(settings.space, done)
     gain, noise = expected_improvement(settings.space, trials, settings.seed)
     if gain >= limit * noise:
         return ""

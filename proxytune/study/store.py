@@ -2,9 +2,9 @@
 
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,7 +14,7 @@ from proxytune.space import Theta
 from proxytune.study.database import connect, disconnect, told
 
 FILE_NAME = "study.db"
-State = Literal["open", "finished", "failed"]
+State = Literal["open", "finished", "failed", "cut"]
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,14 @@ class TrialRecord:
     Attributes:
         number: Counted from 1.
         theta: Where it was.
-        state: Whether it has been scored, has failed, or is still open.
+        state: Whether it has been scored, has failed, was cut off, or is still open.
         prpv: Its PRPV, None unless finished.
         ppv: Its PPV, None unless finished, and where the target's agents all score alike.
         failed_episodes: How many of its episodes failed.
         failure: Why it failed, empty if it did not.
+        decided: The agents that had been driven when it was cut off; empty if it was not.
+        bound: What its PRPV cannot be below, None unless it was cut off.
+        estimate: What its PRPV is expected to be, None unless it was cut off.
     """
 
     number: int
@@ -55,6 +58,14 @@ class TrialRecord:
     ppv: float | None = None
     failed_episodes: int = 0
     failure: str = ""
+    decided: tuple[str, ...] = ()
+    bound: float | None = None
+    estimate: float | None = None
+
+    @property
+    def score(self) -> float | None:
+        """What the search is told: PRPV, of a trial that was cut off the estimate; None if it failed or is open."""
+        return self.estimate if self.state == "cut" else self.prpv
 
 
 @dataclass(frozen=True)
@@ -79,6 +90,12 @@ class SweepRecord:
 def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
     """θ in the one form in which it is stored: sorted by name, every digit kept."""
     return json.dumps({name: float(value) for name, value in sorted(dict(theta).items())}, allow_nan=False)
+
+
+def _trial(number: int, theta: str, *rest: Any) -> TrialRecord:
+    """A trial from its row, in the order of its attributes."""
+    decided = tuple(json.loads(rest[5]))
+    return replace(TrialRecord(number, json.loads(theta), *rest[:5]), decided=decided, bound=rest[6], estimate=rest[7])
 
 
 class Store:
@@ -131,18 +148,20 @@ class Store:
     def trials(self) -> list[TrialRecord]:
         """Every trial, in order; the last may be open."""
         rows = self._all(
-            "SELECT number, theta, state, prpv, ppv, failed_episodes, failure"
+            "SELECT number, theta, state, prpv, ppv, failed_episodes, failure, decided, bound, estimate"
             " FROM trials JOIN instances ON instances.id = trials.instance ORDER BY number"
         )
-        return [TrialRecord(number, json.loads(theta), *rest) for number, theta, *rest in rows]
+        return [_trial(*row) for row in rows]
 
     def save_trial(self, identity: str, trial: TrialRecord) -> None:
         """Write a trial, over what was known of it before."""
         with self._transaction() as connection:
             row = (trial.state, trial.prpv, trial.ppv, trial.failed_episodes, trial.failure)
+            cut = (json.dumps(trial.decided), trial.bound, trial.estimate)
             instance = self._instance(connection, identity, theta_json(trial.theta))
             connection.execute(
-                "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?)", (trial.number, instance, *row)
+                "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (trial.number, instance, *row, *cut),
             )
 
     def save_outcome(self, identity: str, outcome: Outcome) -> None:
@@ -172,6 +191,14 @@ class Store:
         """How long the episodes of each agent and start took on average."""
         rows = self._all("SELECT agent, start, avg(seconds) FROM episodes GROUP BY agent, start")
         return {(agent, start): mean for agent, start, mean in rows}
+
+    def seconds_of_trials(self, last: int, seeds: Collection[int]) -> float:
+        """How long the episodes with these seeds took of all trials up to this one."""
+        query = (
+            "SELECT total(seconds) FROM trials JOIN episodes ON episodes.instance = trials.instance"
+            f" WHERE number <= ? AND seed IN ({', '.join('?' * len(seeds))})"
+        )
+        return float(self._all(query, (last, *seeds))[0][0])
 
     def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
         """Remember that a sweep has been asked for in the domain family with this identity."""

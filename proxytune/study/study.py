@@ -15,6 +15,9 @@ from proxytune.settings import nearest
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
 
+UNSAID = {"engine": DEFAULT_ENGINE, "cut_off": False}
+"""What facts do not say."""
+
 
 @dataclass(frozen=True)
 class Study:
@@ -64,7 +67,8 @@ def facts(study: Study) -> dict[str, Any]:
     """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
 
     Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
-    identity covers it. The default engine goes without saying, as it did when there was no other.
+    identity covers it. The default engine goes without saying, as it did when there was no other, and so does that
+    trials are not cut off.
     """
     settings = study.settings
     engine = {} if settings.engine == DEFAULT_ENGINE else {"engine": settings.engine}
@@ -78,6 +82,7 @@ def facts(study: Study) -> dict[str, Any]:
         "initial": settings.initial,
         "seed": settings.seed,
         **engine,
+        **({"cut_off": True} if settings.cut_off else {}),
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
         "identity": study.identity,
@@ -87,19 +92,18 @@ def facts(study: Study) -> dict[str, Any]:
 def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
     """Which facts differ, each as one phrase for the user."""
     keys = [key for key in {**after, **before} if before.get(key) != after.get(key)]
-    # Other agents or metrics make it another part of the target's table; that is their doing.
-    implied = {"identity", "target"} if {"agents", "metrics"} & set(keys) else {"identity"}
-    named = [key for key in keys if key not in implied]
-    if keys and not named:
-        return ["the domain family (its code, its robot or the proxy's model)"]
-    return [_change(key, before.get(key), after.get(key)) for key in named]
+    # Other agents or metrics make it another part of the target's table, and what the family is told makes it another.
+    target = {"target"} if {"agents", "metrics"} & set(keys) else set()
+    told = any(key == "family" or key.startswith("domain.") for key in keys)
+    named = [key for key in keys if key not in target | {"identity"}]
+    other = ["the domain family (its code, its robot or the proxy's model)"] if "identity" in keys and not told else []
+    return [*(_change(key, before.get(key), after.get(key)) for key in named), *other]
 
 
 def _change(key: str, before: Any, after: Any) -> str:
     if key == "target":
         return "target (its contents)"
-    if key == "engine" and before is None:
-        before = DEFAULT_ENGINE
+    before = UNSAID.get(key) if before is None else before
     shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
     return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
 

@@ -95,3 +95,51 @@ def test_a_sweep_of_an_older_format_is_drawn_without_pod(make_study, capsys):
         )
     capsys.readouterr()
     assert drawn_again(folder, capsys) == before
+
+
+def drawn_by(folder, capsys, *texts):
+    arguments = [word for text in texts for word in ("--metric", text)]
+    assert main(["plot", str(folder), *arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def forbidden(self, episode):
+    raise AssertionError("simulated")
+
+
+def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own(finished, capsys, monkeypatch):
+    assert main(["study", str(finished), "--json"]) == 0
+    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2"]) == 0
+    monkeypatch.setattr("wobbly.Wobbly.run", forbidden)
+    capsys.readouterr()
+    own = drawn_by(finished, capsys)
+    before = {path: path.read_bytes() for path in finished.rglob("*") if path.is_file()}
+    other = drawn_by(finished, capsys, "distance:max:20%", "survival_time:max")
+    assert {path: path.read_bytes() for path in before} == before, "study.db, figures and report stay as they were"
+    folder = finished / "rescored" / "distance_max_20percent+survival_time_max"
+    assert other["report"] == str(folder / "report.html")
+    for path in before:
+        if path.suffix == ".png":
+            again = folder / "figures" / path.name
+            assert str(again) in other["figures"]
+            assert again.read_bytes() != before[path], "the tolerance matters here"
+    assert other["settings"]["metrics"] == ["distance:max:20%", "survival_time:max"]
+    assert [trial["theta"] for trial in other["trials"]] == [trial["theta"] for trial in own["trials"]]
+    assert [trial["prpv"] for trial in other["trials"]] != [trial["prpv"] for trial in own["trials"]]
+
+
+def test_people_see_the_best_by_other_metrics_and_where_it_is_drawn(finished, capsys):
+    assert main(["plot", str(finished), "--metric", "survival_time:max"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "wobbly: 7 of 7 trials; best is trial" in out
+    assert "scored by survival_time:max; nothing simulated" in out
+    assert "rescored/survival_time_max/report.html" in out.replace(" ", "")
+
+
+def test_a_metric_that_is_not_there_is_one_line_and_draws_nothing(finished, capsys):
+    assert main(["plot", str(finished), "--metric", "distance:max", "--metric", "speed:max"]) == 2
+    told = capsys.readouterr().err
+    assert told == "proxytune plot: --metric speed: no such metric; known are: distance, survival_time\n"
+    assert main(["plot", str(finished), "--metric", "distance"]) == 2
+    assert capsys.readouterr().err.startswith("proxytune plot: metric 'distance': write NAME:max or NAME:min")
+    assert not (finished / "rescored").exists()

@@ -41,6 +41,14 @@ def test_failed_trials_are_crosses(result):
     assert "failed" not in lines(convergence(result))
 
 
+def test_trials_that_were_cut_off_are_shown_at_what_they_cannot_be_below(result):
+    cut = TrialRecord(8, result.trials[0].theta, "cut", decided=("agent0", "agent1"), bound=14.0, estimate=20.0)
+    drawn = lines(convergence(replace(result, trials=(*result.trials, cut))))
+    assert drawn["cut off, at least"].get_xydata().tolist() == [[8.0, 14.0]]
+    assert "failed" not in drawn
+    assert "cut off, at least" not in lines(convergence(result))
+
+
 def test_without_a_noise_floor_none_is_drawn(result):
     assessment = result.best.assessment
     silent = replace(assessment, noise_floor=replace(assessment.noise_floor, value=None, low=None, high=None))

@@ -70,6 +70,21 @@ def test_a_newer_format_is_refused(tmp_path):
     refused(path, f"has format {FORMAT + 1}, this proxytune reads up to {FORMAT}; install a newer one")
 
 
+OLD_TRIALS = """
+DROP TABLE trials;
+CREATE TABLE trials (
+    number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
+    state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed')),
+    prpv REAL, ppv REAL, failed_episodes INTEGER NOT NULL DEFAULT 0, failure TEXT NOT NULL DEFAULT '');
+INSERT INTO instances VALUES (1, 'identity', '{}');
+INSERT INTO trials VALUES (1, 1, 'finished', 4.0, 0.25, 1, ''), (2, 1, 'failed', NULL, NULL, 3, 'it fell');
+PRAGMA user_version = 2;
+"""
+TRIALS_OF_2 = "SELECT * FROM trials ORDER BY number"
+CONVERTED_TRIALS = [
+    (1, 1, "finished", 4.0, 0.25, 1, "", "[]", None, None),
+    (2, 1, "failed", None, None, 3, "it fell", "[]", None, None),
+]
 OLD_SWEEPS = """
 DROP TABLE sweeps;
 CREATE TABLE sweeps (
@@ -87,19 +102,44 @@ CONVERTED = [
 
 
 @pytest.fixture
-def of_format_1(tmp_path):
+def of_format_2(tmp_path):
     path = made(tmp_path / "study.db")
     with sqlite3.connect(path) as plain:
-        plain.executescript(OLD_SWEEPS)
+        plain.executescript(OLD_TRIALS)
     return path
+
+
+@pytest.fixture
+def of_format_1(of_format_2):
+    with sqlite3.connect(of_format_2) as plain:
+        plain.executescript(OLD_SWEEPS)
+    return of_format_2
 
 
 def test_format_1_is_read_as_it_is(of_format_1):
     before = of_format_1.read_bytes()
     connection = connect(of_format_1, writable=False)
     assert connection.execute(SWEEPS_OF_1).fetchall() == CONVERTED
+    assert connection.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
     connection.close()
     assert of_format_1.read_bytes() == before
+
+
+def test_format_2_is_read_as_it_is(of_format_2):
+    before = of_format_2.read_bytes()
+    connection = connect(of_format_2, writable=False)
+    assert connection.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
+    assert connection.execute(SWEEPS_OF_1).fetchall() == []
+    connection.close()
+    assert of_format_2.read_bytes() == before
+
+
+def test_format_2_becomes_the_present_one_when_opened_for_writing_and_keeps_what_it_had(of_format_2):
+    disconnect(connect(of_format_2, writable=True))
+    with sqlite3.connect(of_format_2) as plain:
+        assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
+        assert plain.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
+        plain.execute("UPDATE trials SET state = 'cut'")
 
 
 def test_format_1_becomes_the_present_one_when_opened_for_writing_and_keeps_what_it_had(of_format_1):
@@ -107,6 +147,7 @@ def test_format_1_becomes_the_present_one_when_opened_for_writing_and_keeps_what
     with sqlite3.connect(of_format_1) as plain:
         assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
         assert plain.execute(SWEEPS_OF_1).fetchall() == CONVERTED
+        assert plain.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
         assert plain.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
         names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     assert names == {"facts", "instances", "trials", "episodes", "sweeps"}
@@ -190,3 +231,32 @@ def test_a_database_that_another_program_writes_to_is_told(tmp_path, monkeypatch
     with pytest.raises(StoreError, match="another program holds it open"):
         connect(path, writable=True)
     other.close()
+
+
+def test_a_part_of_a_page_is_refused_but_not_beside_the_log_that_has_the_whole_one(tmp_path):
+    """A full disk may leave it so."""
+    path = filled(tmp_path / "study.db")
+    content = path.read_bytes()
+    path.write_bytes(content[:-1])
+    refused(path, "is damaged (its end has been cut off)")
+    path.write_bytes(content)
+    writer = connect(path, writable=True)
+    writer.execute("INSERT INTO facts VALUES ('seed', '1')")
+    with path.open("ab") as main_file:
+        main_file.write(b"?" * 100)
+    reader = connect(path, writable=False)
+    assert reader.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
+    assert reader.execute("SELECT count(*) FROM instances").fetchall() == [(3000,)]
+    reader.close()
+    writer.close()
+
+
+def test_a_file_without_tables_is_refused_and_not_begun_anew(tmp_path):
+    (tmp_path / "study.db").write_bytes(b"S")
+    refused(tmp_path / "study.db", "is damaged (it has no tables)")
+
+
+def test_a_folder_is_refused(tmp_path):
+    (tmp_path / "study.db").mkdir()
+    with pytest.raises(StoreError, match=r"study\.db: is a folder, not a study's database; move it away"):
+        connect(tmp_path / "study.db", writable=True)

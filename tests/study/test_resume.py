@@ -1,109 +1,204 @@
-"""Real processes, killed for real."""
+"""Real processes, stopped for real."""
 
+import json
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import ENVIRONMENT, FAKES, episodes, finished_episodes, start, trials, wait_for
 
-FAKES = Path(__file__).parents[1] / "fakes"
-ROOT = Path(__file__).parents[2]
-EPISODES = 7 * 18
-DOMAIN = {"sleep": "0.02"}
+from proxytune.cli.main import main
+from proxytune.search.engines import STUDY_ENGINES, make_proposer
+from proxytune.study.progress import Silent
+from proxytune.study.run import run_study
+from proxytune.study.store import Store
+from proxytune.study.study import open_study
 
-
-def start(folder, *options):
-    environment = {**os.environ, "PYTHONPATH": f"{ROOT}:{FAKES}", "OMP_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "proxytune", "study", str(folder), *options]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command, env=environment, start_new_session=True, **pipes)
-
-
-def finished_episodes(folder):
-    try:
-        with sqlite3.connect(f"file:{folder}/study.db?mode=ro", uri=True) as plain:
-            return plain.execute("SELECT count(*) FROM episodes").fetchone()[0]
-    except sqlite3.Error:
-        return 0
+PER_TRIAL = 18
+EPISODES = 7 * PER_TRIAL
+DOMAIN = {"sleep": "0.03"}
+TOLD = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
 
 
-def wait_for(folder, process, episodes):
-    while finished_episodes(folder) < episodes and process.poll() is None:
-        time.sleep(0.005)
+class Launched:
+    """A study run by a fork of a process that has loaded proxytune; `launcher` makes them, one at a time."""
+
+    def __init__(self, launcher, folder):
+        # What is left of a killed process, joblib's clean-up, may still print: into a file of its own.
+        self.launcher, self.output = launcher, folder.with_name(f"{folder.name}_{time.monotonic_ns()}.txt")
+        launcher.stdin.write(json.dumps(["study", str(folder), "--json", str(self.output)]) + "\n")
+        launcher.stdin.flush()
+        self.pid = int(launcher.stdout.readline())
+
+    def poll(self):
+        """Something once it has ended."""
+        try:
+            os.kill(self.pid, 0)
+        except ProcessLookupError:
+            return True
+
+    def end(self):
+        """Wait for its end: exit status, and what it printed."""
+        return int(self.launcher.stdout.readline()), self.output.read_text()
 
 
-def trials(folder):
-    with sqlite3.connect(folder / "study.db") as plain:
-        query = "SELECT number, theta, state, prpv, ppv FROM trials JOIN instances ON instances.id = instance"
-        return plain.execute(query).fetchall()
+@pytest.fixture(scope="module")
+def launcher():
+    command = [sys.executable, str(FAKES / "launcher.py")]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **pipes) as process:
+        yield process
+        process.stdin.close()
 
 
-def episodes(folder):
-    with sqlite3.connect(folder / "study.db") as plain:
-        query = "SELECT theta, agent, start, seed, metrics FROM episodes JOIN instances ON instances.id = instance"
-        return sorted(plain.execute(query).fetchall())
+def never_stopped(make_study, **changes):
+    """The study run in this process, in one go: its trials and episodes."""
+    folder = make_study("whole", **changes)
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        run_study(study, store, make_proposer(study.settings.engine, study.settings.initial), Silent())
+    return trials(folder), episodes(folder)
+
+
+def stop(process, number):
+    """Send a signal as it comes in life: Ctrl-C reaches a terminal's every process, the others one."""
+    (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
+    status, printed = process.end()
+    if number == signal.SIGKILL:
+        assert status == -signal.SIGKILL
+    else:
+        expected, word = TOLD[number]
+        line = f"proxytune study: {word}; what was finished is kept, the same command goes on\n"
+        assert (status, printed) == (expected, line)
+
+
+def in_the_middle(folder):
+    """Whether a trial has some of its episodes and not all."""
+    known = finished_episodes(folder) % PER_TRIAL
+    return trials(folder)[-1][2] == "open" and 0 < known < PER_TRIAL
+
+
+def moments(random, count):
+    """So many numbers of episodes, in rising order, each in the middle of another trial."""
+    chosen = np.sort(random.choice(np.arange(7), count, replace=False))
+    return (PER_TRIAL * chosen + random.integers(3, 9, count)).tolist()
+
+
+def stopped_and_resumed(folder, launcher, signals, random):
+    """Run a study that each signal stops once, at seeded moments; how often that was within a trial."""
+    within = 0
+    for number, moment in zip(signals, moments(random, len(signals)), strict=True):
+        process = Launched(launcher, folder)
+        wait_for(folder, process, moment)
+        stop(process, number)
+        assert moment <= finished_episodes(folder) < EPISODES
+        within += in_the_middle(folder)
+    status, printed = Launched(launcher, folder).end()
+    assert status == 0, printed
+    return within
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_a_study_killed_at_any_moment_gives_the_trials_of_one_that_was_not(make_study, jobs):
-    """To the last bit, with one job and with two, however often it is killed."""
-    whole = make_study("whole", domain=DOMAIN)
-    start(whole).communicate()
-    killed = make_study("killed", domain=DOMAIN, jobs=jobs)
-    for moment in np.sort(np.random.default_rng(int(jobs)).integers(1, EPISODES - 40, 4)):
-        process = start(killed)
-        wait_for(killed, process, moment)
-        process.kill()
-        process.communicate()
-        assert process.returncode == -signal.SIGKILL
-        assert moment <= finished_episodes(killed) < EPISODES
-    last = start(killed)
-    _, told = last.communicate()
-    assert last.returncode == 0, told
-    assert trials(killed) == trials(whole)
-    assert episodes(killed) == episodes(whole)
-    assert len(episodes(killed)) == EPISODES
+@pytest.mark.parametrize("engine", STUDY_ENGINES)
+def test_a_study_stopped_at_any_moment_gives_the_trials_of_one_that_was_not(make_study, launcher, engine, jobs):
+    """To the last bit, with every engine, one job and two, by Ctrl-C, SIGTERM and `kill -9`."""
+    if engine == "tpe":
+        pytest.importorskip("optuna")
+    changes = {"engine": f'"{engine}"', "initial": "3"}
+    whole = never_stopped(make_study, **changes)
+    folder = make_study("stopped", domain=DOMAIN, jobs=jobs, **changes)
+    random = np.random.default_rng([STUDY_ENGINES.index(engine), int(jobs)])
+    signals = random.permutation([signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGKILL]).tolist()
+    assert stopped_and_resumed(folder, launcher, signals, random) > 0
+    assert (trials(folder), episodes(folder)) == whole
+    assert len(whole[1]) == EPISODES
+    assert not (folder / "study.lock").exists()
+
+
+def test_a_study_of_two_jobs_terminated_and_killed_within_a_trial_gives_the_trials_of_one_that_was_not(
+    make_study, launcher
+):
+    whole = never_stopped(make_study, initial="3")
+    folder = make_study("stopped", domain=DOMAIN, jobs="2", initial="3")
+    signals = [signal.SIGTERM, signal.SIGKILL]
+    assert stopped_and_resumed(folder, launcher, signals, np.random.default_rng(0)) > 0
+    assert (trials(folder), episodes(folder)) == whole
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_study_killed_as_soon_as_it_begins_gives_the_trials_of_one_that_was_not(make_study, launcher, jobs):
+    """While it takes the lock, makes the database, starts its workers; and while it draws."""
+    whole = never_stopped(make_study)
+    folder = make_study("stopped", jobs=jobs)
+    for seconds in np.random.default_rng(int(jobs)).uniform(0.0, 0.4, 12):
+        process = Launched(launcher, folder)
+        time.sleep(seconds)
+        if not process.poll():
+            os.kill(process.pid, signal.SIGKILL)
+        status, printed = process.end()
+        assert status in (0, -signal.SIGKILL), printed
+    status, printed = Launched(launcher, folder).end()
+    assert status == 0, printed
+    assert (trials(folder), episodes(folder)) == whole
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_with_130_one_line_and_no_process_left(make_study, jobs):
     folder = make_study(domain=DOMAIN, jobs=jobs)
-    process = start(folder)
+    process = start("study", folder)
     wait_for(folder, process, 25)
     os.killpg(process.pid, signal.SIGINT)
-    out, told = process.communicate(timeout=20)
+    out, told = process.communicate(timeout=60)
     assert process.returncode == 130
     assert out == ""
-    assert told.count("\n") == 1
-    assert "the same command goes on" in told
+    assert told == "proxytune study: interrupted; what was finished is kept, the same command goes on\n"
+    assert 25 <= finished_episodes(folder) < EPISODES
+    assert not (folder / "study.lock").exists()
+
+
+@pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "group"])
+def test_sigterm_ends_with_143_one_line_and_no_process_left(make_study, send):
+    """Sent to the process alone or, as schedulers do, to its workers too."""
+    folder = make_study(domain=DOMAIN, jobs="2")
+    process = start("study", folder)
+    wait_for(folder, process, 25)
+    send(process.pid, signal.SIGTERM)
+    out, told = process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
+    assert (process.returncode, out) == (143, "")
+    assert told == "proxytune study: terminated; what was finished is kept, the same command goes on\n"
     assert 25 <= finished_episodes(folder) < EPISODES
     assert not (folder / "study.lock").exists()
 
 
 def test_processes_of_a_killed_study_do_not_linger(make_study):
     folder = make_study(domain={"sleep": "0.05"}, jobs="2")
-    process = start(folder)
+    process = start("study", folder)
     wait_for(folder, process, 5)
     process.kill()
-    process.communicate(timeout=20)  # returns only when every process that holds its pipes has ended
+    process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
     assert process.returncode == -signal.SIGKILL
 
 
-def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(make_study):
-    folder = make_study(domain={"sleep": "0.2"})
-    first = start(folder)
-    wait_for(folder, first, 2)
-    second = start(folder)
-    _, told = second.communicate()
-    assert second.returncode == 1
-    assert f"another process (process {first.pid}) is running this study" in told
-    assert told.count("\n") == 1
+def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(make_study, capsys):
+    """A sweep too; looking at it is for everybody."""
+    folder = make_study(domain={"sleep": "0.05"}, budget="60")
+    first = start("study", folder)
+    wait_for(folder, first, PER_TRIAL + 2)
+    second = start("study", folder)
+    out, told = second.communicate()
+    assert (second.returncode, out) == (1, "")
+    line = f"{folder}: another process (process {first.pid}) is running this study; wait for it or stop it\n"
+    assert told == f"proxytune study: {line}"
+    assert main(["sweep", str(folder), "--parameter", "trim"]) == 1
+    assert capsys.readouterr() == ("", f"proxytune sweep: {line}")
+    assert main(["plot", str(folder), "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["trials"]) >= 1
     wait_for(folder, first, finished_episodes(folder) + 2)
     os.killpg(first.pid, signal.SIGINT)
     first.communicate()

@@ -6,8 +6,9 @@ import pytest
 from proxytune.errors import EpisodeError, RunError, SettingsError
 from proxytune.search.engines import make_proposer
 from proxytune.study.composition import compose_of
+from proxytune.study.history import as_trials
 from proxytune.study.progress import Silent
-from proxytune.study.run import as_stored, as_trials, check_facts, run_study
+from proxytune.study.run import as_stored, check_facts, run_study
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 
@@ -113,6 +114,7 @@ EDITS = {
     "a tolerance": ({"metrics": '["distance:max:5%", "survival_time:max"]'}, "metrics"),
     "the agents": ({"agents": '["agent0", "agent1"]'}, "agents"),
     "the engine": ({"engine": '"sobol"'}, 'engine (was "gp")'),
+    "cutting off": ({"cut_off": "true"}, "cut_off (was false)"),
     "the domain": ({"domain": {"version": '"2"'}}, "domain.version (was nothing)"),
 }
 

@@ -69,6 +69,19 @@ def test_seconds_are_averaged_over_domain_instances(tmp_path):
         assert store.seconds() == {("agent1", 2): 1.0}
 
 
+def test_the_time_of_trials_is_that_of_their_own_episodes(tmp_path):
+    elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
+    with Store.open(tmp_path) as store:
+        assert store.seconds_of_trials(9, {11}) == 0.0
+        store.save_outcome("identity", WORKED)
+        store.save_outcome("another identity", WORKED)
+        store.save_outcome("identity", Outcome(elsewhere, {"distance": 1.0}, "", 0.25))
+        store.save_outcome("identity", Outcome(replace(EPISODE, seed=12), {"distance": 1.0}, "", 8.0))
+        store.save_trial("identity", TrialRecord(1, THETA, "finished"))
+        store.save_trial("identity", TrialRecord(2, {"trim": 0.2}, "finished"))
+        assert [store.seconds_of_trials(last, {11, 13}) for last in (0, 1, 2)] == [0.0, 1.5, 1.75]
+
+
 SWEEP = SweepRecord("trim", {"delay": 0.1}, (-0.3, 0.0, 0.3))
 
 

@@ -17,15 +17,16 @@ def test_what_is_written_is_what_is_read(make_study):
     assert settings.target == settings.folder / "target.csv"
     assert settings.proxy == settings.folder / "m.toml"
     assert as_document(settings)["on_failure"] == "stop"
+    assert as_document(settings)["preflight"] is settings.preflight is False
     assert settings.stop == StopRules()
 
 
 def test_what_may_be_left_out_has_a_default(make_study):
-    left_out = dict.fromkeys(("name", "family", "initial", "seed", "jobs"))
+    left_out = dict.fromkeys(("name", "family", "initial", "seed", "jobs", "preflight", "confirm", "cut_off"))
     settings = read_study_settings(make_study("mine", **left_out))
     assert (settings.name, settings.family, settings.proxy) == ("mine", DEFAULT_FAMILY, None)
     assert (settings.initial, settings.seed, settings.jobs, settings.stop_on_failure) == (8, 1, 1, False)
-    assert settings.engine == "gp"
+    assert (settings.engine, settings.preflight, settings.confirm, settings.cut_off) == ("gp", True, 1, True)
 
 
 def test_rules_to_stop_are_read_each_on_its_own(make_study):
@@ -73,6 +74,8 @@ BAD = {
     ),
     "no time at all": ({"stop": "{ wall_time_s = 0 }"}, "stop.wall_time_s: must be above 0, got 0; take it out"),
     "a negative gain": ({"stop": "{ no_improvement = -1 }"}, "stop.no_improvement: must be above 0, got -1"),
+    "a word for a flag": ({"preflight": '"no"'}, "preflight: must be true or false, without quotes, got 'no'"),
+    "less than no repetition": ({"confirm": "-1"}, "confirm: must be between 0 and 1000, got -1"),
     "stop as a number": ({"stop": "5"}, "stop: must be a table"),
     "no format": ({"format": None}, "format: is missing"),
     "a later format": ({"format": "2"}, "format: this proxytune reads up to 1; install a newer one"),

@@ -1,0 +1,42 @@
+"""`teach`: what a proxy is worth as a teacher: learning curves and PLV."""
+
+import argparse
+from pathlib import Path
+
+from proxytune.cli.answer import Answer
+from proxytune.cli.study_folder import study_folder
+from proxytune.report.teach_document import teach_document
+from proxytune.report.teach_figure import teach_figure
+from proxytune.report.teach_table import teach_table
+from proxytune.report.writing import save
+from proxytune.study.lock import locked
+from proxytune.study.predictivity import predictivity
+from proxytune.study.progress import Bars
+from proxytune.study.store import Store
+from proxytune.study.study import open_study
+from proxytune.study.teach import open_school, points_of, run_experiment
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the study."""
+    parser.add_argument(
+        "path", type=Path, metavar="PATH", help="a study's folder whose study.toml has a [teaching] table"
+    )
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Run what is left of the experiment; a finished one is summed up again without training or driving."""
+    folder = study_folder(arguments.path)
+    study = open_study(folder)
+    school = open_school(study.settings)
+    proxies = school.settings.proxies
+    with locked(folder), Store.open(folder) as store:
+        with Bars(points_of(school), "points of learning curves") as bars:
+            found = run_experiment(study.settings, school, bars)
+        agents = len(study.settings.agents) * study.settings.starts
+        with Bars(agents * sum(proxy.fixed for proxy in proxies.values())) as bars:
+            prpv = predictivity(study, store, proxies, bars)
+    figure = folder / "figures" / "teach.png"
+    save(teach_figure(found), figure)
+    document = {**teach_document(found, prpv), "figure": str(figure)}
+    return Answer(document, teach_table(found, prpv, {"figure": figure}))

@@ -1,0 +1,85 @@
+"""The expert that learners imitate: pure pursuit of the lane's centre line, on the robot's true pose."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from proxytune.driving.agents.agent import Command, Picture
+from proxytune.driving.agents.pilots import duties
+from proxytune.driving.episode import Sight
+from proxytune.driving.lane import lane_point, lane_pose
+from proxytune.driving.maps import LoopMap
+from proxytune.driving.robot import Robot
+from proxytune.effects import Signal
+
+MEMORY = 0.9
+"""Share of the disturbance of one control step that is left in the next: it lasts for half a second."""
+
+
+class Shown(NamedTuple):
+    """What a lesson has shown so far.
+
+    Attributes:
+        figures: The robot's nominal full speed [m/s] and effective baseline [m].
+        disturbance: What was added to the steering at the last step [duty].
+        pictures: One before every command.
+        commands: What the expert would do, undisturbed.
+        on_road: Whether the middle of its axle was on the road then, whichever lane.
+    """
+
+    figures: tuple[float, float]
+    disturbance: float
+    pictures: tuple[Picture, ...]
+    commands: tuple[Command, ...]
+    on_road: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Expert:
+    """Drives by the true pose, and is pushed off its line so as to show how to come back to it.
+
+    Whoever imitates an expert that never errs has not seen what to do after its own first error, so the steering is
+    disturbed while the command that is shown is the undisturbed one (Laskey et al. 2017, DART).
+
+    Attributes:
+        road: The map.
+        look_ahead_m: How far along the lane's centre line the pursued point lies [m].
+        speed: Forward speed [m/s].
+        gain: Steering relative to the arc through that point.
+        disturbance: Standard deviation of what is added to the steering [duty].
+        seed: Seed of the disturbance.
+    """
+
+    road: LoopMap
+    look_ahead_m: float
+    speed: float
+    gain: float
+    disturbance: float
+    seed: int
+
+    def begin(self, robot: Robot) -> Shown:
+        """Nothing shown yet."""
+        return Shown((robot.figures["full_speed"], robot.figures["effective_baseline"]), 0.0, (), (), ())
+
+    def act(self, sight: Sight, memory: Shown) -> tuple[Command, Shown]:
+        """Steer for the point pursued, disturbed."""
+        command, on_road = self._command(sight.pose, *memory.figures)
+        drawn = np.random.default_rng([self.seed, len(memory.commands)]).standard_normal()
+        push = MEMORY * memory.disturbance + np.sqrt(1.0 - MEMORY**2) * self.disturbance * float(drawn)
+        shown = memory._replace(
+            disturbance=push,
+            pictures=(*memory.pictures, sight.picture),
+            commands=(*memory.commands, command),
+            on_road=(*memory.on_road, on_road),
+        )
+        return np.clip(command + np.array((-push, push)), -1.0, 1.0), shown
+
+    def _command(self, pose: Signal, full_speed: float, baseline: float) -> tuple[Command, bool]:
+        seen = lane_pose(self.road, pose[:2], pose[2])
+        ahead = lane_point(self.road, seen.counter_clockwise, seen.along + self.look_ahead_m) - pose[:2]
+        left = float(np.cos(pose[2]) * ahead[1] - np.sin(pose[2]) * ahead[0])
+        yaw_rate = self.gain * self.speed * 2.0 * left / float(ahead @ ahead)
+        command = duties(self.speed, yaw_rate, full_speed=full_speed, baseline=baseline)
+        from_middle = abs(self.road.lane_offset - float(seen.deviation))
+        return command, from_middle <= self.road.lane_offset + self.road.lane_width / 2.0

@@ -1,0 +1,164 @@
+"""After the search: the answer is driven again in fresh episodes, together with those that are nearly as good.
+
+All trials share the placement noise of the study's seed, so the θ that the search likes best also suits that noise.
+The candidates (lowest posterior means given all trials, not more than a standard deviation of the score's noise apart)
+get episodes under seeds that the search has not seen. The answer is the candidate with the lowest posterior mean given
+trials and fresh scores; what fresh episodes say of it beside the search's own is how much of that was luck. No trial
+depends on any of this.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proxytune.domain import Episode
+from proxytune.scores import ScoreTable
+from proxytune.search.proposer import Trial
+from proxytune.search.surrogate import fit_surrogate, unit_array
+from proxytune.study.evaluate import Spent, known_outcomes, plan, run_missing, score
+from proxytune.study.history import as_trials
+from proxytune.study.objective import FRESH
+from proxytune.study.progress import Watcher
+from proxytune.study.settings import StudySettings
+from proxytune.study.stopping import stopped
+from proxytune.study.store import Outcome, Store, TrialRecord
+from proxytune.study.study import Study
+from proxytune.usefulness import Assessment, assess
+
+CANDIDATES = 3
+"""At most so many θ are driven again."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A visited θ that has been driven again.
+
+    Attributes:
+        trial: The trial that visited it.
+        scores: PRPV of each fresh repetition of it; None where an agent has no episode that worked.
+        assessment: How useful the proxy is there, over all fresh episodes; None if an agent has none that worked.
+    """
+
+    trial: TrialRecord
+    scores: tuple[int | None, ...]
+    assessment: Assessment | None
+
+    @property
+    def optimism(self) -> float | None:
+        """How much better its trial scored than its fresh repetitions do on average."""
+        known = [one for one in self.scores if one is not None]
+        return float(np.mean(known)) - self.trial.prpv if known and self.trial.prpv is not None else None
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What fresh episodes say.
+
+    Attributes:
+        answer: The candidate with the lowest posterior mean given trials and fresh scores.
+        candidates: All that were driven again, the search's own favourite first.
+        episodes: How many fresh episodes each was driven in.
+    """
+
+    answer: Candidate
+    candidates: tuple[Candidate, ...]
+    episodes: int
+
+
+def run_confirmation(study: Study, store: Store, watcher: Watcher) -> Spent:
+    """Simulate what is missing of the fresh episodes of a study that has come to its end.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+        RunError: If no trial has a score.
+    """
+    trials, spent = [trial for trial in store.trials() if trial.state != "open"], Spent()
+    if not study.settings.confirm or not stopped(study, store, trials):
+        return spent
+    chosen = candidates(study, trials)
+    watcher.begin("fresh episodes", most_episodes(study.settings) - len(chosen) * per_candidate(study.settings))
+    for number, trial in enumerate(chosen, start=1):
+        planned = [episode for run in _plans(study.settings, trial) for episode in run]
+        spent += run_missing(study, store, planned, watcher, f"fresh episodes {number} of {len(chosen)}")
+    return spent
+
+
+def confirmation_of(study: Study, store: Store, trials: Sequence[TrialRecord]) -> Confirmation | None:
+    """What the fresh episodes in the store say of these trials; None if it is off, or an episode is still missing.
+
+    Raises:
+        RunError: If no trial has a score.
+    """
+    if not study.settings.confirm:
+        return None
+    found = [_driven_again(study, store, trial) for trial in candidates(study, trials)]
+    known = tuple(candidate for candidate in found if candidate is not None)
+    if len(known) < len(found):
+        return None
+    return Confirmation(_answer(study, trials, known), known, per_candidate(study.settings))
+
+
+def candidates(study: Study, trials: Sequence[TrialRecord]) -> list[TrialRecord]:
+    """The trials that are driven again, the lowest posterior mean first: a function of the trials alone.
+
+    Raises:
+        RunError: If no trial has a score.
+    """
+    space = study.settings.space
+    surrogate = fit_surrogate(space, as_trials(space, trials))
+    # Of a trial that was cut off it is certain that it is none of the best.
+    scored = list({space.values(trial.theta): trial for trial in trials if trial.prpv is not None}.values())
+    means, _ = surrogate.predict(unit_array(space, [space.values(trial.theta) for trial in scored]))
+    near = [row for row in np.argsort(means, kind="stable") if means[row] - means.min() <= surrogate.noise_deviation]
+    return [scored[row] for row in near[:CANDIDATES]]
+
+
+def per_candidate(settings: StudySettings) -> int:
+    """How many fresh episodes a candidate is driven in."""
+    return settings.confirm * len(settings.agents) * settings.starts
+
+
+def most_episodes(settings: StudySettings) -> int:
+    """How many episodes a confirmation takes at most."""
+    return CANDIDATES * per_candidate(settings)
+
+
+def _plans(settings: StudySettings, trial: TrialRecord) -> list[list[Episode]]:
+    """The episodes of each fresh repetition of a trial."""
+    seeds = [settings.seed + repetition * FRESH for repetition in range(1, settings.confirm + 1)]
+    return [plan(settings, trial.theta, seed) for seed in seeds]
+
+
+def _driven_again(study: Study, store: Store, trial: TrialRecord) -> Candidate | None:
+    runs = []
+    for planned in _plans(study.settings, trial):
+        known = known_outcomes(study, store, planned)
+        if len(known) < len(planned):
+            return None
+        runs.append(list(known.values()))
+    scores = tuple(score(study, trial.theta, outcomes).prpv for outcomes in runs)
+    return Candidate(trial, scores, _assessed(study, runs))
+
+
+def _assessed(study: Study, runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
+    """All fresh episodes as one table; of several repetitions, each start is another episode every time."""
+    scored: dict[tuple[str, str | int], Mapping[str, float]] = {}
+    for repetition, outcomes in enumerate(runs):
+        for one in outcomes:
+            label = f"{one.episode.start}/{repetition}" if len(runs) > 1 else one.episode.start
+            if one.metrics is not None:
+                scored[one.episode.agent, label] = one.metrics
+    if {agent for agent, _ in scored} != set(study.settings.agents):
+        return None
+    proxy = ScoreTable.from_episodes(scored)
+    return assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
+
+
+def _answer(study: Study, trials: Sequence[TrialRecord], known: Sequence[Candidate]) -> Candidate:
+    """Each candidate has as many fresh scores, so what fresh noise does to all of them alike favours none."""
+    space = study.settings.space
+    fresh = [Trial(space.values(one.trial.theta), score) for one in known for score in one.scores]
+    surrogate = fit_surrogate(space, [*as_trials(space, trials), *fresh])
+    means, _ = surrogate.predict(unit_array(space, [space.values(one.trial.theta) for one in known]))
+    return known[int(np.argmin(means))]

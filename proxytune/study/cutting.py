@@ -1,0 +1,173 @@
+"""Cutting an evaluation off once it cannot reach the incumbents any more.
+
+Agents are driven one after the other, each from all starts; then its place among those before it is decided. The pairs
+of decided agents are a lower bound of PRPV: eq. (4) of the paper is a sum over pairs, none of them negative. As soon as
+that bound lies above the limit, the evaluation cannot end among the incumbents (the trials within one standard
+deviation of the score's noise of the lowest posterior mean), whatever the other agents do, and they are not driven. The
+order of the agents puts those first that disagreed most with the target so far. Order, limit and verdict follow from
+the finished trials and the decided agents' episodes alone: a trial comes to the same end with any number of processes.
+
+What the search is told of such a trial is an estimate: the bound, divided by the share that these pairs had of PRPV in
+the trials that were not cut off.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.domain import Episode
+from proxytune.scores import ScoreTable
+from proxytune.search.surrogate import fit_surrogate
+from proxytune.study.evaluate import Spent, evaluation, known_outcomes, plan, run_missing, table
+from proxytune.study.history import as_trials, episodes_of
+from proxytune.study.progress import Watcher
+from proxytune.study.store import Outcome, Store, TrialRecord
+from proxytune.study.study import Study
+from proxytune.usefulness.prpv import dominance
+
+Array = NDArray[np.float64]
+FEWEST = 3
+"""Trials that must have been scored before one is cut off: fewer say nothing of noise."""
+SHARE = 1e-3
+"""What a pair counts besides its disagreements so far: no pair is certain never to disagree."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What an evaluation is held against: a function of the finished trials.
+
+    Attributes:
+        limit: The score above which it is not among the incumbents.
+        order: The agents in the order in which they are driven.
+        disagreement: Mean |α_proxy − α_target| of each pair over the scored trials, shape (agents, agents), in the
+            same order.
+    """
+
+    limit: float
+    order: tuple[str, ...]
+    disagreement: Array
+
+
+@dataclass(frozen=True)
+class Cut:
+    """An evaluation that was cut off.
+
+    Attributes:
+        decided: The agents that had been driven from all starts.
+        bound: PRPV of their pairs, which PRPV of all cannot be below.
+        estimate: What PRPV of all is expected to be.
+    """
+
+    decided: tuple[str, ...]
+    bound: float
+    estimate: float
+
+
+def reference(study: Study, store: Store, done: Sequence[TrialRecord]) -> Reference | None:
+    """What the next trial is held against; None where it is not to be cut off.
+
+    That is so during the design, on which all else rests, and where a tolerance is a percentage: what is a tie then
+    depends on agents not driven yet, so that no pair is decided before the last. The engine `composite` needs every
+    agent's metrics.
+    """
+    settings = study.settings
+    scored = [trial for trial in done if trial.state == "finished"]
+    percent = any(metric.percent for metric in settings.metrics)
+    whole = percent or settings.engine == "composite"
+    if not settings.cut_off or whole or len(done) < settings.initial or len(scored) < FEWEST:
+        return None
+    surrogate = fit_surrogate(settings.space, as_trials(settings.space, done))
+    means, _ = surrogate.at_visited()
+    tables = [found.proxy for trial in scored if (found := evaluation(study, store, trial.theta)) and found.proxy]
+    agents = sorted(settings.agents)
+    disagreement = SHARE + np.mean([_disagreement(study, proxy, agents) for proxy in tables], axis=0)
+    rows = _telling_first(disagreement)
+    limit = float(means.min()) + surrogate.noise_deviation
+    return Reference(limit, tuple(agents[row] for row in rows), disagreement[np.ix_(rows, rows)])
+
+
+def run_or_cut(
+    study: Study, store: Store, trial: TrialRecord, against: Reference, watcher: Watcher, what: str
+) -> tuple[Spent, Cut | None]:
+    """Simulate what is missing of a trial until it is through or cut off.
+
+    Episodes that other processes have begun by then are kept in the store, but the trial does not stand on them.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+    """
+    settings = study.settings
+    place = {agent: number for number, agent in enumerate(against.order)}
+    planned = sorted(plan(settings, trial.theta, settings.seed), key=lambda episode: place[episode.agent])
+    before = known_outcomes(study, store, planned)
+
+    def enough(known: Mapping[Episode, Outcome]) -> bool:
+        # The bound never falls, so the last of the agents decided tells for those before it.
+        count = _decided(study, against, planned, known)
+        return count >= 2 and _cut_at(study, against, planned, known, count) is not None
+
+    spent = run_missing(study, store, planned, watcher, what, enough)
+    known = known_outcomes(study, store, planned)
+    last = _decided(study, against, planned, known)
+    cuts = (_cut_at(study, against, planned, known, count) for count in range(2, last + 1))
+    cut = next((found for found in cuts if found is not None), None)
+    if cut is None:
+        return spent, None
+    watcher.begin(what, len(planned) - len(known))
+    unused = sum(episode.agent not in cut.decided for episode in known if episode not in before)
+    return spent + Spent(unused=unused), cut
+
+
+def spared(study: Study, store: Store, trials: Sequence[TrialRecord]) -> tuple[int, float]:
+    """How many episodes the cut trials did without, and how long their like take [s], by the others' mean time."""
+    seconds = store.seconds()
+    missing = [
+        episode
+        for trial in trials
+        if trial.decided
+        for episode in set(plan(study.settings, trial.theta, study.settings.seed))
+        - set(episodes_of(study.settings, trial))
+    ]
+    return len(missing), sum(seconds.get((episode.agent, episode.start), 0.0) for episode in missing)
+
+
+def _decided(study: Study, against: Reference, planned: Sequence[Episode], known: Mapping[Episode, Outcome]) -> int:
+    """How many agents, in their order and without the last, have been driven from all starts."""
+    starts, most = study.settings.starts, len(against.order) - 1
+    through = (all(e in known for e in planned[row * starts : (row + 1) * starts]) for row in range(most))
+    return next((row for row, done in enumerate(through) if not done), most)
+
+
+def _cut_at(
+    study: Study, against: Reference, planned: Sequence[Episode], known: Mapping[Episode, Outcome], count: int
+) -> Cut | None:
+    """Whether the first so many agents are enough to cut off."""
+    names = against.order[:count]
+    worked = [known[episode] for episode in planned[: count * study.settings.starts] if known[episode].metrics]
+    if {outcome.episode.agent for outcome in worked} != set(names):
+        # An agent that failed from every start leaves the trial without a score, not with a bad one.
+        return None
+    bound = float(_disagreement(study, table(worked), names).sum())
+    share = against.disagreement[:count, :count].sum() / against.disagreement.sum()
+    return Cut(names, bound, float(bound / share)) if bound > against.limit else None
+
+
+def _disagreement(study: Study, proxy: ScoreTable, agents: Sequence[str]) -> Array:
+    """|α_proxy − α_target| of each pair of these agents, in their order."""
+    metrics = study.settings.metrics
+    names = [metric.name for metric in metrics]
+    sides = [table.select(names).arrange(agents=agents).means for table in (proxy, study.target)]
+    ranked = [dominance(means, metrics) for means in sides]
+    return np.abs(ranked[0] - ranked[1])
+
+
+def _telling_first(disagreement: Array) -> list[int]:
+    """Rows in the order in which their pairs disagree most, one added after the other."""
+    chosen = [int(np.argmax(disagreement.max(axis=1)))]
+    while len(chosen) < len(disagreement):
+        gains = disagreement[:, chosen].sum(axis=1)
+        gains[chosen] = -1.0
+        chosen.append(int(np.argmax(gains)))
+    return chosen

@@ -1,0 +1,242 @@
+"""Before a study: does each parameter of its box move the metrics beyond noise?
+
+The domain instance in the centre of the box is the base. Each parameter is moved to either end of its box, the others
+held, under the same seeds (common random numbers): a parameter that does nothing then changes no episode by a hair.
+What noise does is told by driving the base again under other seeds, one for each agent and start. Per metric and end, a
+one-sided Wilcoxon signed-rank test asks over agents and starts whether |change by the parameter| is larger than |change
+by noise|; were the parameter one more source of noise, either would be the larger as often as the other. P-values are
+multiplied by the number of tests (Bonferroni: metrics × ends × looks). A parameter that the first half of the starts
+already shows to matter is left out of the second look.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import wilcoxon
+
+from proxytune.domain import Episode, make_episode
+from proxytune.space import Interval, Theta
+from proxytune.study.evaluate import Spent, episode_seed, known_outcomes, run_missing
+from proxytune.study.progress import Watcher
+from proxytune.study.settings import StudySettings
+from proxytune.study.store import Outcome, Store
+from proxytune.study.study import Study
+
+LEVEL = 0.05
+"""Of all tests of one parameter together."""
+LOOKS = 2
+PAIRS = 24
+"""So many agents × places at least: with fewer, nothing short of a landslide would be beyond noise."""
+AGAIN = 7
+"""Tells the seeds of noise from those of places."""
+
+Array = NDArray[np.float64]
+
+
+class Place(NamedTuple):
+    """Where every agent drives from: the start, and which time from there."""
+
+    start: int
+    turn: int
+
+
+@dataclass(frozen=True)
+class Movement:
+    """What moving one parameter across its box does to the metrics.
+
+    Attributes:
+        interval: The parameter and its box.
+        p_value: How likely noise alone is to change a metric as much, corrected for all tests; the lowest of them.
+        metric: The metric of that test.
+        change: Median over agents and starts of how much the parameter changes it.
+        noise: Median of how much noise does.
+        pairs: Over how many agents and starts; failed episodes are left out.
+        dead: Whether no metric of any of their episodes changed at all.
+    """
+
+    interval: Interval
+    p_value: float
+    metric: str
+    change: float
+    noise: float
+    pairs: int
+    dead: bool
+
+    @property
+    def moves(self) -> bool:
+        """Whether the parameter changes a metric beyond noise."""
+        return self.p_value < LEVEL
+
+    @property
+    def warning(self) -> str:
+        """What is wrong with the parameter and what to do, in one line; empty if nothing is."""
+        if self.moves:
+            return ""
+        name, box = self.interval.name, f"[{self.interval.low:g}, {self.interval.high:g}]"
+        if not self.pairs:
+            return f"pre-flight: '{name}' cannot be judged: every agent fails somewhere in {box}; narrow its box"
+        what = "nothing at all" if self.dead else "no metric beyond noise"
+        remedy = "take it out of [parameters], add agents that depend on it, or widen its box"
+        return f"pre-flight: '{name}' changes {what} from end to end of {box}; {remedy}"
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """What a study has learnt of its parameters before its first trial.
+
+    Attributes:
+        base: The domain instance from which they were moved.
+        movements: One per parameter, in the order of the box.
+        episodes: How many episodes it took.
+    """
+
+    base: Theta
+    movements: tuple[Movement, ...]
+    episodes: int
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One line for each parameter that does nothing beyond noise."""
+        return tuple(movement.warning for movement in self.movements if not movement.moves)
+
+
+def run_preflight(study: Study, store: Store, watcher: Watcher) -> Spent:
+    """Simulate what is missing of the pre-flight of a study that has no finished trial yet.
+
+    Nothing of it enters a trial. A study whose trials have begun goes on without.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+    """
+    spent = Spent()
+    if not study.settings.preflight or any(trial.state != "open" for trial in store.trials()):
+        return spent
+    undecided = study.settings.space.intervals
+    for look in range(LOOKS):
+        before, now = (_plan(study.settings, _places(study.settings, n), undecided) for n in (look - 1, look))
+        added, what = now[len(before) :], f"pre-flight {look + 1} of {LOOKS}"
+        watcher.begin(what, _most(study.settings, look) - len(added))
+        spent += run_missing(study, store, added, watcher, what)
+        known = known_outcomes(study, store, now)
+        undecided = tuple(i for i in undecided if not _movement(study, look, i, known).moves)
+    return spent
+
+
+def preflight_of(study: Study, store: Store) -> Preflight | None:
+    """The pre-flight from what the store has; None if it is off, or an episode is still missing."""
+    if not study.settings.preflight:
+        return None
+    found: dict[str, Movement] = {}
+    driven: set[Episode] = set()
+    undecided = study.settings.space.intervals
+    for look in range(LOOKS):
+        planned = _plan(study.settings, _places(study.settings, look), undecided)
+        known = known_outcomes(study, store, planned)
+        if len(known) < len(planned):
+            return None
+        driven |= set(planned)
+        found |= {i.name: _movement(study, look, i, known) for i in undecided}
+        undecided = tuple(i for i in undecided if not found[i.name].moves)
+    return Preflight(_base(study.settings), tuple(found[name] for name in study.settings.space.names), len(driven))
+
+
+def most_episodes(settings: StudySettings) -> int:
+    """How many episodes a pre-flight takes at most."""
+    return sum(_most(settings, look) for look in range(LOOKS)) if settings.preflight else 0
+
+
+def _most(settings: StudySettings, look: int) -> int:
+    """How many episodes a look takes that the one before did not, if no parameter is decided."""
+    instances = 2 + 2 * len(settings.space.intervals)
+    return (len(_places(settings, look)) - len(_places(settings, look - 1))) * len(settings.agents) * instances
+
+
+def _places(settings: StudySettings, look: int) -> list[Place]:
+    """Where agents drive from up to this look: the study's starts in turn, until there are pairs enough."""
+    half = max(1, ceil(PAIRS / LOOKS / len(settings.agents)))
+    return [Place(k % settings.starts, k // settings.starts) for k in range(half * (look + 1))]
+
+
+def _base(settings: StudySettings) -> dict[str, float]:
+    return {i.name: 0.5 * (i.low + i.high) for i in settings.space.intervals}
+
+
+def _plan(settings: StudySettings, places: Sequence[Place], undecided: Sequence[Interval]) -> list[Episode]:
+    """Place by place: the base, the base under another seed, the ends of the undecided; nothing if there are none."""
+    if not undecided:
+        return []
+    base = _base(settings)
+    instances = [base, *({**base, i.name: end} for i in undecided for end in (i.low, i.high))]
+    return [
+        episode
+        for place in places
+        for agent in settings.agents
+        for episode in (
+            _again(settings, agent, place),
+            *(_episode(settings, theta, agent, place) for theta in instances),
+        )
+    ]
+
+
+def _episode(settings: StudySettings, theta: Theta, agent: str, place: Place) -> Episode:
+    seed = episode_seed(settings.seed, place.start) if place.turn == 0 else _seed(settings, place)
+    return make_episode(theta, agent=agent, start=place.start, seed=seed)
+
+
+def _again(settings: StudySettings, agent: str, place: Place) -> Episode:
+    """The base under a seed of its own: agents that shared it would share one draw of the noise."""
+    seed = _seed(settings, place, AGAIN, sorted(settings.agents).index(agent))
+    return make_episode(_base(settings), agent=agent, start=place.start, seed=seed)
+
+
+def _seed(settings: StudySettings, place: Place, *more: int) -> int:
+    return int(np.random.SeedSequence([settings.seed, place.start, place.turn, *more]).generate_state(1)[0])
+
+
+def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episode, Outcome]) -> Movement:
+    """Test one parameter on what is known at this look."""
+    settings = study.settings
+    base = _base(settings)
+    instances = [base, *({**base, interval.name: end} for end in (interval.low, interval.high))]
+    driven = [
+        [known[_again(settings, agent, place)], *(known[_episode(settings, t, agent, place)] for t in instances)]
+        for place in _places(settings, look)
+        for agent in settings.agents
+    ]
+    whole = [group for group in driven if all(outcome.metrics is not None for outcome in group)]
+    names = [metric.name for metric in settings.metrics]
+    values = np.array([[[(o.metrics or {})[name] for name in names] for o in group] for group in whole])
+    return judge(interval, names, values.reshape(-1, 4, len(names)))
+
+
+def judge(interval: Interval, names: Sequence[str], values: Array) -> Movement:
+    """What the test that tells most says of a parameter.
+
+    Args:
+        interval: The parameter.
+        names: The metrics.
+        values: Shape (agents × places, 4, metrics): the base again, the base, the lower and the upper end.
+    """
+    changes = np.abs(values[:, [0, 2, 3]] - values[:, [1]])
+    tests = [(_larger(changes[:, end, m], changes[:, 0, m]), end, m) for end in (1, 2) for m in range(len(names))]
+    p_value, end, m = min(tests)
+    middle = np.median(changes[:, [0, end], m], axis=0) if len(changes) else (0.0, 0.0)
+    return Movement(
+        interval=interval,
+        p_value=min(1.0, p_value * len(tests) * LOOKS),
+        metric=names[m],
+        change=float(middle[1]),
+        noise=float(middle[0]),
+        pairs=len(changes),
+        dead=not changes[:, 1:].any(),
+    )
+
+
+def _larger(changes: Array, noise: Array) -> float:
+    """How likely the signed ranks of |change| − |noise| are if neither is the larger."""
+    apart = changes - noise
+    return float(wilcoxon(apart, alternative="greater").pvalue) if apart.any() else 1.0

@@ -1,0 +1,42 @@
+"""A study scored anew by other metrics or tolerances, from the episodes it has; nothing is simulated."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from proxytune.errors import InputError
+from proxytune.scores import Metric
+from proxytune.settings import nearest
+from proxytune.study.result import StudyResult, known_evaluation, result_of
+from proxytune.study.run import record
+from proxytune.study.stopping import stopped
+from proxytune.study.store import Store
+from proxytune.study.study import Study, read_target
+
+
+def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:
+    """The study with its agents compared by these metrics instead.
+
+    Raises:
+        InputError: If the domain family or the target's table lacks one, or one is named twice.
+    """
+    names = [metric.name for metric in metrics]
+    for name in names:
+        if name not in study.family.metrics:
+            raise InputError(f"--metric {name}: no such metric; {nearest(name, study.family.metrics)}")
+        if names.count(name) > 1:
+            raise InputError(f"--metric {name}: is given twice; give each metric once")
+    settings = replace(study.settings, metrics=tuple(metrics))
+    return replace(study, settings=settings, target=read_target(settings))
+
+
+def rescored(study: Study, store: Store, metrics: Sequence[Metric]) -> StudyResult:
+    """The result that the study's trials give by these metrics; they remain those that its own metrics led to.
+
+    Raises:
+        InputError: If a metric cannot be used.
+        RunError: If no trial has a score, or episodes are missing.
+    """
+    own = [trial for trial in store.trials() if trial.state != "open"]
+    other = with_metrics(study, metrics)
+    trials = [record(trial.number, known_evaluation(other, store, trial)) for trial in own]
+    return replace(result_of(other, store, trials), stopped=stopped(study, store, own))

@@ -1,0 +1,121 @@
+"""What the [teaching] table of a study.toml says, read strictly."""
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from proxytune.learning.lessons import Distribution
+from proxytune.settings import Section
+
+DEFAULT_LEARNER = "proxytune.learning.cloning:BehaviourCloning"
+KEYS = (
+    "target", "learner", "proxy_samples", "target_samples", "seeds", "lesson_s",
+    "level", "tolerance", "budget", "narrow", "width", "proxies",
+)  # fmt: skip
+NONE = "none"
+"""The name of the learner without a proxy, which no proxy may have."""
+
+
+@dataclass(frozen=True)
+class TeachingSettings:
+    """How a proxy's worth as a teacher is measured.
+
+    Attributes:
+        target: The target's model.toml, in which the learners are fine-tuned and examined.
+        learner: Who learns, as "module:attribute".
+        proxy_samples: Samples that a proxy teaches.
+        target_samples: The grid of numbers of target samples, rising from 0.
+        seeds: How many times the whole is repeated.
+        lesson_s: How long the expert drives from one start [s].
+        level: The score that counts as converged; None for what a learner without a proxy converges to.
+        tolerance: How far below it still counts.
+        budget: How many proxies a study of the objective "plv" tries.
+        narrow: Whether such a study first finds by PRPV the θ that cannot be told from the best, and searches there.
+        widths: Bounds of the widths of p(θ) that such a study searches, by parameter; without one, θ is fixed.
+        proxies: What `teach` compares, by name: p(θ) of each.
+    """
+
+    target: Path
+    learner: str
+    proxy_samples: int
+    target_samples: tuple[int, ...]
+    seeds: int
+    lesson_s: float
+    level: float | None
+    tolerance: float
+    budget: int
+    narrow: bool
+    widths: Mapping[str, tuple[float, float]]
+    proxies: Mapping[str, Distribution]
+
+
+def read_teaching(section: Section) -> TeachingSettings | None:
+    """Read the table; None where there is none.
+
+    Raises:
+        SettingsError: With file, key and remedy.
+    """
+    if not section.values:
+        return None
+    section.only(KEYS)
+    target = section.path.parent / section.text("target")
+    if not target.is_file():
+        raise section.error("target", f"no such file: {target}; give the target's model.toml")
+    return TeachingSettings(
+        target=target,
+        learner=section.text("learner", DEFAULT_LEARNER),
+        proxy_samples=section.whole("proxy_samples", 4000, low=1, high=1_000_000),
+        target_samples=_grid(section),
+        seeds=section.whole("seeds", 5, low=1, high=1000),
+        lesson_s=section.number("lesson_s", 5.0, low=0.1, high=3600.0),
+        level=section.number("level") if "level" in section.values else None,
+        tolerance=section.number("tolerance", 5.0, low=0.0),
+        budget=section.whole("budget", 12, low=1, high=100_000),
+        narrow=_flag(section, "narrow"),
+        widths=_widths(section.section("width")),
+        proxies=_proxies(section.section("proxies")),
+    )
+
+
+def _grid(section: Section) -> tuple[int, ...]:
+    key = "target_samples"
+    if key not in section.values:
+        raise section.error(key, "is missing; give numbers of target samples, as in [0, 100, 200, 400, 800]")
+    counts = section.values[key]
+    if not isinstance(counts, list) or not all(type(count) is int and count >= 0 for count in counts):
+        raise section.error(key, f"must be a list of whole numbers from 0 on, got {counts!r}")
+    if counts[:1] != [0]:
+        raise section.error(key, "must begin with 0: the score before any target sample; add it")
+    if len(counts) < 2 or any(later <= earlier for earlier, later in itertools.pairwise(counts)):
+        raise section.error(key, f"must rise, over two numbers at least, got {counts}")
+    return tuple(counts)
+
+
+def _flag(section: Section, key: str) -> bool:
+    value = section.values.get(key, False)
+    if not isinstance(value, bool):
+        raise section.error(key, f"must be true or false, got {value!r}")
+    return value
+
+
+def _widths(section: Section) -> Mapping[str, tuple[float, float]]:
+    widths = {name: section.bounds(name) for name in section.values}
+    for name, (low, _) in widths.items():
+        if low < 0.0:
+            raise section.error(name, f"a width is at least 0, got {low:g}")
+    return widths
+
+
+def _proxies(section: Section) -> Mapping[str, Distribution]:
+    if NONE in section.values:
+        raise section.error(NONE, "is what learning without a proxy is called; choose another name")
+    return {name: _distribution(section.section(name)) for name in section.values}
+
+
+def _distribution(section: Section) -> Distribution:
+    pairs = {}
+    for name, value in section.values.items():
+        single = isinstance(value, int | float) and not isinstance(value, bool)
+        pairs[name] = (section.number(name),) * 2 if single else section.bounds(name)
+    return Distribution(dict(sorted(pairs.items())))

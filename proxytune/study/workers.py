@@ -1,0 +1,106 @@
+"""Doing many independent pieces of work, in this process or spread over several."""
+
+import os
+import pickle
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import takewhile
+from typing import Any, TypeVar, cast
+
+from joblib import Parallel, delayed
+
+from proxytune.errors import RunError
+
+WATCH_S = 0.5
+Piece = TypeVar("Piece")
+Result = TypeVar("Result")
+
+
+@contextmanager
+def working(
+    work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int, over: Callable[[], bool] = lambda: False
+) -> Iterator[Iterator[Result]]:
+    """Do pieces of work and give each result as soon as it is there, in no particular order.
+
+    Which process does a piece, and after which, must not change its result. With several jobs, joblib's backend is
+    the caller's choice (processes of this machine by default). Leaving the context drops the pieces not yet done.
+
+    Args:
+        work: Does one piece; picklable.
+        pieces: What to do, in the order in which to begin.
+        jobs: How many processes; with one, everything is done in this process.
+        over: Once this is true no further piece begins; those under way are still finished.
+
+    Raises:
+        RunError: If a process dies.
+    """
+    begun = takewhile(lambda _: not over(), pieces)
+    results = _spread(work, begun, jobs) if min(jobs, len(pieces)) > 1 else _here(work, begun)
+    try:
+        yield _told(results)
+    finally:
+        with warnings.catch_warnings():
+            # joblib warns of pieces it has finished in vain; whoever leaves early knows.
+            warnings.simplefilter("ignore", UserWarning)
+            results.close()
+
+
+def _here(work: Callable[[Piece], Result], pieces: Iterable[Piece]) -> Generator[Result, None, None]:
+    for piece in pieces:
+        yield work(piece)
+
+
+def _spread(work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int) -> Generator[Result, None, None]:
+    recipe = _Recipe(pickle.dumps(work), tuple(sys.path), os.getpid())
+    # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
+    parallel = Parallel(n_jobs=jobs, batch_size=1, pre_dispatch=jobs + 1, return_as="generator_unordered")
+    return cast("Generator[Result, None, None]", parallel(delayed(_do_pickled)(recipe, piece) for piece in pieces))
+
+
+@dataclass(frozen=True)
+class _Recipe:
+    """Work pickled once, where its modules are found, and whose it is: a process unpickles it once."""
+
+    pickled: bytes
+    folders: tuple[str, ...]
+    owner: int
+
+
+def _do_pickled(recipe: _Recipe, piece: Any) -> Any:
+    if os.getppid() == recipe.owner:
+        _end_with(recipe.owner)
+    return _unpickled(recipe)(piece)
+
+
+@lru_cache
+def _end_with(parent: int) -> None:
+    """End this process soon after its parent: after a `kill -9` it would wait for work for minutes."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@lru_cache(maxsize=1)
+def _unpickled(recipe: _Recipe) -> Callable[[Any], Any]:
+    sys.path.extend(folder for folder in recipe.folders if folder not in sys.path)
+    return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
+
+
+def _told(results: Iterator[Result]) -> Iterator[Result]:
+    try:
+        yield from results
+    except BrokenExecutor:
+        raise RunError(
+            "a process that ran episodes was killed (out of memory?); run again to go on, perhaps with jobs = 1"
+        ) from None

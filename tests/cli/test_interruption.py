@@ -1,0 +1,105 @@
+"""SIGTERM and Ctrl-C, sent to real processes of every long command."""
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from processes import finished_episodes, start, wait_for
+
+from proxytune.cli.interruption import Terminated, sigterm_as_interrupt
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+from planted import planted_log, write_log
+
+SLOWLY = {"sleep": "0.03"}
+
+
+def ended(process, number):
+    """Stop a command, and see that it ends with its one line and no process left."""
+    process.send_signal(number)
+    out, told = process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
+    lines = [line for line in told.splitlines() if not line.startswith("compare: at most")]
+    word, status = {signal.SIGTERM: ("terminated", 143), signal.SIGINT: ("interrupted", 130)}[number]
+    (line,) = lines
+    assert line.endswith(f": {word}; what was finished is kept, the same command goes on")
+    assert (process.returncode, out) == (status, "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stopped_sweep_keeps_its_episodes(make_study, number, jobs):
+    folder = make_study(domain=SLOWLY, jobs=jobs)
+    process = start("sweep", folder, "--parameter", "trim", "--points", "5")
+    wait_for(folder, process, 30)
+    ended(process, number)
+    assert 30 <= finished_episodes(folder) < 5 * 18
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stopped_comparison_keeps_its_episodes(make_study, tmp_path, number, jobs):
+    folder, output = make_study(domain=SLOWLY, jobs=jobs), tmp_path / "out"
+    process = start("compare", folder, "--engines", "sobol", "--seeds", "2", "--output", output)
+    wait_for(output, process, 30)
+    ended(process, number)
+    assert 30 <= finished_episodes(output) < 4 * 8 * 18
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stopped_comparison_on_the_stand_in_ends_its_processes(tmp_path, number):
+    process = start("compare", "analytic", "--engines", "sobol", "--seeds", "30", "--output", tmp_path)
+    runs = tmp_path / "runs.jsonl"
+    while not runs.exists() and process.poll() is None:
+        time.sleep(0.01)
+    ended(process, number)
+    assert len(runs.read_text().splitlines()) < 60
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stopped_diagnosis_is_one_line_and_leaves_no_findings(tmp_path, number):
+    log = write_log(planted_log({}, episodes=6, seconds=20.0), tmp_path / "log")
+    process = start("diagnose", log, "--output", tmp_path / "out")
+    wait_until_heeding(process)
+    ended(process, number)
+    assert not (tmp_path / "out").exists()
+
+
+def wait_until_heeding(process):
+    """Until SIGTERM has a handler: the command has begun."""
+    status = Path(f"/proc/{process.pid}/status")
+    if not status.exists():
+        pytest.skip("this system does not tell which signals a process handles")
+    while process.poll() is None:
+        caught = next(line for line in status.read_text().splitlines() if line.startswith("SigCgt"))
+        if int(caught.split()[1], 16) >> (signal.SIGTERM - 1) & 1:
+            return
+        time.sleep(0.005)
+
+
+def test_sigterm_is_raised_once_and_cleaning_up_is_left_alone():
+    before = signal.getsignal(signal.SIGTERM)
+    cleaned = []
+    with pytest.raises(Terminated), sigterm_as_interrupt():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        finally:
+            os.kill(os.getpid(), signal.SIGTERM)
+            cleaned.append(True)
+    assert cleaned
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_ctrl_c_while_libraries_are_loaded_is_one_line(tmp_path):
+    """A rich of our own, which is loaded first, presses it."""
+    (tmp_path / "rich.py").write_text("import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n")
+    process = start("study", tmp_path, cwd=tmp_path)
+    out, told = process.communicate(timeout=60)
+    assert (process.returncode, out, told) == (130, "", "proxytune: interrupted\n")

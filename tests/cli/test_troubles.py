@@ -1,0 +1,272 @@
+"""What goes wrong around a study, through the real command line: one line, the right status, and nothing lost."""
+
+import os
+import re
+import resource
+import shutil
+import sqlite3
+import subprocess
+
+import pytest
+from processes import episodes, start, trials
+
+from proxytune.cli.main import main
+from proxytune.search.engines import make_proposer
+from proxytune.study.database import FORMAT
+from proxytune.study.progress import Silent
+from proxytune.study.run import run_study
+from proxytune.study.store import Store
+from proxytune.study.study import open_study
+
+slow = pytest.mark.slow
+DAMAGED = r"is damaged \([^)]+\); restore a copy, or move it away to start again"
+
+
+class Stopping(Silent):
+    """Presses Ctrl-C after so many episodes."""
+
+    def __init__(self, episodes):
+        self.left = episodes
+
+    def episode(self):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+def interrupted_after(folder, count):
+    """Run a study in this process until it has so many episodes."""
+    study = open_study(folder)
+    with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
+        run_study(study, store, make_proposer("gp", study.settings.initial), Stopping(count))
+
+
+@pytest.fixture
+def half(make_study):
+    """A study stopped in the middle of its fifth trial."""
+    folder = make_study("half")
+    interrupted_after(folder, 80)
+    return folder
+
+
+def run(*words, status=0, **how):
+    """A command as a process of its own: its one line on standard error, or what it printed where all went well."""
+    process = start(*words, **how)
+    out, told = process.communicate(timeout=120)
+    assert process.returncode == status, told
+    if status == 0:
+        return out
+    assert (out, told.count("\n")) == ("", 1)
+    return told
+
+
+def refused(capsys, status, *words):
+    """The one line of a command run in this process."""
+    assert main([*map(str, words)]) == status
+    out, told = capsys.readouterr()
+    assert (out, told.count("\n")) == ("", 1)
+    return told
+
+
+def goes_on(folder, finished):
+    """Run to the end: trials and episodes are those of a study that has never been in trouble."""
+    assert main(["study", str(folder), "--json"]) == 0
+    assert trials(folder) == trials(finished)
+    assert episodes(folder) == episodes(finished)
+
+
+def told_by_every_command(folder, capsys, expected):
+    """`study` as a process, `sweep` and `plot` in this one: the same line, and study.db as it was."""
+    path = folder / "study.db"
+    before = path.read_bytes() if path.is_file() else sorted(path.iterdir())
+    found = {
+        "study": run("study", folder, status=1),
+        "sweep": refused(capsys, 1, "sweep", folder, "--parameter", "trim", "--points", "2"),
+        "plot": refused(capsys, 1, "plot", folder),
+    }
+    for command, line in found.items():
+        assert re.fullmatch(f"proxytune {command}: {re.escape(str(path))}: {expected}\n", line), line
+    assert before == (path.read_bytes() if path.is_file() else sorted(path.iterdir()))
+    assert sorted(file.name for file in folder.iterdir()) == ["study.db", "study.toml", "target.csv"]
+
+
+def test_a_newer_format_is_told_and_its_study_goes_on_where_that_is_known(half, finished, capsys):
+    with sqlite3.connect(half / "study.db") as plain:
+        plain.execute(f"PRAGMA user_version = {FORMAT + 1}")
+    expected = f"has format {FORMAT + 1}, this proxytune reads up to {FORMAT}; install a newer one"
+    told_by_every_command(half, capsys, expected)
+    with sqlite3.connect(half / "study.db") as plain:
+        plain.execute(f"PRAGMA user_version = {FORMAT}")
+    goes_on(half, finished)
+
+
+@slow
+def test_a_text_file_in_its_place_is_told(half, capsys):
+    (half / "study.db").write_text("trial,prpv\n" * 500)
+    told_by_every_command(half, capsys, DAMAGED)
+
+
+@slow
+def test_a_folder_in_its_place_is_told(half, capsys):
+    (half / "study.db").rename(half.parent / "aside")
+    (half / "study.db").mkdir()
+    told_by_every_command(half, capsys, "is a folder, not a study's database; move it away")
+
+
+CUTS = [1, 4096, -4096, -1]
+MORE_CUTS = [50, 100, 512, 5000, 3 * 4096, -2 * 4096, -4095]
+
+
+@pytest.mark.parametrize("cut", [*CUTS, *(pytest.param(cut, marks=slow) for cut in MORE_CUTS)])
+def test_a_truncated_database_is_told_wherever_it_is_cut(half, capsys, cut):
+    path = half / "study.db"
+    content = path.read_bytes()
+    path.write_bytes(content[:cut])
+    for words in (("study", half), ("sweep", half, "--parameter", "trim", "--points", "2"), ("plot", half)):
+        told = refused(capsys, 1, *words)
+        assert re.fullmatch(f"proxytune {words[0]}: {re.escape(str(path))}: {DAMAGED}\n", told), told
+        assert path.read_bytes() == content[:cut]
+    assert sorted(file.name for file in half.iterdir()) == ["study.db", "study.toml", "target.csv"]
+
+
+@slow
+def test_with_the_truncated_database_restored_the_study_goes_on(half, finished, capsys):
+    path = half / "study.db"
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    told_by_every_command(half, capsys, DAMAGED)
+    path.write_bytes(content)
+    goes_on(half, finished)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
+def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_study, finished, share):
+    """As a machine without power may leave it: what is lost is simulated again, to the same trials."""
+    folder, crashed = make_study("half"), make_study("crashed")
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        with pytest.raises(KeyboardInterrupt):
+            run_study(study, store, make_proposer("gp", 5), Stopping(80))
+        for name in ("study.db", "study.db-wal"):
+            shutil.copy(folder / name, crashed / name)
+    log = crashed / "study.db-wal"
+    os.truncate(log, int(share * log.stat().st_size))
+    kept = len(episodes(crashed)) if share else 0
+    assert (kept > 0) == (share > 0)
+    with Store.open(crashed) as store:
+        spent = run_study(open_study(crashed), store, make_proposer("gp", 5), Silent())
+    assert spent.episodes == 7 * 18 - kept
+    assert (trials(crashed), episodes(crashed)) == (trials(finished), episodes(finished))
+
+
+def limited(limit):
+    """A process that may write no file larger than this: what a full disk is like, also to root."""
+    return {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))}
+
+
+FULL = r"cannot be read or written \(disk I/O error\); is the disk full\? What is finished is kept"
+
+
+@pytest.mark.parametrize("limit", [pytest.param(64, marks=slow), pytest.param(40_000, marks=slow), 120_000])
+def test_a_disk_that_fills_up_is_told_and_the_study_goes_on_when_there_is_room(half, finished, limit):
+    before = episodes(half)
+    told = run("study", half, status=1, **limited(limit))
+    assert re.fullmatch(f"proxytune study: {re.escape(str(half / 'study.db'))}: {FULL}\n", told), told
+    assert set(before) <= set(episodes(half))
+    goes_on(half, finished)
+
+
+def drawn(folder):
+    """Figures and report, and whatever else is in the folder but the database."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name != "study.db"}
+
+
+@slow
+@pytest.mark.parametrize(("limit", "name"), [(35_000, "figures/convergence.png"), (120_000, "report.html")])
+def test_figures_and_report_on_a_full_disk_are_told_and_the_old_ones_stay(finished, capsys, limit, name):
+    """The study is finished, its database needs no more room than it has."""
+    assert main(["study", str(finished), "--json"]) == 0
+    capsys.readouterr()
+    before, known = drawn(finished), (trials(finished), episodes(finished))
+    for command in ("study", "plot"):
+        told = run(command, finished, status=1, **limited(limit))
+        what = "the figure " if name.endswith("png") else ""
+        place = f"{finished / name}: {what}cannot be written (File too large); mend that and run again"
+        assert told == f"proxytune {command}: {place}\n"
+        assert (trials(finished), episodes(finished)) == known
+        assert drawn(finished) == before
+    shutil.rmtree(finished / "figures")
+    assert main(["plot", str(finished)]) == 0
+    assert drawn(finished) == before
+
+
+def test_a_standard_output_that_is_full_is_told(finished):
+    with open("/dev/full", "w") as full:
+        process = start("plot", finished, "--json", stdout=full)
+        _, told = process.communicate(timeout=60)
+    line = "standard output: cannot be written (No space left on device); make room and run again"
+    assert (process.returncode, told) == (1, f"proxytune plot: {line}\n")
+
+
+@pytest.fixture
+def sealed(half):
+    """A half-run study's folder that cannot be written, also not by root: mounted so where the process may."""
+    if os.geteuid() != 0:
+        half.chmod(0o555)
+        yield half, "Permission denied"
+        half.chmod(0o755)
+        return
+    if subprocess.run(["mount", "--bind", half, half], capture_output=True).returncode:
+        pytest.skip("root can write every folder, and this process may not mount one that is read-only")
+    subprocess.run(["mount", "-o", "remount,ro,bind", half], check=True)
+    yield half, "Read-only file system"
+    subprocess.run(["umount", half], capture_output=True)
+
+
+def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_written(sealed, finished, capsys):
+    folder, why = sealed
+    before = (folder / "study.db").read_bytes()
+    line = f"{folder}: cannot be written ({why}); copy the study elsewhere\n"
+    assert run("study", folder, status=1) == f"proxytune study: {line}"
+    assert refused(capsys, 1, "study", folder / "study.toml") == f"proxytune study: {line}"
+    told = refused(capsys, 1, "sweep", folder, "--parameter", "trim", "--points", "2")
+    assert told == f"proxytune sweep: {line}"
+    figure = f"{folder / 'figures' / 'convergence.png'}: the figure cannot be written ({why}); mend that and run again"
+    assert refused(capsys, 1, "plot", folder) == f"proxytune plot: {figure}\n"
+    assert (folder / "study.db").read_bytes() == before
+    elsewhere = shutil.copytree(folder, folder.parent / "elsewhere")
+    elsewhere.chmod(0o755)
+    goes_on(elsewhere, finished)
+
+
+def test_an_edited_study_is_refused_with_every_key_that_changed(half, make_study, finished):
+    (half / "model.toml").write_text("trim = 0.1\n")
+    changes = {"starts": "2", "seed": "2", "initial": "4", "engine": '"sobol"', "proxy": '"model.toml"'}
+    make_study("half", parameters={"trim": "[-0.2, 0.3]", "delay": "[0.0, 0.3]"}, **changes)
+    told = run("study", half, status=2)
+    keys = (
+        'starts (was 3), initial (was 5), seed (was 1), engine (was "gp"), parameters.trim (was [-0.3, 0.3]), '
+        "the domain family (its code, its robot or the proxy's model)"
+    )
+    remedy = "put it back, or move study.db away to start again"
+    assert told == f"proxytune study: {half / 'study.toml'}: changed since the first trial: {keys}; {remedy}\n"
+    make_study("half", proxy=None)
+    goes_on(half, finished)
+
+
+@slow
+def test_budget_and_jobs_may_be_raised(half, make_study):
+    other = make_study("other", budget="9")
+    assert main(["study", str(other)]) == 0
+    make_study("half", budget="9", jobs="2")
+    goes_on(half, other)
+    assert len(trials(half)) == 9
+
+
+def test_a_lowered_budget_keeps_what_is_finished_and_says_so(finished, make_study, capsys):
+    before = (trials(finished), episodes(finished))
+    make_study("study", budget="3")
+    assert main(["study", str(finished)]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "stopped: the budget of 3 trials is spent; all 7 that are finished count" in out
+    assert (trials(finished), episodes(finished)) == before

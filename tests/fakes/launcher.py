@@ -1,0 +1,25 @@
+"""Loads proxytune once and forks for each command, so that a test can afford many real processes.
+
+Reads one JSON list per line, the words of a command and last the file for what it prints; writes its process id when it
+begins and its wait status when it has ended.
+"""
+
+import json
+import os
+import signal
+import sys
+
+from proxytune.cli.main import main
+
+for line in iter(sys.stdin.readline, ""):
+    *words, output = json.loads(line)
+    child = os.fork()
+    if child == 0:
+        os.setsid()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        descriptor = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        for stream in (1, 2):
+            os.dup2(descriptor, stream)
+        raise SystemExit(main(words))
+    print(child, flush=True)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)

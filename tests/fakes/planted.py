@@ -1,0 +1,81 @@
+"""A domain family with one parameter that matters, one that moves no more than noise does, and a dead one."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from proxytune.domain import Episode
+from proxytune.settings import Section
+from proxytune.space import Parameter
+
+NAMES = {"matters": -1.0, "noise_sized": 0.0, "dead": 0.0}
+
+
+@dataclass(frozen=True)
+class Planted:
+    """Agents of different strength; `noise_sized` reshuffles each episode as another seed would."""
+
+    identity: str = "planted 1"
+
+    @property
+    def metrics(self) -> Mapping[str, str]:
+        return {"distance": "m", "survival_time": "s"}
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        return {name: Parameter(name, "", low, 1.0, 0.0) for name, low in NAMES.items()}
+
+    @property
+    def starts(self) -> int:
+        return 5
+
+    def check_agent(self, name: str) -> None:
+        """Any will do."""
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        theta = dict(episode.theta)
+        number = int(episode.agent.removeprefix("agent"))
+        shuffled = round(1000 * theta.get("noise_sized", 0.0))
+        draw = np.random.default_rng([episode.seed, episode.start, number, shuffled]).normal(0.0, 0.3, 2)
+        good = number * (1.0 - theta.get("matters", 0.0) ** 2)
+        moved = 2.0 * abs(theta.get("matters", 0.0))
+        return {"distance": float(good - moved + draw[0]), "survival_time": float(10.0 - number + draw[1])}
+
+
+def planted(section: Section, *, model: Path | None) -> Planted:
+    """The family."""
+    section.only(())
+    return Planted()
+
+
+@dataclass(frozen=True)
+class Ordered(Planted):
+    """Agents that the target ranks by number, and this family less and less so away from the middle of the box."""
+
+    identity: str = "ordered 1"
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        return {name: Parameter(name, "", 0.0, 1.0, 0.5) for name in ("first", "second")}
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        theta = dict(episode.theta)
+        number = int(episode.agent.removeprefix("agent"))
+        turned = 3.0 * np.hypot(theta["first"] - 0.4, theta["second"] - 0.55)
+        good = number * np.cos(turned) + 3.0 * np.sin(turned) * np.sin(7.0 * number)
+        draw = np.random.default_rng([episode.seed, episode.start, number]).normal(0.0, 0.5, 2)
+        return {"distance": float(good + draw[0]), "survival_time": float(2.0 * good + draw[1])}
+
+
+def ordered(section: Section, *, model: Path | None) -> Ordered:
+    """The family."""
+    section.only(())
+    return Ordered()
+
+
+ORDERED = "agent,episode,distance,survival_time\n" + "".join(
+    f"agent{number},{start},{number + 0.1 * start},{2 * number}\n" for number in range(8) for start in range(3)
+)
+"""The target of the ordered family."""

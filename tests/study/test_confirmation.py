@@ -1,0 +1,227 @@
+"""The answer is what fresh episodes confirm, never the luckiest trial."""
+
+from dataclasses import replace
+
+import pytest
+
+from proxytune.errors import EpisodeError
+from proxytune.report.study_document import study_document
+from proxytune.report.study_table import fresh_lines
+from proxytune.search.engines import make_proposer
+from proxytune.search.surrogate import fit_surrogate
+from proxytune.study.confirmation import (
+    CANDIDATES,
+    candidates,
+    confirmation_of,
+    most_episodes,
+    run_confirmation,
+)
+from proxytune.study.evaluate import plan
+from proxytune.study.history import as_trials
+from proxytune.study.objective import FRESH
+from proxytune.study.progress import Silent
+from proxytune.study.result import result_of
+from proxytune.study.run import run_study
+from proxytune.study.settings import StopRules
+from proxytune.study.store import Outcome, Store
+from proxytune.study.study import open_study
+
+ONE = 6 * 3
+"""Episodes of one repetition of one θ."""
+
+
+def opened(folder, **changes):
+    study = open_study(folder)
+    return replace(study, settings=replace(study.settings, **{"confirm": 1, **changes}))
+
+
+def confirmed(folder, watcher=None, **changes):
+    """What it cost, and what there is to tell."""
+    study = opened(folder, **changes)
+    with Store.open(folder) as store:
+        spent = run_confirmation(study, store, watcher or Silent())
+        return spent, result_of(study, store)
+
+
+def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_seen(finished):
+    spent, found = confirmed(finished)
+    answer = found.confirmation.answer
+    assert found.best.trial == answer.trial
+    assert spent.episodes == ONE * len(found.confirmation.candidates) == found.episodes - 7 * ONE
+    assert answer.scores == (answer.assessment.prpv.value,)
+    assert answer.optimism == answer.scores[0] - answer.trial.prpv
+    with Store.read(finished) as store:
+        known = store.outcomes(found.study.identity, answer.trial.theta)
+    seen = plan(found.study.settings, answer.trial.theta, found.study.settings.seed)
+    assert len(set(known) - set(seen)) == ONE
+    assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
+
+
+def test_a_second_time_nothing_is_simulated(finished):
+    _, found = confirmed(finished)
+    spent, again = confirmed(finished)
+    assert spent.episodes == 0
+    assert study_document(again) == study_document(found)
+
+
+def test_candidates_are_the_lowest_posterior_means_within_the_noise_and_few(finished):
+    study = opened(finished)
+    with Store.read(finished) as store:
+        trials = store.trials()
+    space = study.settings.space
+    surrogate = fit_surrogate(space, as_trials(space, trials))
+    means = dict(zip((t.values for t in surrogate.visited), surrogate.at_visited()[0], strict=True))
+    chosen = [space.values(trial.theta) for trial in candidates(study, trials)]
+    assert chosen[0] == surrogate.incumbent()[0]
+    near = [v for v in means if means[v] - min(means.values()) <= surrogate.noise_deviation]
+    assert chosen == sorted(near, key=means.__getitem__)[:CANDIDATES]
+
+
+def plant(study, store, trial, shift):
+    """Fresh episodes of this trial in which the agents rank as on the target, or the other way round."""
+    for episode in plan(study.settings, trial.theta, study.settings.seed + FRESH):
+        row = study.target.agents.index(episode.agent)
+        metrics = dict(zip(study.target.metrics, (shift * study.target.means[row]).tolist(), strict=True))
+        store.save_outcome(study.identity, Outcome(episode, metrics, "", 0.0))
+
+
+def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_confirm(finished):
+    study = opened(finished)
+    with Store.open(finished) as store:
+        trials = store.trials()
+        # Scores that follow nothing make rivals of all.
+        level = [replace(trial, prpv=float(8 + trial.number % 2)) for trial in trials]
+        lucky, *rivals = candidates(study, level)
+        plant(study, store, lucky, -1.0)
+        for rival in rivals:
+            plant(study, store, rival, 1.0)
+        found = confirmation_of(study, store, level)
+    assert len(found.candidates) == CANDIDATES
+    assert found.answer.trial != lucky
+    assert found.answer.scores == (0,)
+    assert found.candidates[0].optimism > 0
+
+
+def test_trials_do_not_depend_on_it(finished, make_study):
+    with Store.read(finished) as store:
+        before = store.trials()
+    confirmed(finished)
+    longer = opened(finished, budget=9)
+    other = opened(make_study("other"), budget=9, confirm=0)
+    trials = []
+    for study in (longer, other):
+        with Store.open(study.settings.folder) as store:
+            run_study(study, store, make_proposer("gp", 5), Silent())
+            trials.append(store.trials())
+    assert trials[0] == trials[1]
+    assert trials[0][:7] == before
+
+
+class Stopping(Silent):
+    """Presses Ctrl-C after so many episodes, and counts what is announced."""
+
+    def __init__(self, episodes=10**6):
+        self.left, self.off = episodes, 0
+
+    def begin(self, what, known):
+        self.off += known
+
+    def episode(self):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
+    study = opened(finished, jobs=jobs, confirm=2)
+    for episodes in (1, 20):
+        with Store.open(finished) as store:
+            with pytest.raises(KeyboardInterrupt):
+                run_confirmation(study, store, Stopping(episodes))
+            assert result_of(study, store).confirmation is None
+    spent, found = confirmed(finished, jobs=jobs, confirm=2)
+    assert spent.episodes == 2 * ONE * len(found.confirmation.candidates) - 21
+    assert found.confirmation.answer.trial in found.trials
+
+
+def test_what_need_not_be_run_is_taken_off_the_bar(finished):
+    watcher = Stopping()
+    spent, found = confirmed(finished, watcher)
+    assert spent.episodes + watcher.off == most_episodes(found.study.settings) == CANDIDATES * ONE
+
+
+def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
+    _, found = confirmed(finished, confirm=3)
+    answer = found.confirmation.answer
+    assert len(answer.scores) == 3
+    assert int(answer.assessment.inputs.proxy.counts.min()) == 9
+    assert answer.optimism == pytest.approx(sum(answer.scores) / 3 - answer.trial.prpv)
+
+
+def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, finished):
+    assert confirmed(finished, budget=8)[0].episodes == 0
+    folder = make_study("ruled")
+    study = opened(folder, stop=StopRules(no_improvement=1e9))
+    with Store.open(folder) as store:
+        run_study(study, store, make_proposer("gp", 5), Silent())
+        assert len(store.trials()) == 5
+    assert confirmed(folder, stop=StopRules(no_improvement=1e9))[0].episodes >= ONE
+
+
+def test_it_can_be_turned_off(finished):
+    spent, found = confirmed(finished, confirm=0)
+    assert (spent.episodes, found.confirmation, fresh_lines(found)) == (0, None, [])
+    assert study_document(found)["best"]["fresh"] is None
+
+
+def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished):
+    study = opened(finished, budget=8)
+    with Store.open(finished) as store:
+        taken = sum(o.seconds for t in store.trials() for o in store.outcomes(study.identity, t.theta).values())
+    confirmed(finished, confirm=9)
+    _, found = confirmed(finished, budget=8, stop=StopRules(wall_time_s=1.01 * taken))
+    assert found.stopped == ""
+
+
+def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_score(finished):
+    study = opened(finished)
+    with Store.open(finished) as store:
+        for trial in candidates(study, store.trials()):
+            for episode in plan(study.settings, trial.theta, study.settings.seed + FRESH):
+                if episode.agent == "agent3":
+                    store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
+    _, found = confirmed(finished)
+    assert found.confirmation.answer.scores == (None,)
+    assert found.best.trial == found.confirmation.candidates[0].trial
+    assert fresh_lines(found) == ["fresh episodes: no PRPV, since an agent failed in all of them"]
+    assert study_document(found)["best"]["fresh"]["prpv"] is None
+
+
+def test_where_failures_stop_the_study_they_stop_it_here(finished):
+    broken = opened(finished, stop_on_failure=True)
+    broken = replace(broken, family=replace(broken.family, faults=("agent3:1:raises",)))
+    with Store.open(finished) as store, pytest.raises(EpisodeError, match="agent 'agent3'"):
+        run_confirmation(broken, store, Silent())
+
+
+def test_how_much_was_luck_is_one_line(finished):
+    _, found = confirmed(finished)
+    answer = found.confirmation.answer
+    lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
+    (line,) = fresh_lines(replace(found, confirmation=replace(found.confirmation, answer=lucky)))
+    assert f"on fresh episodes PRPV {answer.assessment.prpv.value}, interval " in line
+    assert ": 4 of it was luck" in line
+    unlucky = replace(answer, scores=(int(answer.trial.prpv),))
+    (line,) = fresh_lines(replace(found, confirmation=replace(found.confirmation, answer=unlucky)))
+    assert ": it was not luck" in line
+
+
+def test_the_document_has_the_answer_and_every_candidate(finished):
+    _, found = confirmed(finished)
+    fresh = study_document(found)["best"]["fresh"]
+    answer = found.confirmation.answer
+    inner = answer.assessment.prpv_interval
+    assert (fresh["prpv"], fresh["prpv_interval"]) == (answer.scores[0], [inner.low, inner.high])
+    assert fresh["optimism"] == answer.optimism
+    assert [one["index"] for one in fresh["candidates"]] == [c.trial.number for c in found.confirmation.candidates]

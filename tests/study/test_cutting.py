@@ -1,0 +1,213 @@
+"""A trial that cannot be among the best any more is cut off, the same way however it is run."""
+
+import json
+import shutil
+import sqlite3
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from planted import ORDERED
+
+from proxytune.search.engines import make_proposer
+from proxytune.study.cutting import reference, spared
+from proxytune.study.evaluate import evaluation, simulate
+from proxytune.study.history import as_trials, episodes_of
+from proxytune.study.progress import Silent
+from proxytune.study.result import result_of
+from proxytune.study.run import run_study
+from proxytune.study.store import Store, TrialRecord
+from proxytune.study.study import open_study
+
+BUDGET, ALL = 14, 8 * 3
+"""Trials, and episodes of one that is not cut off."""
+
+
+def study_of(make, called="cutting", **changes):
+    """A study of eight agents whose order gets lost away from the best θ."""
+    folder = make(
+        called,
+        parameters={"first": "[0, 1]", "second": "[0, 1]"},
+        **{
+            "family": '"planted:ordered"',
+            "agents": "[" + ", ".join(f'"agent{number}"' for number in range(8)) + "]",
+            "budget": str(BUDGET),
+            "cut_off": "true",
+            **changes,
+        },
+    )
+    (folder / "target.csv").write_text(ORDERED)
+    return folder
+
+
+@pytest.fixture
+def cutting(make_study):
+    """Writes such a study."""
+    return lambda called="cutting", **changes: study_of(make_study, called, **changes)
+
+
+@pytest.fixture(scope="module")
+def done_once(make_studies):
+    """Such a study, run once."""
+    return run(study_of(make_studies))
+
+
+@pytest.fixture
+def done(done_once, tmp_path):
+    """The same in a folder of one's own."""
+    spent, trials, found = done_once
+    folder = Path(shutil.copytree(found.study.settings.folder, tmp_path / "done"))
+    return spent, trials, replace(found, study=open_study(folder))
+
+
+def run(folder, watcher=None, **changes):
+    study = open_study(folder)
+    study = replace(study, settings=replace(study.settings, **changes))
+    with Store.open(folder) as store:
+        spent = run_study(study, store, make_proposer("gp", study.settings.initial), watcher or Silent())
+        return spent, store.trials(), result_of(study, store)
+
+
+def test_trials_are_cut_off_after_the_design_and_no_other_episode_is_run(done):
+    spent, trials, found = done
+    cut = [trial for trial in trials if trial.state == "cut"]
+    assert cut
+    assert min(trial.number for trial in cut) > 5
+    assert all(3 <= len(trial.decided) + 1 <= 8 and trial.prpv is None for trial in cut)
+    assert spent.episodes == found.episodes == BUDGET * ALL - 3 * sum(8 - len(trial.decided) for trial in cut)
+    assert found.spared[0] == BUDGET * ALL - spent.episodes
+
+
+def test_a_trial_that_was_cut_off_would_have_scored_no_less_than_its_bound_and_above_the_limit(cutting, done):
+    _, trials, found = done
+    with Store.open(found.study.settings.folder) as store:
+        for trial in trials:
+            if trial.state == "cut":
+                limit = reference(found.study, store, trials[: trial.number - 1]).limit
+                simulate(found.study, store, trial.theta, Silent(), "")
+                score = evaluation(found.study, store, trial.theta).prpv
+                assert score >= trial.bound > limit
+                assert trial.estimate >= trial.bound
+
+
+def test_the_search_is_told_the_estimate_of_a_trial_that_was_cut_off(done):
+    _, trials, found = done
+    told = as_trials(found.study.settings.space, trials)
+    assert [one.score for one in told] == [t.estimate if t.state == "cut" else t.prpv for t in trials]
+    assert found.best.trial.state == "finished"
+
+
+@pytest.mark.parametrize("engine", ["gp", "random", "sobol"])
+def test_two_jobs_cut_off_the_same_trials_at_the_same_agents_as_one(cutting, engine):
+    one = run(cutting("one", engine=f'"{engine}"'), jobs=1)
+    two = run(cutting("two", engine=f'"{engine}"'), jobs=2)
+    assert two[1] == one[1]
+    assert two[0].episodes - two[0].unused == one[0].episodes
+    assert one[0].unused == 0
+
+
+class Stopping(Silent):
+    """Presses Ctrl-C after so many episodes."""
+
+    def __init__(self, episodes):
+        self.left = episodes
+
+    def episode(self):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_interrupted_anywhere_it_goes_on_to_the_same_trials(cutting, done, jobs):
+    folder = cutting("stopped", jobs=str(jobs))
+    for episodes in (130, 7, 1, 2, 11, 30):
+        with pytest.raises(KeyboardInterrupt):
+            run(folder, Stopping(episodes))
+    spent, trials, _ = run(folder)
+    assert trials == done[1]
+    assert spent.episodes - spent.unused <= done[0].episodes - 181
+
+
+def test_episodes_run_in_vain_change_nothing(cutting, done):
+    """All episodes of every trial are known beforehand, in which case nothing is simulated at all."""
+    _, trials, _ = done
+    folder = cutting("known")
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        for trial in trials:
+            simulate(study, store, trial.theta, Silent(), "")
+    spent, again, _ = run(folder)
+    assert (spent.episodes, again) == (0, trials)
+
+
+def test_without_it_all_trials_are_driven_to_their_end(cutting):
+    spent, trials, found = run(cutting(cut_off="false"))
+    assert {trial.state for trial in trials} == {"finished"}
+    assert (spent.episodes, found.spared) == (BUDGET * ALL, (0, 0.0))
+
+
+def test_where_a_tolerance_is_a_percentage_no_trial_is_cut_off(cutting):
+    _, trials, _ = run(cutting(metrics='["distance:max:1%", "survival_time:max"]'))
+    assert {trial.state for trial in trials} == {"finished"}
+
+
+def test_an_agent_that_always_fails_is_a_failure_and_no_reason_to_cut_off(make_study):
+    folder = make_study(cut_off="true", domain={"faults": '["agent3:1:raises"]'}, budget="9")
+    _, trials, found = run(folder)
+    assert {trial.state for trial in trials} <= {"finished", "cut"}
+    for trial in trials:
+        assert trial.failed_episodes == (not trial.decided or "agent3" in trial.decided)
+    assert found.failed_episodes == sum(trial.failed_episodes for trial in trials)
+
+
+def test_the_order_of_agents_in_the_settings_does_not_matter(cutting, done):
+    folder = cutting("turned", agents="[" + ", ".join(f'"agent{number}"' for number in range(7, -1, -1)) + "]")
+    assert run(folder)[1] == done[1]
+
+
+def test_the_agents_that_tell_most_come_first_and_the_limit_is_a_noise_above_the_incumbent(done):
+    _, trials, found = done
+    with Store.open(found.study.settings.folder) as store:
+        against = reference(found.study, store, trials)
+        assert reference(found.study, store, trials[:4]) is None
+    rows = against.disagreement
+    assert sorted(against.order) == sorted(found.study.settings.agents)
+    assert rows[0, 1] == rows.max()
+    assert all(rows[:k, k].sum() >= rows[:k, k + 1 :].sum(axis=0).max() for k in range(1, 7))
+    lowest = min(trial.prpv for trial in trials if trial.prpv is not None)
+    assert against.limit > lowest
+
+
+def test_what_was_spared_is_the_time_of_the_like_of_what_was_not_driven(done):
+    _, trials, found = done
+    with Store.open(found.study.settings.folder) as store:
+        seconds = store.seconds()
+        episodes, spared_seconds = spared(found.study, store, trials)
+    missing = [
+        seconds[agent, start]
+        for trial in trials
+        for agent in found.study.settings.agents
+        for start in range(3)
+        if trial.decided and agent not in trial.decided
+    ]
+    assert episodes == len(missing)
+    assert spared_seconds == pytest.approx(sum(missing))
+
+
+def test_a_cut_trial_is_told_in_the_database_in_plain_sql(done):
+    _, trials, found = done
+    with sqlite3.connect(found.study.settings.folder / "study.db") as plain:
+        rows = plain.execute("SELECT number, prpv, decided, bound, estimate FROM trials WHERE state = 'cut'").fetchall()
+    assert [(row[0], row[1], tuple(json.loads(row[2])), *row[3:]) for row in rows] == [
+        (trial.number, None, trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
+    ]
+
+
+def test_a_trial_stands_on_the_episodes_of_its_decided_agents(done):
+    _, _, found = done
+    trial = TrialRecord(1, {"first": 0.0, "second": 0.0}, "cut", decided=("agent2", "agent5"), bound=1.0, estimate=2.0)
+    driven = episodes_of(found.study.settings, trial)
+    assert {episode.agent for episode in driven} == {"agent2", "agent5"}
+    assert len(driven) == 6
+    assert len(episodes_of(found.study.settings, replace(trial, state="finished", decided=()))) == ALL

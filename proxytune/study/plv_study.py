@@ -104,7 +104,8 @@ def search_space(
 def _narrowed(box: Interval, left: tuple[float, float] | None) -> Interval:
     if left is None:
         return box
-    slack = SLACK * (box.high - box.low) if left[0] == left[1] else 0.0
+    step = SLACK * (box.high - box.low)
+    slack = step if left[1] - left[0] < step else 0.0
     return Interval(box.name, max(box.low, left[0] - slack), min(box.high, left[1] + slack), box.unit)
 
 

@@ -203,3 +203,29 @@ def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturb
     os.killpg(first.pid, signal.SIGINT)
     first.communicate()
     assert first.returncode == 130, "it was running all the while"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_pre_flight_cut_trials_and_confirmation_survive_being_stopped(make_study, launcher, jobs, capsys):
+    """With several jobs, episodes under way when a trial is cut off are kept; no trial stands on them."""
+    phases = {"preflight": "true", "confirm": "1", "cut_off": "true", "initial": "4", "budget": "12"}
+    whole = make_study("whole", **phases)
+    assert main(["study", str(whole), "--json"]) == 0
+    expected = json.loads(capsys.readouterr().out)
+    total = finished_episodes(whole)
+    folder = make_study("stopped", domain={"sleep": "0.01"}, jobs=jobs, **phases)
+    random = np.random.default_rng(int(jobs))
+    stopped_at = np.sort(random.choice(np.arange(10, total - 10), 4, replace=False)).tolist()
+    signals = random.permutation([signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGKILL]).tolist()
+    for number, moment in zip(signals, stopped_at, strict=True):
+        process = Launched(launcher, folder)
+        wait_for(folder, process, moment)
+        os.kill(process.pid, number)
+        status, printed = process.end()
+        assert status == (-number if number == signal.SIGKILL else 128 + number), printed
+    assert main(["study", str(folder), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert any(trial["prpv"] is None for trial in expected["trials"]), "something was cut off"
+    for key in ("trials", "best", "preflight", "confirmation", "stopped"):
+        assert found.get(key) == expected.get(key), key

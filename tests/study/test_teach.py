@@ -2,40 +2,12 @@
 
 import numpy as np
 import pytest
+from taught import GRID, make_taught
 
 from proxytune.errors import EpisodeError, InputError, LearnerError, SettingsError
 from proxytune.study.progress import Silent
 from proxytune.study.settings import read_study_settings
 from proxytune.study.teach import open_school, run_experiment
-
-TEACHING = """
-[teaching]
-target = "twin.toml"
-learner = "schoolroom:Matrix"
-proxy_samples = 300
-target_samples = {grid}
-seeds = 3
-lesson_s = 2.0
-tolerance = 6.0
-{more}
-[teaching.proxies.right]
-trim = 0.12
-delay = 0.21
-[teaching.proxies.wrong]
-trim = -0.3
-[teaching.proxies.wide]
-trim = [0.0, 0.3]
-delay = [0.1, 0.3]
-"""
-GRID = [0, 20, 40, 80, 160, 320, 640]
-
-
-def make(make_study, *, grid=GRID, more="", called="study", **changes):
-    folder = make_study(called, **{"family": '"schoolroom:schoolroom"', **changes})
-    (folder / "twin.toml").write_text("trim = 0.12\ndelay = 0.21\n")
-    path = folder / "study.toml"
-    path.write_text(path.read_text() + TEACHING.format(grid=grid, more=more))
-    return folder
 
 
 def run(folder):
@@ -48,7 +20,7 @@ def figures(found):
 
 
 def test_the_right_proxy_saves_target_samples_and_the_wrong_one_harms(make_study):
-    found = run(make(make_study))
+    found = run(make_taught(make_study))
     worth = {lesson.name: lesson.worth for lesson in found.lessons}
     assert found.settled
     assert worth["right"].needed.value == 0.0
@@ -59,13 +31,13 @@ def test_the_right_proxy_saves_target_samples_and_the_wrong_one_harms(make_study
 
 
 def test_a_stated_level_is_what_counts_as_converged(make_study):
-    strict = run(make(make_study, more="level = 59.9"))
+    strict = run(make_taught(make_study, more="level = 59.9"))
     assert (strict.when.level, strict.when.threshold) == (59.9, 53.9)
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_run_whose_cache_lost_any_of_its_pieces_comes_to_the_same(make_study, jobs):
-    folder = make(make_study, jobs=jobs)
+    folder = make_taught(make_study, jobs=jobs)
     whole = run(folder)
     for lost in ("exam", "weights", "samples"):
         for path in sorted((folder / "teaching").glob(f"{lost}-*.npz"))[::3]:
@@ -77,7 +49,7 @@ def test_a_run_whose_cache_lost_any_of_its_pieces_comes_to_the_same(make_study, 
 
 def test_what_is_cached_is_neither_driven_nor_trained_again(make_study, tmp_path):
     journal = tmp_path / "journal"
-    folder = make(make_study, domain={"teaching_journal": f'"{journal}"'})
+    folder = make_taught(make_study, domain={"teaching_journal": f'"{journal}"'})
     run(folder)
     first = journal.read_text().splitlines()
     run(folder)
@@ -88,7 +60,7 @@ def test_what_is_cached_is_neither_driven_nor_trained_again(make_study, tmp_path
 
 def test_more_seeds_add_to_what_was_done(make_study, tmp_path):
     journal = tmp_path / "journal"
-    folder = make(make_study, domain={"teaching_journal": f'"{journal}"'})
+    folder = make_taught(make_study, domain={"teaching_journal": f'"{journal}"'})
     before = figures(run(folder))
     driven = len(journal.read_text().splitlines())
     path = folder / "study.toml"
@@ -99,18 +71,18 @@ def test_more_seeds_add_to_what_was_done(make_study, tmp_path):
 
 
 def test_a_target_budget_too_small_to_converge_is_no_plv(make_study):
-    found = run(make(make_study, grid=[0, 3, 6]))
+    found = run(make_taught(make_study, grid=[0, 3, 6]))
     assert not found.settled
     assert all(lesson.worth is None for lesson in found.lessons)
 
 
 def test_an_expert_that_cannot_drive_is_told_with_the_proxys_name(make_study):
     with pytest.raises(LearnerError, match="cannot drive here"):
-        run(make(make_study, domain={"blocked": "0.9"}))
+        run(make_taught(make_study, domain={"blocked": "0.9"}))
 
 
 def test_a_policy_that_gives_no_command_stops_the_run_and_keeps_the_rest(make_study):
-    folder = make(make_study)
+    folder = make_taught(make_study)
     path = folder / "study.toml"
     (folder / "mine.py").write_text(
         "import numpy as np\n\n\nclass Silly:\n"
@@ -134,7 +106,7 @@ def test_a_policy_that_gives_no_command_stops_the_run_and_keeps_the_rest(make_st
     ],
 )
 def test_what_cannot_be_used_is_one_line_with_its_key(make_study, edit, says):
-    folder = make(make_study)
+    folder = make_taught(make_study)
     path = folder / "study.toml"
     path.write_text(path.read_text().replace(*edit))
     with pytest.raises(InputError) as told:
@@ -148,7 +120,7 @@ def test_a_study_without_the_table_cannot_teach(make_study):
 
 
 def test_a_study_without_proxies_has_nothing_to_compare(make_study):
-    folder = make(make_study)
+    folder = make_taught(make_study)
     path = folder / "study.toml"
     path.write_text(path.read_text().split("[teaching.proxies")[0])
     with pytest.raises(SettingsError, match=r"teaching\.proxies: is missing"):

@@ -1,0 +1,91 @@
+"""`teach` prints table 1 and one JSON document; `study` with the objective "plv" looks for the best teacher."""
+
+import json
+
+import pytest
+from taught import GRID, make_taught
+
+from proxytune.cli.main import main
+
+
+def test_teach_prints_one_document_with_the_promised_keys(make_study, capsys):
+    folder = make_taught(make_study)
+    assert main(["teach", str(folder), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert set(document["proxies"]) == {"right", "wrong", "wide"}
+    right = document["proxies"]["right"]
+    assert {"theta", "prpv", "zero_shot", "plv", "needed", "factor", "reduction", "scores"} <= set(right)
+    assert right["target_samples"] == document["without"]["target_samples"] == GRID
+    assert document["without"]["scores"][0][0] is None
+    assert right["plv"]["value"] == document["proxies"]["right"]["without"]["value"] - right["needed"]["value"]
+    assert document["proxies"]["wide"]["prpv"] is None
+    assert isinstance(right["prpv"], float | int)
+    assert (folder / "figures" / "teach.png").stat().st_size > 1000
+
+
+def test_people_see_table_1_and_when_a_learner_counts_as_converged(make_study, capsys):
+    folder = make_taught(make_study)
+    assert main(["teach", str(folder)]) == 0
+    said = capsys.readouterr().out
+    for words in ("zero-shot score", "target samples", "PLV", "reduction", "none", "right", "converged: a mean score"):
+        assert words in said
+
+
+def test_a_budget_too_small_to_converge_is_said_and_gives_no_plv(make_study, capsys):
+    folder = make_taught(make_study, grid=[0, 3, 6])
+    assert main(["teach", str(folder), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["convergence"]["settled"] is False
+    assert document["proxies"]["right"]["plv"] is None
+    assert main(["teach", str(folder)]) == 0
+    assert "raise teaching.target_samples" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
+    folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more="budget = 3")
+    assert main(["study", str(folder), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    plvs = [trial["plv"]["value"] for trial in document["trials"]]
+    assert len(plvs) == 3
+    assert document["best"]["plv"]["value"] == max(plvs)
+    assert document["narrowed_by_prpv"] is False
+    assert document["searched"] == {"trim": [-0.3, 0.3]}
+    assert (folder / "figures" / "plv.png").stat().st_size > 1000
+
+
+def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, capsys):
+    more = "budget = 2\nnarrow = true"
+    folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more=more)
+    assert main(["study", str(folder), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    low, high = document["searched"]["trim"]
+    assert document["narrowed_by_prpv"] is True
+    assert -0.3 <= low < high <= 0.3
+    assert all(low <= trial["theta"]["trim"] <= high for trial in document["trials"])
+    assert (folder / "study.db").exists()
+
+
+@pytest.mark.parametrize(
+    ("edit", "status", "says"),
+    [
+        (("[0, 20,", "[20,"), 2, "teaching.target_samples: must begin with 0"),
+        (("[teaching]", "[teachings]"), 2, "teachings: unknown key; did you mean 'teaching'?"),
+        (("schoolroom:Matrix", "schoolroom"), 2, "teaching.learner: 'schoolroom' cannot be loaded"),
+    ],
+)
+def test_bad_input_is_one_line(make_study, capsys, edit, status, says):
+    folder = make_taught(make_study)
+    path = folder / "study.toml"
+    path.write_text(path.read_text().replace(*edit))
+    assert main(["teach", str(folder)]) == status
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert says in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_an_expert_that_cannot_drive_is_one_line_and_nothing_is_drawn(make_study, capsys):
+    folder = make_taught(make_study, domain={"blocked": "0.9"})
+    assert main(["teach", str(folder)]) == 2
+    assert "the expert cannot drive here" in capsys.readouterr().err
+    assert not (folder / "figures").exists()

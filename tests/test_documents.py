@@ -18,6 +18,7 @@ from proxytune.driving.robot import UNITS
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE
 from proxytune.study.settings import KEYS
+from proxytune.study.teaching import KEYS as TEACHING_KEYS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -55,6 +56,12 @@ def test_every_option_is_in_the_readme(command, option):
 @pytest.mark.parametrize("key", [*KEYS, "robot", "plant", "camera", "map", "seconds", "position_noise_m", "effects"])
 def test_every_study_key_is_documented(key):
     assert re.search(rf"^\| `\[?{key}\]?` ", STUDIES, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("key", TEACHING_KEYS)
+def test_every_key_of_teaching_is_documented(key):
+    table = STUDIES.split("## [teaching]")[1].split("\n## ")[0]
+    assert re.search(rf"^\| `{key}` ", table, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

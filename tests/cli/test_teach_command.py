@@ -1,8 +1,12 @@
 """`teach` prints table 1 and one JSON document; `study` with the objective "plv" looks for the best teacher."""
 
 import json
+import signal
+import time
 
+import numpy as np
 import pytest
+from processes import start
 from taught import GRID, make_taught
 
 from proxytune.cli.main import main
@@ -89,3 +93,37 @@ def test_an_expert_that_cannot_drive_is_one_line_and_nothing_is_drawn(make_study
     assert main(["teach", str(folder)]) == 2
     assert "the expert cannot drive here" in capsys.readouterr().err
     assert not (folder / "figures").exists()
+
+
+def made(folder):
+    """How many samples, weights and examinations are kept."""
+    return len(list((folder / "teaching").glob("*.npz")))
+
+
+def stopped_when(folder, count, number):
+    """`teach` in a process of its own, sent a signal once so much is kept and it has added to that; its exit status."""
+    count = max(count, made(folder) + 1)
+    process = start("teach", folder, "--json")
+    while made(folder) < count and process.poll() is None:
+        time.sleep(0.002)
+    process.send_signal(number)
+    process.communicate(timeout=60)
+    return process.returncode
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_run_stopped_at_any_moment_comes_to_the_same_document_as_one_that_was_not(make_study, capsys, jobs):
+    expected = []
+    for called in ("whole", "stopped"):
+        folder = make_taught(make_study, called=called, jobs=jobs)
+        if called == "stopped":
+            moments = np.sort(np.random.default_rng(int(jobs)).choice(np.arange(1, 100), 4, replace=False)).tolist()
+            numbers = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+            statuses = [stopped_when(folder, count, number) for count, number in zip(moments, numbers, strict=True)]
+            assert statuses == [-signal.SIGKILL, 130, 143, -signal.SIGKILL]
+        assert main(["teach", str(folder), "--json"]) == 0
+        document = json.loads(capsys.readouterr().out)
+        expected.append({key: document[key] for key in ("convergence", "without", "proxies")})
+        assert not list((folder / "teaching").glob("*.npz.*"))
+    assert expected[0] == expected[1]

@@ -41,7 +41,7 @@ def plv_table(found: PlvStudy, files: Mapping[str, Any]) -> RenderableType:
     """The trials, the best one first, and what was searched."""
     names = found.space.names
     table = Table(box=None, pad_edge=False)
-    for name in ("trial", *names, "zero-shot score", "target samples", "PLV"):
+    for name in ("trial", *names, "zero-shot", "target samples", "PLV"):
         table.add_column(name, justify="right")
     ordered = sorted(found.trials, key=lambda trial: (trial is not found.best, trial.number))
     for trial in ordered:

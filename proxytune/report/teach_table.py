@@ -11,7 +11,7 @@ from proxytune.learning.plv import Estimate
 from proxytune.study.teach import Experiment, Lesson
 from proxytune.study.teaching import NONE
 
-COLUMNS = ("proxy", "PRPV", "zero-shot score", "target samples", "PLV", "reduction")
+COLUMNS = ("proxy", "PRPV", "zero-shot", "target samples", "PLV", "reduction")
 NOT_REACHED = "not reached"
 
 
@@ -55,24 +55,25 @@ def convergence_lines(found: Experiment) -> list[str]:
 
 
 def _told(lesson: Lesson) -> list[str]:
-    """How many times fewer target samples a proxy leaves to gather."""
+    """The factor by which a proxy divides the target samples that are needed."""
     worth = lesson.worth
     if worth is None or worth.factor.value is None:
         return []
-    return [f"{lesson.name}: {worth.factor.value:.3g} times fewer target samples than without ({_ends(worth.factor)})"]
+    return [f"{lesson.name}: η(∅) / η(S) = {worth.factor.value:.3g} ({_ends(worth.factor)})"]
 
 
 def count(figure: Estimate) -> str:
     """A number of samples with its interval; what was not reached is said."""
-    if figure.value is None:
-        return NOT_REACHED
-    return f"{figure.value:g} ({_ends(figure)})"
+    value = NOT_REACHED if figure.value is None else f"{figure.value:g}"
+    ends = _ends(figure)
+    return f"{value} ({ends})" if ends else value
 
 
 def _ends(figure: Estimate) -> str:
-    low = "unknown" if figure.low is None else f"{figure.low:.4g}"
-    high = "unknown" if figure.high is None else f"{figure.high:.4g}"
-    return f"{low} to {high}"
+    """The interval; an end that lies beyond the grid is left open."""
+    if figure.low is None:
+        return "" if figure.high is None else f"at most {figure.high:.4g}"
+    return f"{figure.low:.4g} or more" if figure.high is None else f"{figure.low:.4g} to {figure.high:.4g}"
 
 
 def _share(figure: Estimate) -> str:

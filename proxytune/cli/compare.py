@@ -1,4 +1,4 @@
-"""`compare`: how fast each engine finds a good θ, on an analytic stand-in or on a study."""
+"""`compare`: how fast each engine finds a good θ, on a stand-in or on a study."""
 
 import argparse
 import json

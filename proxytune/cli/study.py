@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.cli.answer import Answer
+from proxytune.cli.learning_value import taught
 from proxytune.cli.study_folder import study_folder
 from proxytune.errors import InputError
 from proxytune.report.convergence import convergence
@@ -41,8 +42,20 @@ def run(arguments: argparse.Namespace) -> Answer:
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
     study = open_study(folder)
-    settings = study.settings
     proposer = _proposer(study)
+    if study.settings.objective == "plv":
+        return taught(study, folder, proposer, lambda: searched(study, folder, proposer)[0].profiles)
+    result, spent = searched(study, folder, proposer)
+    figures, report = draw(result, folder)
+    costs = _costs(result, spent, time.perf_counter() - begun)
+    document = {**study_document(result), **costs, "figures": [str(path) for path in figures], "report": str(report)}
+    files = {"figure": figures[0], "report": report}
+    return Answer(document, study_table(result, _told(costs), files))
+
+
+def searched(study: Study, folder: Path, proposer: Proposer) -> tuple[StudyResult, Spent]:
+    """Search by PRPV from wherever it was left: pre-flight, trials, confirmation; what was found and what it cost."""
+    settings = study.settings
     episodes = preflight.most_episodes(settings) + confirmation.most_episodes(settings)
     episodes += settings.budget * len(settings.agents) * settings.starts
     with locked(folder), Store.open(folder) as store:
@@ -50,12 +63,7 @@ def run(arguments: argparse.Namespace) -> Answer:
             spent = _prepared(study, store, bars)
             spent += run_study(study, store, proposer, bars)
             spent += confirmation.run_confirmation(study, store, bars)
-        result = result_of(study, store)
-    figures, report = draw(result, folder)
-    costs = _costs(result, spent, time.perf_counter() - begun)
-    document = {**study_document(result), **costs, "figures": [str(path) for path in figures], "report": str(report)}
-    files = {"figure": figures[0], "report": report}
-    return Answer(document, study_table(result, _told(costs), files))
+        return result_of(study, store), spent
 
 
 def _prepared(study: Study, store: Store, watcher: Watcher) -> Spent:

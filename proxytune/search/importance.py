@@ -8,7 +8,9 @@ from threadpoolctl import threadpool_limits
 from proxytune.search.design import unit_points
 from proxytune.search.surrogate import Array, Surrogate
 
-BASE = 256
+POINTS = 2048
+"""At most so many points: the functions drawn are drawn jointly, which takes the cube of their number."""
+
 DRAWS = 200
 LEVELS = (0.025, 0.975)
 JITTER = 1e-8
@@ -55,22 +57,23 @@ def importances(surrogate: Surrogate) -> tuple[Importance, ...]:
 
 
 def _values(surrogate: Surrogate, dimensions: int) -> tuple[Array, Array]:
-    """The posterior mean, shape (2 + parameters, BASE), and draws of it, one more axis before.
+    """The posterior mean, shape (2 + parameters, points), and draws of it, one more axis before.
 
     Row 0 is at one set of points, row 1 at another, row 2 + i at the first with column i of the other.
     """
-    pairs = unit_points(2 * dimensions, BASE, 0)
+    base = 2 ** int(np.log2(POINTS / (2 + dimensions)))
+    pairs = unit_points(2 * dimensions, base, 0)
     first, second = pairs[:, :dimensions], pairs[:, dimensions:]
     swapped = [np.where(np.arange(dimensions) == column, second, first) for column in range(dimensions)]
     mean, covariance = surrogate.joint(np.concatenate([first, second, *swapped]))
     scale = max(float(np.diag(covariance).mean()), JITTER)
     root = np.linalg.cholesky(covariance + JITTER * scale * np.eye(len(mean)))
     drawn = mean + np.random.default_rng(0).standard_normal((DRAWS, len(mean))) @ root.T
-    return mean.reshape(-1, BASE), drawn.reshape(DRAWS, -1, BASE)
+    return mean.reshape(-1, base), drawn.reshape(DRAWS, -1, base)
 
 
 def _indices(values: Array) -> tuple[Array, Array]:
-    """Total-effect and first-order indices (…, parameters) of values (…, 2 + parameters, BASE); 0 if constant."""
+    """Total-effect and first-order indices (…, parameters) of values (…, 2 + parameters, points); 0 if constant."""
     first, second, swapped = values[..., :1, :], values[..., 1:2, :], values[..., 2:, :]
     variance = values[..., :2, :].var(axis=(-1, -2))[..., None]
     safe = np.where(variance > 0, variance, 1.0)

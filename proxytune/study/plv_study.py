@@ -16,7 +16,7 @@ from proxytune.space import Interval, Space, Theta
 from proxytune.study.progress import Watcher
 from proxytune.study.school import School
 from proxytune.study.settings import StudySettings
-from proxytune.study.teach import learning_curves
+from proxytune.study.teach import learning_curves, teaching_settings
 from proxytune.study.teaching import NONE
 
 WIDTH = " width"
@@ -52,7 +52,6 @@ class PlvStudy:
     Attributes:
         settings: Of the study.
         space: The box that was searched: the study's, or what PRPV left of it, and the widths'.
-        narrowed: Whether PRPV narrowed it.
         without: The learning curve without a proxy.
         when: When a learner counts as converged.
         trials: Every proxy tried, in order.
@@ -60,10 +59,14 @@ class PlvStudy:
 
     settings: StudySettings
     space: Space
-    narrowed: bool
     without: Curve
     when: Convergence
     trials: tuple[PlvTrial, ...]
+
+    @property
+    def narrowed(self) -> bool:
+        """Whether PRPV has narrowed the box first."""
+        return teaching_settings(self.settings).narrow
 
     @property
     def best(self) -> PlvTrial:
@@ -106,7 +109,7 @@ def _narrowed(box: Interval, left: tuple[float, float] | None) -> Interval:
 
 
 def run_plv_study(
-    settings: StudySettings, school: School, proposer: Proposer, space: Space, watcher: Watcher, *, narrowed: bool
+    settings: StudySettings, school: School, proposer: Proposer, space: Space, watcher: Watcher
 ) -> PlvStudy:
     """Try as many proxies as the budget of [teaching] says, from wherever an earlier run was left.
 
@@ -132,7 +135,7 @@ def run_plv_study(
         curve = learning_curves(school, {name: proxy}, settings.jobs, watcher)[name]
         worth = teaching(without=without, with_proxy=curve, when=when)
         trials.append(PlvTrial(len(trials) + 1, theta, proxy, curve, worth))
-    return PlvStudy(settings, space, narrowed, without, when, tuple(trials))
+    return PlvStudy(settings, space, without, when, tuple(trials))
 
 
 def distribution(school: School, theta: Theta) -> Distribution:

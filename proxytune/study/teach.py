@@ -154,6 +154,11 @@ def points_of(school: School) -> int:
     return (len(school.settings.proxies) + 1) * school.settings.seeds * len(school.settings.target_samples)
 
 
+def points_of_study(school: School) -> int:
+    """How many points the learning curves of a study of learning value have, the one without a proxy included."""
+    return (school.settings.budget + 1) * school.settings.seeds * len(school.settings.target_samples)
+
+
 def _curve(school: School, points: Sequence[Point]) -> Curve:
     scores = np.array([school.score(point) for point in points])
     return Curve(school.settings.target_samples, scores.reshape(school.settings.seeds, -1))

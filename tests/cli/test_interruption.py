@@ -1,5 +1,6 @@
 """SIGTERM and Ctrl-C, sent to real processes of every long command."""
 
+import json
 import os
 import signal
 import sys
@@ -9,7 +10,9 @@ from pathlib import Path
 import pytest
 from processes import finished_episodes, start, wait_for
 
+from proxytune.cli.compare import read_runs
 from proxytune.cli.interruption import Terminated, sigterm_as_interrupt
+from proxytune.cli.main import main
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
@@ -30,45 +33,57 @@ def ended(process, number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", ["1", "2"])
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_stopped_sweep_keeps_its_episodes(make_study, number, jobs):
-    folder = make_study(domain=SLOWLY, jobs=jobs)
-    process = start("sweep", folder, "--parameter", "trim", "--points", "5")
+@pytest.mark.parametrize(("number", "jobs"), [(signal.SIGTERM, "1"), (signal.SIGINT, "2")])
+def test_a_stopped_sweep_goes_on_to_the_same_curve(make_study, capsys, number, jobs):
+    folder, whole = make_study(domain=SLOWLY, jobs=jobs), make_study("whole")
+    arguments = ("--parameter", "trim", "--points", "5", "--json")
+    process = start("sweep", folder, *arguments)
     wait_for(folder, process, 30)
     ended(process, number)
-    assert 30 <= finished_episodes(folder) < 5 * 18
+    kept = finished_episodes(folder)
+    assert 30 <= kept < 5 * 18
+    documents = []
+    for home in (folder, whole):
+        assert main(["sweep", str(home), *arguments]) == 0
+        documents.append(json.loads(capsys.readouterr().out))
+    assert documents[0]["curves"] == documents[1]["curves"]
+    assert documents[0]["episodes"]["run"] == 5 * 18 - kept
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("jobs", ["1", "2"])
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_stopped_comparison_keeps_its_episodes(make_study, tmp_path, number, jobs):
-    folder, output = make_study(domain=SLOWLY, jobs=jobs), tmp_path / "out"
-    process = start("compare", folder, "--engines", "sobol", "--seeds", "2", "--output", output)
-    wait_for(output, process, 30)
+@pytest.mark.parametrize(("number", "jobs"), [(signal.SIGTERM, "2"), (signal.SIGINT, "1")])
+def test_a_stopped_comparison_goes_on_to_the_same_runs(make_study, tmp_path, number, jobs):
+    folder, whole = make_study(domain={"sleep": "0.01"}, jobs=jobs), make_study("whole")
+    few = ("--engines", "sobol", "--seeds", "2", "--budget", "4", "--initial", "2", "--output")
+    process = start("compare", folder, *few, tmp_path / "out")
+    wait_for(tmp_path / "out", process, 30)
     ended(process, number)
-    assert 30 <= finished_episodes(output) < 4 * 8 * 18
+    assert 30 <= finished_episodes(tmp_path / "out") < 4 * 5 * 18
+    found = []
+    for home, output in ((folder, tmp_path / "out"), (whole, tmp_path / "never stopped")):
+        assert main(["compare", str(home), *few, str(output)]) == 0
+        runs = read_runs(output / "runs.jsonl").items()
+        found.append({(key.engine, key.seed): (run.regrets, run.answer, run.answer_regret) for key, run in runs})
+    assert found[0] == found[1]
+    assert len(found[0]) == 4
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_stopped_comparison_on_the_stand_in_ends_its_processes(tmp_path, number):
+def test_a_terminated_comparison_on_the_stand_in_ends_its_processes(tmp_path):
     process = start("compare", "analytic", "--engines", "sobol", "--seeds", "30", "--output", tmp_path)
     runs = tmp_path / "runs.jsonl"
     while not runs.exists() and process.poll() is None:
         time.sleep(0.01)
-    ended(process, number)
+    ended(process, signal.SIGTERM)
     assert len(runs.read_text().splitlines()) < 60
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_stopped_diagnosis_is_one_line_and_leaves_no_findings(tmp_path, number):
+def test_a_terminated_diagnosis_is_one_line_and_leaves_no_findings(tmp_path):
     log = write_log(planted_log({}, episodes=6, seconds=20.0), tmp_path / "log")
     process = start("diagnose", log, "--output", tmp_path / "out")
     wait_until_heeding(process)
-    ended(process, number)
+    ended(process, signal.SIGTERM)
     assert not (tmp_path / "out").exists()
 
 

@@ -1,3 +1,7 @@
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from steps import SPACE, search, steps, whole
@@ -31,6 +35,19 @@ def test_it_finds_at_once_what_the_score_alone_does_not_show():
 def test_a_proposal_does_not_depend_on_the_order_in_which_trials_are_told():
     trials = search(make_proposer("composite", 5, whole), 8, seed=2)
     assert Composite(whole).propose(SPACE, trials[::-1], 2) == Composite(whole).propose(SPACE, trials, 2)
+
+
+def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
+    trials = search(make_proposer("composite", 5, whole), 8, seed=4)
+    code = (
+        "from proxytune.search.composite import Composite\n"
+        "from proxytune.search.proposer import Trial\n"
+        "from proxytune.space import Interval, Space\n"
+        f"print(repr(Composite(lambda outcomes: outcomes[..., 0]).propose({SPACE!r}, {trials!r}, 4)))"
+    )
+    environment = {**os.environ, "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2", "PYTHONHASHSEED": "7"}
+    found = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == repr(Composite(whole).propose(SPACE, trials, 4))
 
 
 def test_a_failed_trial_keeps_the_search_away():

@@ -1,6 +1,11 @@
 import numpy as np
+import pytest
 
+from proxytune.search.engines import make_proposer
 from proxytune.study.composition import compose_of, trial_of
+from proxytune.study.evaluate import simulate
+from proxytune.study.progress import Silent
+from proxytune.study.run import run_study
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 
@@ -17,12 +22,10 @@ def test_a_trial_s_outcome_composes_to_its_prpv(finished):
     assert len(set(composed)) > 1
 
 
-def test_an_outcome_is_in_the_target_s_order_whatever_the_study_s(make_study):
-    from proxytune.search.engines import make_proposer
-    from proxytune.study.progress import Silent
-    from proxytune.study.run import run_study
-
-    folder = make_study(agents='["agent5", "agent0", "agent3", "agent1", "agent2", "agent4"]', budget="6")
+@pytest.mark.parametrize("metrics", ['["survival_time:max"]', '["survival_time:max", "distance:min"]'])
+def test_an_outcome_has_the_study_s_metrics_in_their_order_and_the_target_s_agents(make_study, metrics):
+    agents = '["agent5", "agent0", "agent3", "agent1", "agent2", "agent4"]'
+    folder = make_study(agents=agents, metrics=metrics, budget="6")
     study = open_study(folder)
     with Store.open(folder) as store:
         run_study(study, store, make_proposer("sobol", 5), Silent())
@@ -34,9 +37,6 @@ def test_an_outcome_is_in_the_target_s_order_whatever_the_study_s(make_study):
 def test_a_trial_whose_agent_has_no_episode_has_no_outcome(make_study):
     folder = make_study(domain={"faults": '["agent3:*:raises"]'}, budget="6")
     study = open_study(folder)
-    from proxytune.study.evaluate import simulate
-    from proxytune.study.progress import Silent
-
     with Store.open(folder) as store:
         theta = {"delay": 0.1, "trim": 0.1}
         simulate(study, store, theta, Silent(), "")

@@ -1,0 +1,114 @@
+"""Behaviour cloning learns what pictures show, the same under the same seed, and goes on from other weights."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sklearn.neural_network import MLPRegressor
+
+from proxytune.domain import Demonstration
+from proxytune.errors import LearnerError
+from proxytune.learning.cloning import BehaviourCloning
+
+SMALL = BehaviourCloning(rows=3, columns=4, hidden=(12,), steps=600, passes=10)
+
+
+def pictures(count, seed, rows=12, columns=16):
+    """Pictures whose brightness leans to one side, and the steering that goes with it."""
+    generator = np.random.default_rng(seed)
+    lean = generator.uniform(-1, 1, count)
+    ramp = 128 + 100 * lean[:, None] * np.linspace(-1, 1, columns)
+    noisy = ramp[:, None, :, None] + generator.normal(0, 8, (count, rows, columns, 3))
+    commands = 0.3 + 0.1 * np.stack((-lean, lean), axis=1)
+    return Demonstration(np.clip(noisy, 0, 255).astype(np.uint8), commands)
+
+
+def error(learner, weights, samples):
+    answered = np.array([learner.act(weights, picture) for picture in samples.observations])
+    return float(np.abs(answered - samples.commands).mean())
+
+
+def test_it_learns_a_planted_steering_far_better_than_a_constant_would():
+    weights = SMALL.train(pictures(400, 1), None, 1)
+    fresh = pictures(100, 2)
+    assert error(SMALL, weights, fresh) < 0.1 * np.abs(fresh.commands - 0.3).mean()
+
+
+def test_the_same_seed_gives_the_same_weights_to_the_last_bit_and_another_does_not():
+    one, again, other = (SMALL.train(pictures(60, 1), None, seed) for seed in (1, 1, 2))
+    assert all(np.array_equal(one[name], again[name]) for name in one)
+    assert not np.array_equal(one["weight0"], other["weight0"])
+
+
+def test_its_answer_is_that_of_scikit_learns_network():
+    weights = SMALL.train(pictures(80, 1), None, 1)
+    network = MLPRegressor(hidden_layer_sizes=SMALL.hidden, random_state=0)
+    network.partial_fit(SMALL.features(pictures(80, 1).observations), np.zeros((80, 2)))
+    network.coefs_ = [weights["weight0"], weights["weight1"]]
+    network.intercepts_ = [weights["bias0"], weights["bias1"]]
+    picture = pictures(1, 5).observations[0]
+    expected = weights["centre"] + weights["spread"] * network.predict(SMALL.features(picture[None]))[0]
+    assert SMALL.act(weights, picture) == pytest.approx(np.clip(expected, -1, 1), abs=1e-12)
+
+
+def test_starting_from_weights_a_few_samples_do_not_make_it_forget():
+    start = SMALL.train(pictures(400, 1), None, 1)
+    fresh = pictures(100, 2)
+    one_sided = [place for place, command in enumerate(fresh.commands) if command[0] > 0.36][:8]
+    few = Demonstration(fresh.observations[one_sided], fresh.commands[one_sided])
+    tuned, scratch = SMALL.train(few, start, 1), SMALL.train(few, None, 1)
+    assert not np.array_equal(tuned["weight0"], start["weight0"])
+    assert error(SMALL, tuned, fresh) < 0.5 * error(SMALL, scratch, fresh)
+
+
+def test_starting_from_weights_it_follows_samples_that_say_otherwise():
+    start = SMALL.train(pictures(400, 1), None, 1)
+    turned = pictures(400, 4)
+    turned = turned._replace(commands=turned.commands[:, ::-1].copy())
+    tuned = replace(SMALL, passes=100).train(turned, start, 1)
+    assert error(SMALL, tuned, turned) < 0.3 * error(SMALL, start, turned)
+
+
+def test_training_leaves_the_weights_it_started_from_as_they_were():
+    start = SMALL.train(pictures(60, 1), None, 1)
+    before = {name: values.copy() for name, values in start.items()}
+    SMALL.train(pictures(60, 2), start, 1)
+    assert all(np.array_equal(start[name], before[name]) for name in before)
+
+
+def test_a_cell_is_the_mean_grey_of_its_pixels_and_the_top_is_not_looked_at():
+    picture = np.zeros((1, 12, 16, 3), dtype=np.uint8)
+    picture[0, :3] = 255
+    picture[0, 3:6, :4] = (255, 0, 0)
+    cells = SMALL.features(picture)[0].reshape(3, 4)
+    assert cells[0, 0] == pytest.approx(1 / 3 - 0.5)
+    assert (np.delete(cells.ravel(), 0) == -0.5).all()
+
+
+def test_cells_may_be_of_unequal_size():
+    learner = BehaviourCloning(top=0.0, rows=2, columns=2)
+    picture = np.zeros((1, 5, 3, 3), dtype=np.uint8)
+    picture[0, :2, :2] = 255
+    assert learner.features(picture)[0] == pytest.approx([0.5, -0.5, -0.5, -0.5])
+
+
+@pytest.mark.parametrize("shape", [(2, 2, 3), (48, 64), (3, 16, 3)])
+def test_pictures_of_the_wrong_size_are_one_line(shape):
+    with pytest.raises(LearnerError, match="pictures have shape .*do not fit in; give"):
+        SMALL.features(np.zeros((1, *shape), dtype=np.uint8))
+
+
+def test_no_sample_is_nothing_to_learn_from():
+    with pytest.raises(LearnerError, match="no sample"):
+        SMALL.train(Demonstration(np.zeros((0, 12, 16, 3), np.uint8), np.zeros((0, 2))), None, 1)
+
+
+def test_weights_of_another_network_are_refused_with_both_shapes():
+    other = BehaviourCloning(rows=3, columns=4, hidden=(7,), steps=50).train(pictures(30, 1), None, 1)
+    with pytest.raises(LearnerError, match=r"weight0 is \(12, 7\) where these samples need \(12, 12\)"):
+        SMALL.train(pictures(30, 1), other, 1)
+
+
+def test_one_sample_can_be_learnt_from():
+    weights = SMALL.train(pictures(1, 1), None, 1)
+    assert np.isfinite(SMALL.act(weights, pictures(1, 1).observations[0])).all()

@@ -37,8 +37,8 @@ def cut_lines(result: StudyResult) -> list[str]:
     if not result.cut:
         return []
     episodes, seconds = result.spared
-    saved = f"{episodes} episodes, about {seconds:.3g} s of simulation, saved"
-    return [f"cut off, since they could not be among the best: {len(result.cut)} trials; {saved}"]
+    saved = f"{episodes} episodes saved, about {seconds:.3g} s of simulation"
+    return [f"cut off: {len(result.cut)} trials that could not be among the best; {saved}"]
 
 
 def preflight_lines(result: StudyResult) -> list[str]:

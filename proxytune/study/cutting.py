@@ -134,15 +134,14 @@ def by_other_metrics(study: Study, store: Store, trial: TrialRecord) -> TrialRec
 
 
 def spared(study: Study, store: Store, trials: Sequence[TrialRecord]) -> tuple[int, float]:
-    """How many episodes the cut trials did without, and how long their like take [s], by the others' mean time."""
-    seconds = store.seconds()
-    missing = [
-        episode
-        for trial in trials
-        if trial.decided
-        for episode in set(plan(study.settings, trial.theta, study.settings.seed))
-        - set(episodes_of(study.settings, trial))
-    ]
+    """How many episodes the cut trials did without, and how long their like take [s], by the others' mean time.
+
+    Those that other processes had begun in vain are not among them.
+    """
+    settings, seconds = study.settings, store.seconds()
+    planned = [episode for trial in trials if trial.decided for episode in plan(settings, trial.theta, settings.seed)]
+    known = known_outcomes(study, store, planned)
+    missing = [episode for episode in planned if episode not in known]
     return len(missing), sum(seconds.get((episode.agent, episode.start), 0.0) for episode in missing)
 
 

@@ -72,7 +72,7 @@ def test_what_was_cut_off_and_saved_is_told(result):
     cut = replace(first, state="cut", prpv=None, ppv=None, decided=("agent0", "agent2"), bound=12.0, estimate=17.5)
     found = replace(result, trials=(cut, *others), spared=(12, 3.456))
     (line,) = cut_lines(found)
-    assert line.endswith("be among the best: 1 trials; 12 episodes, about 3.46 s of simulation, saved")
+    assert line == "cut off: 1 trials that could not be among the best; 12 episodes saved, about 3.46 s of simulation"
     document = study_document(found)
     assert document["cut_off"] == {"trials": 1, "episodes": 12, "seconds": 3.456}
     assert document["trials"][0]["prpv"] is None

@@ -107,6 +107,8 @@ def test_two_jobs_cut_off_the_same_trials_at_the_same_agents_as_one(cutting, eng
     assert two[1] == one[1]
     assert two[0].episodes - two[0].unused == one[0].episodes
     assert one[0].unused == 0
+    for spent, _, found in (one, two):
+        assert found.spared[0] == BUDGET * ALL - spent.episodes, "what was run in vain was not spared"
 
 
 class Stopping(Silent):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from proxytune.driving.lane import lane_length, lane_pose, off_map
+from proxytune.driving.lane import lane_length, lane_point, lane_pose, off_map
 from proxytune.driving.maps import SMALL_LOOP as ROAD
 
 TILE = ROAD.tile
@@ -138,6 +138,65 @@ def test_a_hair_below_the_first_side_the_way_round_closes():
     pose = lane_pose(ROAD, np.column_stack((x, y)), np.full(y.size, pi / 2))
     assert wrapped(pose.along, lane_length(ROAD, True)) == pytest.approx(0, abs=1e-12)
     assert pose.deviation == pytest.approx(0, abs=1e-12)
+
+
+ways = st.floats(-12, 12)
+
+
+@both_lanes
+def test_points_along_a_lane_are_those_of_its_centre_line(counter_clockwise):
+    line, directions = LAPS[counter_clockwise]
+    along = lane_pose(ROAD, line, directions).along
+    assert lane_point(ROAD, counter_clockwise, along) == pytest.approx(line, abs=1e-9)
+
+
+def tangent(counter_clockwise, along, step=1e-5):
+    """Heading of the lane's centre line."""
+    behind, ahead = (lane_point(ROAD, counter_clockwise, along + way) for way in (-step, step))
+    return np.arctan2(*(ahead - behind)[::-1])
+
+
+@quick
+@given(st.booleans(), ways)
+def test_the_point_so_far_along_a_lane_is_seen_so_far_along_it_on_its_centre_line(counter_clockwise, along):
+    heading = tangent(counter_clockwise, along)
+    pose = lane_pose(ROAD, lane_point(ROAD, counter_clockwise, along), heading)
+    assert pose.counter_clockwise == counter_clockwise
+    assert pose.deviation == pytest.approx(0, abs=1e-12)
+    assert pose.heading_error == pytest.approx(0, abs=1e-4)
+    assert wrapped(pose.along - along, lane_length(ROAD, counter_clockwise)) == pytest.approx(0, abs=1e-9)
+
+
+@quick
+@given(points, headings)
+def test_a_pose_lies_its_deviation_to_the_left_of_the_point_so_far_along(point, heading):
+    pose = lane_pose(ROAD, np.array(point), np.array(heading))
+    outer = bool(pose.counter_clockwise)
+    apart = np.array(point) - lane_point(ROAD, outer, pose.along)
+    assert np.hypot(*apart) == pytest.approx(abs(pose.deviation), abs=1e-9)
+
+
+@quick
+@given(st.booleans(), ways, st.integers(-3, 3))
+def test_whole_laps_make_no_difference_to_a_point(counter_clockwise, along, laps):
+    further = along + laps * lane_length(ROAD, counter_clockwise)
+    here = lane_point(ROAD, counter_clockwise, along)
+    assert lane_point(ROAD, counter_clockwise, further) == pytest.approx(here, abs=1e-9)
+
+
+@quick
+@given(st.booleans(), ways, st.floats(0, 0.3))
+def test_going_on_along_a_lane_goes_no_further_than_that(counter_clockwise, along, way):
+    here, there = (lane_point(ROAD, counter_clockwise, along + further) for further in (0.0, way))
+    assert np.hypot(*(there - here)) <= way + 1e-12
+
+
+def test_points_of_many_lanes_and_ways_may_be_asked_for_at_once():
+    outer, along = np.array([[True], [False]]), np.linspace(-1, 6, 5)
+    together = lane_point(ROAD, outer, along)
+    apart = [[lane_point(ROAD, bool(lane), float(way)) for way in along] for lane in outer]
+    assert together == pytest.approx(np.array(apart), abs=1e-12)
+    assert together.shape == (2, 5, 2)
 
 
 def test_the_maps_middle_has_a_finite_answer():

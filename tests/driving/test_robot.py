@@ -2,6 +2,7 @@
 
 import math
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -221,3 +222,11 @@ def test_a_mistake_in_robot_toml_is_one_line(tmp_path, monkeypatch, before, afte
     with pytest.raises(SettingsError) as caught:
         read_robot.__wrapped__("duckiebot")
     assert says in str(caught.value)
+
+
+def test_a_robot_that_does_not_state_its_wheels_distance_cannot_be_examined():
+    robot = read_robot("duckiebot")
+    assert robot.wheel_distance() == robot.figures["wheel_distance"]
+    figures = {name: value for name, value in robot.figures.items() if name != "wheel_distance"}
+    with pytest.raises(SettingsError, match="states no wheel_distance; add it"):
+        replace(robot, figures=figures).wheel_distance()

@@ -76,7 +76,7 @@ def test_an_engine_that_is_not_installed_is_refused_by_file_and_key_and_nothing_
 
 def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(make_study, capsys):
     folder = make_study(
-        family='"planted:planted"', parameters={"matters": "[-1, 1]", "dead": "[0, 1]"}, preflight="true"
+        family='"partly_dead:partly_dead"', parameters={"matters": "[-1, 1]", "dead": "[0, 1]"}, preflight="true"
     )
     assert main(["study", str(folder), "--json"]) == 0
     out, told = capsys.readouterr()

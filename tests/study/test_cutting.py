@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from planted import ORDERED
+from partly_dead import ORDERED
 
 from proxytune.scores import Metric
 from proxytune.search.engines import make_proposer
@@ -32,7 +32,7 @@ def study_of(make, called="cutting", **changes):
         called,
         parameters={"first": "[0, 1]", "second": "[0, 1]"},
         **{
-            "family": '"planted:ordered"',
+            "family": '"partly_dead:ordered"',
             "agents": "[" + ", ".join(f'"agent{number}"' for number in range(8)) + "]",
             "budget": str(BUDGET),
             "cut_off": "true",

@@ -37,7 +37,7 @@ def planted(make_study):
         return make_study(
             called,
             parameters={"matters": "[-1, 1]", "noise_sized": "[0, 1]", "dead": "[0, 1]"},
-            family='"planted:planted"',
+            family='"partly_dead:partly_dead"',
             agents=f"[{names}]",
             preflight="true",
             **changes,

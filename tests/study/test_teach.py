@@ -84,12 +84,12 @@ def test_an_expert_that_cannot_drive_is_told_with_the_proxys_name(make_study):
 def test_a_policy_that_gives_no_command_stops_the_run_and_keeps_the_rest(make_study):
     folder = make_taught(make_study)
     path = folder / "study.toml"
-    (folder / "mine.py").write_text(
+    (folder / "silly_learner.py").write_text(
         "import numpy as np\n\n\nclass Silly:\n"
         "    def train(self, samples, start, seed):\n        return {'nothing': np.zeros(1)}\n\n"
         "    def act(self, weights, observation):\n        return np.array([np.nan, 0.0])\n"
     )
-    path.write_text(path.read_text().replace("schoolroom:Matrix", "mine:Silly"))
+    path.write_text(path.read_text().replace("schoolroom:Matrix", "silly_learner:Silly"))
     with pytest.raises(EpisodeError, match="no command"):
         run(folder)
     assert list((folder / "teaching").glob("samples-*.npz"))

@@ -14,7 +14,7 @@ NAMES = {"matters": -1.0, "noise_sized": 0.0, "dead": 0.0}
 
 
 @dataclass(frozen=True)
-class Planted:
+class PartlyDead:
     """Agents of different strength; `noise_sized` reshuffles each episode as another seed would."""
 
     identity: str = "planted 1"
@@ -44,14 +44,14 @@ class Planted:
         return {"distance": float(good - moved + draw[0]), "survival_time": float(10.0 - number + draw[1])}
 
 
-def planted(section: Section, *, model: Path | None) -> Planted:
+def partly_dead(section: Section, *, model: Path | None) -> PartlyDead:
     """The family."""
     section.only(())
-    return Planted()
+    return PartlyDead()
 
 
 @dataclass(frozen=True)
-class Ordered(Planted):
+class Ordered(PartlyDead):
     """Agents that the target ranks by number, and this family less and less so away from the middle of the box."""
 
     identity: str = "ordered 1"

@@ -123,6 +123,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", str(disk)], check=True)
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_the_study_goes_on_when_there_is_room(make_study, small_disk, capsys):
     whole = make_study("whole", budget="20")
     assert main(["study", str(whole), "--json"]) == 0

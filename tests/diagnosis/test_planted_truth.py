@@ -23,8 +23,8 @@ def said_of(name, kind):
     "name",
     [
         "dead_band width 0.12",
-        "turn_slip gain 0.15",
-        "yaw_scrub baseline 0.13",
+        pytest.param("turn_slip gain 0.15", marks=pytest.mark.slow),
+        pytest.param("yaw_scrub baseline 0.13", marks=pytest.mark.slow),
         "dropped_commands probability 0.4",
     ],
 )

@@ -100,7 +100,9 @@ def test_the_search_is_told_the_estimate_of_a_trial_that_was_cut_off(done):
     assert found.best.trial.state == "finished"
 
 
-@pytest.mark.parametrize("engine", ["gp", "random", "sobol"])
+@pytest.mark.parametrize(
+    "engine", ["gp", *(pytest.param(name, marks=pytest.mark.slow) for name in ("random", "sobol"))]
+)
 def test_two_jobs_cut_off_the_same_trials_at_the_same_agents_as_one(cutting, engine):
     one = run(cutting("one", engine=f'"{engine}"'), jobs=1)
     two = run(cutting("two", engine=f'"{engine}"'), jobs=2)

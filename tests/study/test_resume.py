@@ -185,6 +185,7 @@ def test_processes_of_a_killed_study_do_not_linger(make_study):
     assert process.returncode == -signal.SIGKILL
 
 
+@pytest.mark.slow
 def test_a_second_process_on_the_same_study_is_told_and_the_first_is_not_disturbed(make_study, capsys):
     """A sweep too; looking at it is for everybody."""
     folder = make_study(domain={"sleep": "0.05"}, budget="60")

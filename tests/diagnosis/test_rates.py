@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 
 import rates
 
-EVERY = 12
+EVERY = 24
 """Every so many-th case of each kind: twelve one-minute logs take about half a minute of processor time a case."""
 
 

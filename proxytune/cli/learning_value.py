@@ -13,7 +13,7 @@ from proxytune.study.lock import locked
 from proxytune.study.plv_study import run_plv_study, search_space
 from proxytune.study.progress import Bars
 from proxytune.study.study import Study
-from proxytune.study.teach import open_school, points_of_study
+from proxytune.study.teach import open_school, points_of
 
 
 def taught(study: Study, folder: Path, proposer: Proposer, by_prpv: Callable[[], tuple[Profile, ...]]) -> Answer:
@@ -23,7 +23,7 @@ def taught(study: Study, folder: Path, proposer: Proposer, by_prpv: Callable[[],
     widths = school.settings.widths
     search_space(settings, widths, ())
     space = search_space(settings, widths, by_prpv() if school.settings.narrow else ())
-    with locked(folder), Bars(points_of_study(school), "points of learning curves") as bars:
+    with locked(folder), Bars(points_of(school, school.settings.budget), "points of learning curves") as bars:
         found = run_plv_study(settings, school, proposer, space, bars)
     figure = folder / "figures" / "plv.png"
     save(plv_figure(found), figure)

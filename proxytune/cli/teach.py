@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     school = open_school(study.settings)
     proxies = school.settings.proxies
     with locked(folder), Store.open(folder) as store:
-        with Bars(points_of(school), "points of learning curves") as bars:
+        with Bars(points_of(school, len(proxies)), "points of learning curves") as bars:
             found = run_experiment(study.settings, school, bars)
         agents = len(study.settings.agents) * study.settings.starts
         with Bars(agents * sum(proxy.fixed for proxy in proxies.values())) as bars:

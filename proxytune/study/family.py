@@ -3,6 +3,7 @@
 import importlib
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from proxytune.domain import DomainFamily
@@ -38,12 +39,10 @@ def _factory(settings: StudySettings) -> Any:
     module, colon, name = settings.family.partition(":")
     if not (module and colon and name):
         raise settings.error("family", f"must be 'module:factory', got '{settings.family}'")
-    folder = str(settings.folder.absolute())
-    if folder not in sys.path:
-        sys.path.append(folder)
     try:
-        found = importlib.import_module(module)
+        found = import_beside(settings, module)
     except ModuleNotFoundError as problem:
+        folder = settings.folder.absolute()
         raise settings.error("family", f"no module '{problem.name}' here, in {folder} or installed") from None
     except Exception as problem:
         raise settings.error("family", f"importing {module} raised {_named(problem)}; mend it") from problem
@@ -53,12 +52,22 @@ def _factory(settings: StudySettings) -> Any:
     return getattr(found, name)
 
 
+def import_beside(settings: StudySettings, module: str) -> ModuleType:
+    """Import a module that is installed, or lies in the study's folder."""
+    folder = str(settings.folder.absolute())
+    if folder not in sys.path:
+        sys.path.append(folder)
+    return importlib.import_module(module)
+
+
 def _check(settings: StudySettings, family: DomainFamily) -> None:
     lacks = [member for member in MEMBERS if not hasattr(family, member)]
     if lacks:
         raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
     for interval in settings.space.intervals:
-        _check_interval(settings, family, interval.name, interval.low, interval.high)
+        given = f"[{interval.low:g}, {interval.high:g}]"
+        bounds = (interval.low, interval.high)
+        check_bounds(settings, family, f"parameters.{interval.name}", interval.name, bounds, given)
     if settings.starts > family.starts:
         raise settings.error("starts", f"the family has {family.starts}, got {settings.starts}")
     for metric in settings.metrics:
@@ -71,13 +80,27 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
             raise settings.error("agents", str(problem)) from None
 
 
-def _check_interval(settings: StudySettings, family: DomainFamily, name: str, low: float, high: float) -> None:
-    key = f"parameters.{name}"
+def check_bounds(
+    settings: StudySettings, family: DomainFamily, key: str, name: str, bounds: tuple[float, float], given: str
+) -> None:
+    """Refuse values of a parameter that the family has not, or that lie beyond what it can be.
+
+    Args:
+        settings: Of the study.
+        family: Whose parameter it is.
+        key: Where the values stand in study.toml.
+        name: The parameter.
+        bounds: Lowest and highest of the values.
+        given: The values as text.
+
+    Raises:
+        SettingsError: With the key and the remedy.
+    """
     if name not in family.parameters:
         raise settings.error(key, f"unknown parameter; {nearest(name, family.parameters)}")
     known = family.parameters[name]
-    if low < known.low or high > known.high:
-        raise settings.error(key, f"must lie within [{known.low:g}, {known.high:g}], got [{low:g}, {high:g}]")
+    if bounds[0] < known.low or bounds[1] > known.high:
+        raise settings.error(key, f"must lie within [{known.low:g}, {known.high:g}], got {given}")
 
 
 def _named(problem: Exception) -> str:

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 from proxytune.errors import RunError
 from proxytune.learning.lessons import Distribution
-from proxytune.learning.plv import Convergence, Curve, Teaching, converged_level, settled, teaching
+from proxytune.learning.plv import Convergence, Curve, Teaching, settled, teaching
 from proxytune.search.profile import Profile
 from proxytune.search.proposer import Proposer, Trial
 from proxytune.space import Interval, Space, Theta
 from proxytune.study.progress import Watcher
 from proxytune.study.school import School
 from proxytune.study.settings import StudySettings
-from proxytune.study.teach import learning_curves, teaching_settings
+from proxytune.study.teach import convergence, learning_curves, teaching_settings
 from proxytune.study.teaching import NONE
 
 WIDTH = " width"
@@ -120,8 +120,7 @@ def run_plv_study(
     """
     taught = school.settings
     without = learning_curves(school, {NONE: None}, settings.jobs, watcher)[NONE]
-    level = converged_level(without) if taught.level is None else taught.level
-    when = Convergence(level, taught.tolerance)
+    when = convergence(taught, without)
     if not settled(without, taught.tolerance):
         raise RunError(
             f"{settings.path}: without a proxy the score still rises by more than {taught.tolerance:g} up to "

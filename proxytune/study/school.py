@@ -65,6 +65,11 @@ class School:
     starts: int
     cache: Cache
 
+    @functools.cached_property
+    def identities(self) -> tuple[str, str]:
+        """Of the proxy's and the target's domain family, once: reading them digests the user's modules."""
+        return self.proxy.identity, self.target.identity
+
     def score(self, point: Point) -> float:
         """Mean score in the target over all starts; NaN where nothing has been learnt, so nothing can drive.
 
@@ -92,7 +97,7 @@ class School:
         """All that determines a point's scores."""
         weights = self._weights_facts(point)
         return {
-            "target": self.target.identity,
+            "target": self.identities[1],
             "starts": self.starts,
             "seed": self._seed(EXAM, 0),
             "weights": digest(weights) if weights else None,
@@ -123,15 +128,17 @@ class School:
         }
 
     def _proxy_facts(self, proxy: Distribution, repetition: int) -> dict[str, Any]:
-        return self._lessons_facts(self.proxy, proxy.bounds, self.settings.proxy_samples, self._seed(PROXY, repetition))
+        domain, seed = self.identities[0], self._seed(PROXY, repetition)
+        return self._lessons_facts(domain, proxy.bounds, self.settings.proxy_samples, seed)
 
     def _target_facts(self, repetition: int) -> dict[str, Any]:
-        return self._lessons_facts(self.target, {}, self.settings.target_samples[-1], self._seed(TARGET, repetition))
+        domain, seed = self.identities[1], self._seed(TARGET, repetition)
+        return self._lessons_facts(domain, {}, self.settings.target_samples[-1], seed)
 
-    def _lessons_facts(self, room: Classroom, bounds: Mapping[str, Any], count: int, seed: int) -> dict[str, Any]:
+    def _lessons_facts(self, domain: str, bounds: Mapping[str, Any], count: int, seed: int) -> dict[str, Any]:
         theta = {name: list(pair) for name, pair in bounds.items()}
         return {
-            "domain": room.identity,
+            "domain": domain,
             "theta": theta,
             "count": count,
             "seed": seed,

@@ -1,9 +1,7 @@
 """The learning experiment: learning curves with and without each proxy, and what each is worth as a teacher."""
 
 import hashlib
-import importlib
 import inspect
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +15,7 @@ from proxytune.learning.cache import Cache
 from proxytune.learning.learner import Learner
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Curve, Teaching, converged_level, settled, teaching
-from proxytune.settings import nearest
-from proxytune.study.family import load_family
+from proxytune.study.family import check_bounds, import_beside, load_family
 from proxytune.study.progress import Watcher
 from proxytune.study.school import Point, School, examined, prepared
 from proxytune.study.settings import StudySettings
@@ -115,8 +112,7 @@ def run_experiment(settings: StudySettings, school: School, watcher: Watcher) ->
 def judged(settings: StudySettings, school: School, curves: Mapping[str, Curve]) -> Experiment:
     """What the curves say: a pure function of them and of what counts as converged."""
     taught, without = school.settings, curves[NONE]
-    level = converged_level(without) if taught.level is None else taught.level
-    when = Convergence(level, taught.tolerance)
+    when = convergence(taught, without)
     steady = settled(without, taught.tolerance)
     lessons = [
         Lesson(
@@ -125,6 +121,12 @@ def judged(settings: StudySettings, school: School, curves: Mapping[str, Curve])
         for name, proxy in taught.proxies.items()
     ]
     return Experiment(settings, school.target.best_score, without, when, steady, tuple(lessons))
+
+
+def convergence(taught: TeachingSettings, without: Curve) -> Convergence:
+    """When a learner counts as converged: at the level stated, or at what it comes to without a proxy."""
+    level = converged_level(without) if taught.level is None else taught.level
+    return Convergence(level, taught.tolerance)
 
 
 def learning_curves(
@@ -149,14 +151,9 @@ def learning_curves(
     return {name: _curve(school, [point for point in points if point.name == name]) for name in proxies}
 
 
-def points_of(school: School) -> int:
-    """How many points the learning curves of an experiment have together, the one without a proxy included."""
-    return (len(school.settings.proxies) + 1) * school.settings.seeds * len(school.settings.target_samples)
-
-
-def points_of_study(school: School) -> int:
-    """How many points the learning curves of a study of learning value have, the one without a proxy included."""
-    return (school.settings.budget + 1) * school.settings.seeds * len(school.settings.target_samples)
+def points_of(school: School, proxies: int) -> int:
+    """How many points the learning curves of so many proxies have, with the one of no proxy."""
+    return (proxies + 1) * school.settings.seeds * len(school.settings.target_samples)
 
 
 def _curve(school: School, points: Sequence[Point]) -> Curve:
@@ -172,12 +169,8 @@ def check_proxies(settings: StudySettings, school: School, proxies: Mapping[str,
     """
     for proxy, where in proxies.items():
         for name, (low, high) in where.bounds.items():
-            key = f"teaching.proxies.{proxy}.{name}"
-            if name not in school.proxy.parameters:
-                raise settings.error(key, f"unknown parameter; {nearest(name, school.proxy.parameters)}")
-            known = school.proxy.parameters[name]
-            if low < known.low or high > known.high:
-                raise settings.error(key, f"must lie within [{known.low:g}, {known.high:g}], got {low:g} to {high:g}")
+            key, given = f"teaching.proxies.{proxy}.{name}", f"{low:g} to {high:g}"
+            check_bounds(settings, school.proxy, key, name, (low, high), given)
 
 
 def _classroom(settings: StudySettings, model: Path | None) -> Classroom:
@@ -191,11 +184,8 @@ def _classroom(settings: StudySettings, model: Path | None) -> Classroom:
 def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
     """The learner and a digest of its code and settings."""
     module, _, attribute = name.partition(":")
-    folder = str(settings.folder.absolute())
-    if folder not in sys.path:
-        sys.path.append(folder)
     try:
-        found: Any = getattr(importlib.import_module(module), attribute)
+        found: Any = getattr(import_beside(settings, module), attribute)
         made = found() if inspect.isclass(found) or inspect.isfunction(found) else found
     except Exception as problem:
         raise _no_learner(settings, f"'{name}' cannot be loaded: {problem}; write module:attribute") from None

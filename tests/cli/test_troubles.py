@@ -9,6 +9,7 @@ import subprocess
 
 import pytest
 from processes import episodes, start, trials
+from stopping import Stopping
 
 from proxytune.cli.main import main
 from proxytune.search.engines import make_proposer
@@ -20,18 +21,6 @@ from proxytune.study.study import open_study
 
 slow = pytest.mark.slow
 DAMAGED = r"is damaged \([^)]+\); restore a copy, or move it away to start again"
-
-
-class Stopping(Silent):
-    """Presses Ctrl-C after so many episodes."""
-
-    def __init__(self, episodes):
-        self.left = episodes
-
-    def episode(self):
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
 
 
 def interrupted_after(folder, count):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from stopping import Stopping
 
 from proxytune.errors import EpisodeError
 from proxytune.report.study_document import study_document
@@ -115,21 +116,6 @@ def test_trials_do_not_depend_on_it(finished, make_study):
             trials.append(store.trials())
     assert trials[0] == trials[1]
     assert trials[0][:7] == before
-
-
-class Stopping(Silent):
-    """Presses Ctrl-C after so many episodes, and counts what is announced."""
-
-    def __init__(self, episodes=10**6):
-        self.left, self.off = episodes, 0
-
-    def begin(self, what, known):
-        self.off += known
-
-    def episode(self):
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

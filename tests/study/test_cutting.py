@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from partly_dead import ORDERED
+from stopping import Stopping
 
 from proxytune.scores import Metric
 from proxytune.search.engines import make_proposer
@@ -111,18 +112,6 @@ def test_two_jobs_cut_off_the_same_trials_at_the_same_agents_as_one(cutting, eng
     assert one[0].unused == 0
     for spent, _, found in (one, two):
         assert found.spared[0] == BUDGET * ALL - spent.episodes, "what was run in vain was not spared"
-
-
-class Stopping(Silent):
-    """Presses Ctrl-C after so many episodes."""
-
-    def __init__(self, episodes):
-        self.left = episodes
-
-    def episode(self):
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

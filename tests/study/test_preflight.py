@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from stopping import Stopping
 
 from proxytune.errors import EpisodeError
 from proxytune.search.engines import make_proposer
@@ -65,21 +66,6 @@ def test_a_parameter_that_matters_is_not_looked_at_twice_and_nothing_is_simulate
     assert spent.episodes == found.episodes == sum(looked.values())
     assert spent.episodes < most_episodes(open_study(folder).settings)
     assert run(folder) == (replace(spent, episodes=0, seconds=0), found)
-
-
-class Stopping(Silent):
-    """Presses Ctrl-C after so many episodes, and counts what is announced."""
-
-    def __init__(self, episodes=10**6):
-        self.left, self.off = episodes, 0
-
-    def begin(self, what, known):
-        self.off += known
-
-    def episode(self):
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

@@ -2,6 +2,7 @@ import sqlite3
 from dataclasses import replace
 
 import pytest
+from stopping import Stopping
 
 from proxytune.errors import EpisodeError, RunError, SettingsError
 from proxytune.search.engines import make_proposer
@@ -43,18 +44,6 @@ def test_a_raised_budget_goes_on_as_if_it_had_been_so_from_the_start(make_study)
 def test_a_lowered_budget_keeps_what_is_finished(finished, make_study):
     _, trials = run(finished)
     assert run(finished, budget=3) == (0, trials)
-
-
-class Stopping(Silent):
-    """Presses Ctrl-C after so many episodes."""
-
-    def __init__(self, episodes):
-        self.left = episodes
-
-    def episode(self):
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

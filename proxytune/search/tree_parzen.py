@@ -21,7 +21,7 @@ class TreeParzen:
         """The next point, a function of the trials in their order and the seed alone; every trial needs a score."""
         import optuna
 
-        box = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
+        box: dict[str, Any] = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
         sampler = optuna.samplers.TPESampler(n_startup_trials=1, seed=proposal_seed(seed, len(trials)))
         with _quiet(optuna.logging):
             study = optuna.create_study(sampler=sampler, direction="minimize")

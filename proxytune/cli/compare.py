@@ -2,9 +2,7 @@
 
 import argparse
 import json
-import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from joblib import Parallel, delayed
@@ -12,25 +10,18 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.cli.answer import Answer
-from proxytune.cli.study_folder import study_folder
+from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, check_truths, objective_of
 from proxytune.errors import InputError, StoreError
 from proxytune.report.compare_document import compare_document, compare_lines, compare_table
 from proxytune.report.compare_figure import compare_figure
 from proxytune.report.writing import save, write_text
-from proxytune.search.analytic import Analytic, Objective
+from proxytune.search.analytic import Objective
 from proxytune.search.comparison import Run, RunKey, run_document, run_engine, run_from, search_code
-from proxytune.search.engines import DEFAULT_ENGINE, ENGINES, STUDY_ENGINES, why_not
-from proxytune.search.ranking import Ranking
+from proxytune.search.engines import ENGINES, STUDY_ENGINES, why_not
 from proxytune.search.summary import EngineSummary, summarise
 from proxytune.study.lock import locked
-from proxytune.study.objective import StudyObjective, noise_floor
-from proxytune.study.progress import Bars
-from proxytune.study.store import Store
-from proxytune.study.study import open_study
 
-STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking()}
 FILE_NAME = "runs.jsonl"
-BUDGET = 40
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -39,13 +30,28 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--engines",
         metavar="NAME,…",
-        help=f"of {', '.join(ENGINES)}; {DEFAULT_ENGINE} is always there [all of a study's that can be used]",
+        help=f"of {', '.join(ENGINES)}; the others are compared with the first [all of a study's that can be used]",
     )
     parser.add_argument(
         "--seeds", type=int, default=30, metavar="N", help="runs per engine, the same seeds for all [30]"
     )
     parser.add_argument("--budget", type=int, metavar="N", help=f"evaluations per run [the study's, or {BUDGET}]")
-    parser.add_argument("--initial", type=int, metavar="N", help="of them the shared design [the study's, or 10]")
+    parser.add_argument(
+        "--initial", type=int, metavar="N", help=f"of them the shared design [the study's, or {INITIAL}]"
+    )
+    parser.add_argument(
+        "--truths",
+        action="store_true",
+        help="of a study: each seed has a target of its own, simulated at a θ drawn by it",
+    )
+    parser.add_argument(
+        "--lacks",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="with --truths: a model.toml whose effects the targets have and the proxy lacks; several by turns",
+    )
     parser.add_argument("--output", type=Path, metavar="DIR", help="where runs and figure go [./compare_STUDY]")
 
 
@@ -55,7 +61,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     output = arguments.output or Path(f"compare_{name}")
     engines = _engines(arguments)
     _check(arguments)
-    with locked(_made(output)), _objective(arguments, output) as (objective, budget, initial, jobs):
+    with locked(_made(output)), objective_of(arguments, output, len(engines)) as (objective, budget, initial, jobs):
         keys = _keys(objective, engines, arguments.seeds, budget, initial)
         runs = _finished(objective, keys, output / FILE_NAME, jobs)
     grouped = [[runs[key] for key in keys if key.engine == engine] for engine in engines]
@@ -76,7 +82,7 @@ def _answer(
 
 
 def _engines(arguments: argparse.Namespace) -> list[str]:
-    """The engines asked for, the default first."""
+    """The engines asked for, in that order."""
     stand_in = STAND_INS.get(arguments.study)
     composed = stand_in is None or stand_in.goal(1) is not None
     if arguments.engines is None:
@@ -86,7 +92,9 @@ def _engines(arguments: argparse.Namespace) -> list[str]:
         reason = why_not(name, composed=composed)
         if reason:
             raise InputError(f"--engines: {reason}")
-    return list(dict.fromkeys([DEFAULT_ENGINE, *named]))
+    if not named:
+        raise InputError(f"--engines: names none; give some of {', '.join(ENGINES)}")
+    return list(dict.fromkeys(named))
 
 
 def _check(arguments: argparse.Namespace) -> None:
@@ -94,37 +102,15 @@ def _check(arguments: argparse.Namespace) -> None:
         value = getattr(arguments, name)
         if value is not None and value < least:
             raise InputError(f"--{name} {value}: give at least {least}")
-
-
-@contextmanager
-def _objective(arguments: argparse.Namespace, output: Path) -> Iterator[tuple[Objective, int, int, int]]:
-    """The objective with budget, design and how many runs at a time: a study's own episodes run in parallel instead."""
-    if arguments.study in STAND_INS:
-        yield STAND_INS[arguments.study], *_spending(arguments, BUDGET, 10), 2
-        return
-    study = open_study(study_folder(Path(arguments.study)))
-    settings = study.settings
-    budget, initial = _spending(arguments, settings.budget, settings.initial)
-    per_run = (budget + 1) * len(settings.agents) * settings.starts
-    episodes = per_run * arguments.seeds * len(_engines(arguments))
-    print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
-    with Store.open(output) as store, Bars(episodes) as bars:
-        yield StudyObjective(study, store, bars, noise_floor(study)), budget, initial, 1
-
-
-def _spending(arguments: argparse.Namespace, budget: int, initial: int) -> tuple[int, int]:
-    budget, initial = arguments.budget or budget, arguments.initial or initial
-    if initial >= budget:
-        raise InputError(f"--budget {budget}: is spent on the design of {initial}; raise it, or lower --initial")
-    return budget, initial
+    check_truths(arguments)
 
 
 def _keys(objective: Objective, engines: Sequence[str], seeds: int, budget: int, initial: int) -> list[RunKey]:
     code = search_code()
     return [
         RunKey(objective.identity, engine, seed, budget, initial, code)
-        for engine in engines
         for seed in range(1, seeds + 1)
+        for engine in engines
     ]
 
 

@@ -66,8 +66,12 @@ class Objective(Protocol):
         """How much worse than the optimum a visited point is, as well as that is known without further simulation."""
         ...
 
+    def fresh_score(self, values: Values, seed: int) -> float | None:
+        """The score of the answer, free of the noise that the engine has seen."""
+        ...
+
     def fresh_regret(self, values: Values, seed: int) -> float | None:
-        """The same of the answer, free of the noise that the engine has seen."""
+        """How much worse than the optimum the answer is, free of the noise that the engine has seen."""
         ...
 
     def error(self, values: Values, seed: int) -> float | None:
@@ -112,6 +116,10 @@ class Analytic:
         blur, pitch, delay, trim = to_unit(self.space, values) - to_unit(self.space, self.optimum(seed))
         far = math.hypot(2.5 * trim, 1.5 * (delay + 0.5 * blur), 1.2 * pitch, 0.3 * blur)
         return float(STEP * math.floor(CEILING * (1.0 - math.exp(-far)) / STEP))
+
+    def fresh_score(self, values: Values, seed: int) -> float:
+        """The score without noise."""
+        return self.regret(values, seed)
 
     def fresh_regret(self, values: Values, seed: int) -> float:
         """The score without noise."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.search.analytic import Objective
-from proxytune.search.engines import make_proposer
+from proxytune.search.engines import WITH_OUTPUTS, make_proposer
 from proxytune.search.proposer import Trial, Values
 from proxytune.search.surrogate import fit_surrogate
 
@@ -43,6 +43,7 @@ class Run:
         key: Which run it was.
         regrets: Regret of every visited point, in order; None where the trial failed.
         answer: The visited point with the lowest posterior mean, which is what a study reports.
+        answer_score: Its score, free of the noise that the engine has seen; None where it failed.
         answer_regret: Its regret, free of the noise that the engine has seen; None where it failed.
         error: Its distance from the truth in widths of the box, None where truth is not known.
         seconds: Mean time per proposal after the design.
@@ -51,6 +52,7 @@ class Run:
     key: RunKey
     regrets: tuple[float | None, ...]
     answer: Values
+    answer_score: float | None
     answer_regret: float | None
     error: float | None
     seconds: float
@@ -76,7 +78,8 @@ def run_engine(objective: Objective, key: RunKey) -> Run:
         InputError: If there is no such engine, or it needs a library that is not installed.
         RunError: If no trial has a score.
     """
-    proposer, space, spent = make_proposer(key.engine, key.initial, objective.goal(key.seed)), objective.space, 0.0
+    goal = objective.goal(key.seed) if key.engine in WITH_OUTPUTS else None
+    proposer, space, spent = make_proposer(key.engine, key.initial, goal), objective.space, 0.0
     trials: list[Trial] = []
     for number in range(key.budget):
         begun = time.perf_counter()
@@ -88,6 +91,7 @@ def run_engine(objective: Objective, key: RunKey) -> Run:
         key=key,
         regrets=tuple(objective.regret(trial.values, key.seed) for trial in trials),
         answer=answer,
+        answer_score=objective.fresh_score(answer, key.seed),
         answer_regret=objective.fresh_regret(answer, key.seed),
         error=objective.error(answer, key.seed),
         seconds=spent / max(1, key.budget - key.initial),

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 
 from proxytune.errors import InputError
+from proxytune.search.botorch_nei import BotorchNEI
 from proxytune.search.composite import Composite
 from proxytune.search.design import design_point
 from proxytune.search.gaussian_process import GaussianProcess
 from proxytune.search.goal import Goal
+from proxytune.search.optuna_gp import OptunaGP
 from proxytune.search.outcomes import Outcomes
 from proxytune.search.proposer import Proposer, Trial, Values, with_failures_as_worst
 from proxytune.search.random_points import RandomPoints
@@ -25,8 +27,14 @@ WITH_OUTPUTS = (DEFAULT_ENGINE, "composite")
 """What learns from the outputs that a score is computed from."""
 STUDY_ENGINES = (*WITH_OUTPUTS, SCORE_ENGINE, "random", "sobol", "tpe")
 """What a study may name."""
-ENGINES = (*STUDY_ENGINES, "skopt")
+ENGINES = (*STUDY_ENGINES, "skopt", "gpsampler", "qlognei")
 """What can be compared."""
+NEEDS = {
+    "tpe": (("optuna",), "Optuna", "tpe"),
+    "gpsampler": (("optuna", "torch"), "Optuna and PyTorch", "peers"),
+    "qlognei": (("botorch",), "BoTorch", "peers"),
+}
+"""Modules that an engine needs, what they are called, and the extra that installs them."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +68,11 @@ def why_not(engine: str, *, composed: bool) -> str:
     """
     if engine not in ENGINES:
         return f"unknown engine '{engine}'; {nearest(engine, ENGINES)}"
-    if engine == "tpe" and find_spec("optuna") is None:
-        return "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]', or use another engine"
+    modules, called, extra = NEEDS.get(engine, ((), "", ""))
+    if any(find_spec(module) is None for module in modules):
+        verb = "are" if len(modules) > 1 else "is"
+        remedy = f"pip install 'proxytune[{extra}]', or use another engine"
+        return f"'{engine}' needs {called}, which {verb} not installed; {remedy}"
     if engine in WITH_OUTPUTS and not composed:
         return f"'{engine}' models what a score is computed from, and this one has no such parts; use '{SCORE_ENGINE}'"
     return ""
@@ -89,5 +100,7 @@ def make_proposer(engine: str, initial: int, goal: Goal | None = None) -> Propos
         "sobol": Sobol(),
         "tpe": TreeParzen(),
         "skopt": ScikitOptimize(),
+        "gpsampler": OptunaGP(),
+        "qlognei": BotorchNEI(),
     }
     return AfterDesign(inner[engine], initial)

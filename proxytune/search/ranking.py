@@ -82,6 +82,10 @@ class Ranking:
         """PRPV without noise on either side."""
         return float(prpv_of_means(self.means(values, seed), self.means(self.optimum(seed), seed), METRICS))
 
+    def fresh_score(self, values: Values, seed: int) -> float:
+        """PRPV without noise."""
+        return self.regret(values, seed)
+
     def fresh_regret(self, values: Values, seed: int) -> float:
         """The same: it has no noise."""
         return self.regret(values, seed)

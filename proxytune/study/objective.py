@@ -1,5 +1,6 @@
 """A study as something that engines are compared on: each seed is a study of its own, simulated once."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from proxytune.search.goal import Goal
@@ -49,9 +50,12 @@ class StudyObjective:
     @property
     def identity(self) -> str:
         """All that its figures depend on, apart from the seed."""
-        of_the_search = ("seed", "initial", "engine", "cut_off")
-        kept = {key: value for key, value in facts(self.study).items() if key not in of_the_search}
-        return repr(sorted(kept.items()))
+        return self.identity_without(())
+
+    def identity_without(self, named: Sequence[str]) -> str:
+        """The same, but for some of the study's facts."""
+        left_out = {"seed", "initial", "engine", "cut_off", *named}
+        return repr(sorted((key, value) for key, value in facts(self.study).items() if key not in left_out))
 
     def score(self, values: Values, seed: int) -> float | None:
         """PRPV, with the placement noise of this seed; None where an agent has no episode that worked."""
@@ -74,9 +78,13 @@ class StudyObjective:
         """The score above the noise floor."""
         return self._above(self.score(values, seed))
 
+    def fresh_score(self, values: Values, seed: int) -> float | None:
+        """PRPV of episodes that no engine has seen."""
+        return self.score(values, seed + FRESH)
+
     def fresh_regret(self, values: Values, seed: int) -> float | None:
-        """PRPV on fresh episodes above the noise floor."""
-        return self._above(self.score(values, seed + FRESH))
+        """PRPV of fresh episodes above the noise floor."""
+        return self._above(self.fresh_score(values, seed))
 
     def error(self, values: Values, seed: int) -> None:
         """Not known: a study's target is what was measured."""

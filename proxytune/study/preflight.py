@@ -11,6 +11,7 @@ already shows to matter is left out of the second look.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil
 from typing import NamedTuple
 
@@ -261,5 +262,10 @@ def judge(interval: Interval, names: Sequence[str], values: Array) -> Movement:
 
 def _larger(changes: Array, noise: Array) -> float:
     """How likely the signed ranks of |change| − |noise| are if neither is the larger."""
-    apart = changes - noise
-    return float(wilcoxon(apart, alternative="greater").pvalue) if apart.any() else 1.0
+    return _chance_of(tuple((changes - noise).tolist()))
+
+
+@lru_cache(maxsize=4096)
+def _chance_of(apart: tuple[float, ...]) -> float:
+    """The p-value of these differences; with ties it takes a second, and the same ones are asked for again."""
+    return float(wilcoxon(apart, alternative="greater").pvalue) if any(apart) else 1.0

@@ -1,0 +1,70 @@
+"""What `compare` compares engines on: a stand-in, a study, or a study with a truth of its own for every seed."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from proxytune.cli.study_folder import study_folder
+from proxytune.errors import InputError
+from proxytune.search.analytic import Analytic, Objective
+from proxytune.search.ranking import Ranking
+from proxytune.study.objective import StudyObjective, noise_floor
+from proxytune.study.preflight import most_episodes
+from proxytune.study.progress import Bars, Watcher
+from proxytune.study.settings import StudySettings
+from proxytune.study.store import Store
+from proxytune.study.study import Study, open_study
+from proxytune.study.truths import TruthObjective, lacking_families
+
+STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking()}
+BUDGET, INITIAL = 40, 10
+
+
+@contextmanager
+def objective_of(
+    arguments: argparse.Namespace, output: Path, engines: int
+) -> Iterator[tuple[Objective, int, int, int]]:
+    """The objective with budget, design and how many runs at a time: a study's own episodes run in parallel instead."""
+    if arguments.study in STAND_INS:
+        yield STAND_INS[arguments.study], *_spending(arguments, BUDGET, INITIAL), 2
+        return
+    study = open_study(study_folder(Path(arguments.study)))
+    budget, initial = _spending(arguments, study.settings.budget, study.settings.initial)
+    per_run = _episodes_per_run(arguments, study.settings, budget)
+    episodes = per_run * arguments.seeds * engines
+    print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
+    with Store.open(output) as store, Bars(episodes) as bars:
+        yield _on_study(arguments, study, store, bars), budget, initial, 1
+
+
+def check_truths(arguments: argparse.Namespace) -> None:
+    """Refuse truths of a stand-in, which has its own, and effects that no target is measured with.
+
+    Raises:
+        InputError: With the option and the remedy.
+    """
+    if arguments.lacks and not arguments.truths:
+        raise InputError("--lacks: a study's target is what was measured; add --truths to measure targets")
+    if arguments.truths and arguments.study in STAND_INS:
+        raise InputError(f"--truths: '{arguments.study}' has a truth for every seed; leave it out")
+
+
+def _on_study(arguments: argparse.Namespace, study: Study, store: Store, watcher: Watcher) -> Objective:
+    if arguments.truths:
+        return TruthObjective(study, store, watcher, lacking_families(study, arguments.lacks))
+    return StudyObjective(study, store, watcher, noise_floor(study))
+
+
+def _episodes_per_run(arguments: argparse.Namespace, settings: StudySettings, budget: int) -> int:
+    """At most: every point, the answer, the pre-flight; with truths also target, truth twice, fresh ones of points."""
+    points = 2 * budget + 3 if arguments.truths else budget + 1
+    return points * len(settings.agents) * settings.starts + most_episodes(settings)
+
+
+def _spending(arguments: argparse.Namespace, budget: int, initial: int) -> tuple[int, int]:
+    budget, initial = arguments.budget or budget, arguments.initial or initial
+    if initial >= budget:
+        raise InputError(f"--budget {budget}: is spent on the design of {initial}; raise it, or lower --initial")
+    return budget, initial

@@ -106,8 +106,10 @@ def floor_of_repeats(
     """
     inputs = compare(proxy=again, target=domain, metrics=metrics)
     one, other = _shared_starts(inputs)
-    reason = "" if one.driven.any(axis=1).all() else "an agent drove no start both times"
-    reason = reason or too_few(one, "from starts driven both times")
+    absent = [agent for agent, count in zip(one.agents, one.counts, strict=True) if not count]
+    reason = (
+        f"agent '{absent[0]}' drove no start both times" if absent else too_few(one, "from starts driven both times")
+    )
     if reason:
         return NoiseFloor("none", None, None, None, 0, inputs.target, inputs.metrics, inputs.proxy, reason)
     value = float(prpv_of_means(one.means, other.means, metrics))

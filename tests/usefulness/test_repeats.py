@@ -85,6 +85,9 @@ def test_of_one_start_alone_the_repeats_are_drawn_and_that_is_said():
     values = np.random.default_rng(0).normal(size=(4, 6))
     counts = draw_counts(table(values, labelled(1, 6)), np.random.default_rng(0), 30)
     assert len(np.unique(counts[0], axis=0)) > 10
+    assert not compare(
+        proxy=table(values[:, :3], labelled(1, 3)), target=table(values, labelled(1, 6)), metrics=M
+    ).paired
     found = assess(proxy=table(values, "abcdef"), target=table(values, labelled(1, 6)), metrics=M)
     assert any("from one start" in note for note in found.notes)
 

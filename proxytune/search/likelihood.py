@@ -60,8 +60,13 @@ class Likelihood:
     def log(self, points: Array) -> Array:
         """The tempered log likelihood (n,) at points (n, parameters) of the unit cube, up to a constant."""
         distance, variance = self.standardised(points)
-        student = 0.5 * (FREEDOM + 1.0) * np.log1p(distance**2 / FREEDOM) + 0.5 * np.log(variance)
-        return np.asarray(-student.sum(axis=1) / self.kappa)
+        against = deviance(distance) + 0.5 * np.log(variance)
+        return np.asarray(-against.sum(axis=1) / self.kappa)
+
+
+def deviance(distance: Array) -> Array:
+    """Student's negative log density, up to a constant, of distances in standard deviations; 0 where there is none."""
+    return np.asarray(0.5 * (FREEDOM + 1.0) * np.log1p(distance**2 / FREEDOM))
 
 
 def temper(errors: Array) -> float:

@@ -71,16 +71,14 @@ class OutputModel:
 
     Attributes:
         space: The search box.
-        smooth: Covariance of a standardised output over the unit cube.
-        roughness: Variance of a standardised output round its smooth course.
+        kernel: Covariance of a standardised output over the unit cube: its smooth course, and noise round that.
         groups: The outputs, by where they are known.
         constant: What each output is on average over the trials that know it, shape (outputs,); NaN where none does.
         visited: All trials that know any output, in the unit cube, shape (trials, parameters).
     """
 
     space: Space
-    smooth: Kernel
-    roughness: float
+    kernel: Kernel
     groups: tuple[OutputGroup, ...]
     constant: Array
     visited: Array
@@ -89,6 +87,11 @@ class OutputModel:
     def outputs(self) -> int:
         """How many outputs there are; those in no group do not change, or are known too seldom."""
         return len(self.constant)
+
+    @property
+    def roughness(self) -> float:
+        """Variance of a standardised output round its smooth course."""
+        return float(self.kernel.k2.noise_level)
 
     @cached_property
     def modelled(self) -> Rows:
@@ -102,10 +105,11 @@ class OutputModel:
             Two arrays (n, outputs), in the outputs' units; NaN for an output that is not modelled.
         """
         mean, variance = (np.full((len(points), self.outputs), np.nan) for _ in range(2))
+        smooth = self.kernel.k1
         with threadpool_limits(limits=1):
             for group in self.groups:
-                near = self.smooth(points, group.visited)
-                left = self.smooth.diag(points) - np.einsum("ij,jk,ik->i", near, group.inverse, near, optimize=True)
+                near = smooth(points, group.visited)
+                left = smooth.diag(points) - np.einsum("ij,jk,ik->i", near, group.inverse, near, optimize=True)
                 mean[:, group.columns] = group.middle + group.scale * (near @ group.weights)
                 variance[:, group.columns] = np.outer(np.maximum(left, 0.0), group.inflation * group.scale**2)
         return mean, variance
@@ -130,8 +134,13 @@ class OutputModel:
         return found
 
 
-def fit_outputs(space: Space, trials: Sequence[Trial]) -> OutputModel:
+def fit_outputs(space: Space, trials: Sequence[Trial], kernel: Kernel | None = None) -> OutputModel:
     """Fit the model to the trials that have outputs: same trials in any order, same model to the last bit.
+
+    Args:
+        space: The search box.
+        trials: Finished trials.
+        kernel: The kernel; without one it is fitted too.
 
     Raises:
         RunError: If no output is known to change.
@@ -141,14 +150,14 @@ def fit_outputs(space: Space, trials: Sequence[Trial]) -> OutputModel:
         raise RunError("no trial has an outcome, so there is nothing to learn from")
     visited, outputs = unit_array(space, [values for values, _ in known]), np.array([found for _, found in known])
     with threadpool_limits(limits=1):
-        kernel = _fitted_kernel(visited, outputs)
+        kernel = kernel or _fitted_kernel(visited, outputs)
         groups = _groups(kernel, visited, outputs)
     if not groups:
         raise RunError("no output changes from trial to trial, so there is nothing to learn from")
     seen = ~np.isnan(outputs)
     with np.errstate(invalid="ignore"):
         constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)
-    return OutputModel(space, kernel.k1, float(kernel.k2.noise_level), groups, constant, visited)
+    return OutputModel(space, kernel, groups, constant, visited)
 
 
 def _fitted_kernel(visited: Array, outputs: Array) -> Kernel:

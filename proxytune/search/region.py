@@ -100,14 +100,15 @@ class Posterior:
         return np.asarray(np.clip(self.points[row] + generator.uniform(-reach, reach, self.points.shape[1]), 0.0, 1.0))
 
 
-def posterior_of(log_density: Callable[[Array], Array], dimensions: int) -> Posterior:
+def posterior_of(log_density: Callable[[Array], Array], dimensions: int, count: int = POINTS) -> Posterior:
     """Look at the whole box, then ever closer at the box round what counts.
 
     Args:
         log_density: Logarithm of the density (n,) at points (n, parameters) of the unit cube, up to a constant.
         dimensions: How many parameters there are.
+        count: How many points each look takes.
     """
-    low, high, cloud = np.zeros(dimensions), np.ones(dimensions), unit_points(dimensions, POINTS, 0)
+    low, high, cloud = np.zeros(dimensions), np.ones(dimensions), unit_points(dimensions, count, 0)
     for _ in range(ZOOMS):
         points = low + (high - low) * cloud
         density = log_density(points)

@@ -12,12 +12,13 @@ from rich.text import Text
 from proxytune.cli.answer import Answer
 from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, check_truths, objective_of
 from proxytune.errors import InputError, StoreError
-from proxytune.report.compare_document import compare_document, compare_lines, compare_table
+from proxytune.report.compare_document import compare_document, compare_lines, compare_tables
 from proxytune.report.compare_figure import compare_figure
 from proxytune.report.writing import save, write_text
 from proxytune.search.analytic import Objective
-from proxytune.search.comparison import Run, RunKey, run_document, run_engine, run_from, search_code
-from proxytune.search.engines import ENGINES, STUDY_ENGINES, why_not
+from proxytune.search.comparison import Run, RunKey, judged_again, run_document, run_engine, run_from
+from proxytune.search.engines import ENGINES, STUDY_ENGINES, engine_code, why_not
+from proxytune.search.judgement import judging_code
 from proxytune.search.summary import EngineSummary, summarise
 from proxytune.study.lock import locked
 
@@ -65,7 +66,8 @@ def run(arguments: argparse.Namespace) -> Answer:
         keys = _keys(objective, engines, arguments.seeds, budget, initial)
         runs = _finished(objective, keys, output / FILE_NAME, jobs)
     grouped = [[runs[key] for key in keys if key.engine == engine] for engine in engines]
-    summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
+    names = objective.space.names
+    summaries = [summarise(group, grouped[0], objective.tolerance, names) for group in grouped]
     return _answer(objective, summaries, grouped, output)
 
 
@@ -77,8 +79,8 @@ def _answer(
     document = compare_document(objective.name, summaries, budget, objective.tolerance)
     write_text(output / "compare.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     lines = [*compare_lines(summaries), f"figure: {figure}"]
-    table = compare_table(objective.name, summaries, budget)
-    return Answer({**document, "figures": [str(figure)]}, Group(table, *(Text(line) for line in lines)))
+    tables = compare_tables(objective.name, summaries, budget)
+    return Answer({**document, "figures": [str(figure)]}, Group(*tables, *(Text(line) for line in lines)))
 
 
 def _engines(arguments: argparse.Namespace) -> list[str]:
@@ -106,23 +108,29 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def _keys(objective: Objective, engines: Sequence[str], seeds: int, budget: int, initial: int) -> list[RunKey]:
-    code = search_code()
     return [
-        RunKey(objective.identity, engine, seed, budget, initial, code)
+        RunKey(objective.identity, engine, seed, budget, initial, engine_code(engine))
         for seed in range(1, seeds + 1)
         for engine in engines
     ]
 
 
 def _finished(objective: Objective, keys: Sequence[RunKey], path: Path, jobs: int) -> Mapping[RunKey, Run]:
-    """All runs, those that the file lacks run now, each written as soon as it is finished."""
+    """All runs, each written as soon as it is finished.
+
+    Those that the file lacks are run now; those that other code has judged are judged again.
+    """
     known = read_runs(path)
-    missing = [key for key in keys if key not in known]
+    missing = [key for key in keys if key not in known or known[key].judgement.code != judging_code()]
     with Parallel(n_jobs=min(jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
-        for run in parallel(delayed(run_engine)(objective, key) for key in missing):
+        for run in parallel(delayed(_finish)(objective, key, known.get(key)) for key in missing):
             _append(path, run)
             known[run.key] = run
     return known
+
+
+def _finish(objective: Objective, key: RunKey, run: Run | None) -> Run:
+    return judged_again(objective, run) if run else run_engine(objective, key)
 
 
 def read_runs(path: Path) -> dict[RunKey, Run]:

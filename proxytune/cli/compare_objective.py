@@ -9,6 +9,7 @@ from pathlib import Path
 from proxytune.cli.study_folder import study_folder
 from proxytune.errors import InputError
 from proxytune.search.analytic import Analytic, Objective
+from proxytune.search.calibrated import Calibrated
 from proxytune.search.ranking import Ranking
 from proxytune.study.objective import StudyObjective, noise_floor
 from proxytune.study.preflight import most_episodes
@@ -18,7 +19,7 @@ from proxytune.study.store import Store
 from proxytune.study.study import Study, open_study
 from proxytune.study.truths import TruthObjective, lacking_families
 
-STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking()}
+STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking(), "calibrated": Calibrated()}
 BUDGET, INITIAL = 40, 10
 
 

@@ -74,6 +74,10 @@ class Objective(Protocol):
         """How much worse than the optimum the answer is, free of the noise that the engine has seen."""
         ...
 
+    def truth(self, seed: int) -> Values | None:
+        """The θ that made the target; None where it is not known."""
+        ...
+
     def error(self, values: Values, seed: int) -> float | None:
         """Mean distance of the parameters from the true ones, in widths of the box; None where truth is not known."""
         ...
@@ -94,7 +98,7 @@ class Analytic:
     tolerance: float = float(STEP)
     identity: str = "analytic 1"
 
-    def optimum(self, seed: int) -> Values:
+    def truth(self, seed: int) -> Values:
         """The true θ: each parameter drawn from the middle 60 % of its interval."""
         unit = np.random.default_rng([seed, 1]).uniform(0.2, 0.8, len(self.space.intervals))
         return tuple(i.low + float(u) * (i.high - i.low) for i, u in zip(self.space.intervals, unit, strict=True))
@@ -113,7 +117,7 @@ class Analytic:
 
     def regret(self, values: Values, seed: int) -> float:
         """The score without noise; 0 at the optimum."""
-        blur, pitch, delay, trim = to_unit(self.space, values) - to_unit(self.space, self.optimum(seed))
+        blur, pitch, delay, trim = to_unit(self.space, values) - to_unit(self.space, self.truth(seed))
         far = math.hypot(2.5 * trim, 1.5 * (delay + 0.5 * blur), 1.2 * pitch, 0.3 * blur)
         return float(STEP * math.floor(CEILING * (1.0 - math.exp(-far)) / STEP))
 
@@ -127,4 +131,4 @@ class Analytic:
 
     def error(self, values: Values, seed: int) -> float:
         """Mean distance of the parameters from the true ones, in widths of the box."""
-        return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.optimum(seed))).mean())
+        return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.truth(seed))).mean())

@@ -1,17 +1,14 @@
 """One engine on one seed of an objective, from the design to the end of its budget."""
 
-import hashlib
-import math
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from proxytune.search.analytic import Objective
 from proxytune.search.engines import WITH_OUTPUTS, make_proposer
+from proxytune.search.judgement import Judgement, judge, judgement_from
 from proxytune.search.proposer import Trial, Values
-from proxytune.search.surrogate import fit_surrogate
 
 
 @dataclass(frozen=True)
@@ -24,7 +21,7 @@ class RunKey:
         seed: The instance of the problem, its noise, the design, and what the engine draws.
         budget: How many evaluations.
         initial: How many of them are the design, which all engines share.
-        code: Digest of the code of the search.
+        code: Digest of the code that the engine's proposals depend on.
     """
 
     objective: str
@@ -37,42 +34,23 @@ class RunKey:
 
 @dataclass(frozen=True)
 class Run:
-    """What an engine achieved.
+    """What an engine did, and what that is worth.
 
     Attributes:
         key: Which run it was.
-        regrets: Regret of every visited point, in order; None where the trial failed.
-        answer: The visited point with the lowest posterior mean, which is what a study reports.
-        answer_score: Its score, free of the noise that the engine has seen; None where it failed.
-        answer_regret: Its regret, free of the noise that the engine has seen; None where it failed.
-        error: Its distance from the truth in widths of the box, None where truth is not known.
+        visited: The points in order.
         seconds: Mean time per proposal after the design.
+        judgement: What they are worth.
     """
 
     key: RunKey
-    regrets: tuple[float | None, ...]
-    answer: Values
-    answer_score: float | None
-    answer_regret: float | None
-    error: float | None
+    visited: tuple[Values, ...]
     seconds: float
-
-    @property
-    def best_regrets(self) -> tuple[float, ...]:
-        """The lowest regret of the points visited so far, after each evaluation; infinite while all have failed."""
-        lowest, found = math.inf, []
-        for regret in self.regrets:
-            lowest = min(lowest, math.inf if regret is None else regret)
-            found.append(lowest)
-        return tuple(found)
-
-    def evaluations_to(self, tolerance: float) -> int | None:
-        """How many evaluations it took to visit a point within the tolerance; None if the budget did not suffice."""
-        return next((n for n, regret in enumerate(self.best_regrets, 1) if regret <= tolerance), None)
+    judgement: Judgement
 
 
 def run_engine(objective: Objective, key: RunKey) -> Run:
-    """Spend the budget and take the study's own answer from the trials.
+    """Spend the budget, and judge what came of it.
 
     Raises:
         InputError: If there is no such engine, or it needs a library that is not installed.
@@ -86,22 +64,15 @@ def run_engine(objective: Objective, key: RunKey) -> Run:
         values = proposer.propose(space, trials, key.seed)
         spent += time.perf_counter() - begun if number >= key.initial else 0.0
         trials.append(Trial(values, objective.score(values, key.seed), objective.outcome(values, key.seed)))
-    answer, _ = fit_surrogate(space, trials).incumbent()
-    return Run(
-        key=key,
-        regrets=tuple(objective.regret(trial.values, key.seed) for trial in trials),
-        answer=answer,
-        answer_score=objective.fresh_score(answer, key.seed),
-        answer_regret=objective.fresh_regret(answer, key.seed),
-        error=objective.error(answer, key.seed),
-        seconds=spent / max(1, key.budget - key.initial),
-    )
+    visited = tuple(trial.values for trial in trials)
+    found = judge(objective, visited, key.seed, by_outputs=key.engine in WITH_OUTPUTS)
+    return Run(key, visited, spent / max(1, key.budget - key.initial), found)
 
 
-def search_code() -> str:
-    """A digest of the code of the search: with other code, a run is another run."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:12]
+def judged_again(objective: Objective, run: Run) -> Run:
+    """A finished run, judged by the code of today: nothing is proposed, and nothing of a point is evaluated twice."""
+    found = judge(objective, run.visited, run.key.seed, by_outputs=run.key.engine in WITH_OUTPUTS)
+    return Run(run.key, run.visited, run.seconds, found)
 
 
 def run_document(run: Run) -> dict[str, Any]:
@@ -116,6 +87,5 @@ def run_from(document: Mapping[str, Any]) -> Run:
         KeyError: If something is missing.
         TypeError: If something is of another kind.
     """
-    fields = dict(document)
-    key = RunKey(**fields.pop("key"))
-    return Run(key, tuple(fields.pop("regrets")), tuple(fields.pop("answer")), **fields)
+    visited = tuple(tuple(values) for values in document["visited"])
+    return Run(RunKey(**document["key"]), visited, document["seconds"], judgement_from(document["judgement"]))

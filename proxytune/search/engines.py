@@ -1,24 +1,24 @@
 """The engines by name."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from importlib.util import find_spec
 
 from proxytune.errors import InputError
+from proxytune.search import after_design
+from proxytune.search.after_design import AfterDesign
 from proxytune.search.botorch_nei import BotorchNEI
 from proxytune.search.composite import Composite
-from proxytune.search.design import design_point
+from proxytune.search.digest import code_of
 from proxytune.search.gaussian_process import GaussianProcess
 from proxytune.search.goal import Goal
 from proxytune.search.optuna_gp import OptunaGP
 from proxytune.search.outcomes import Outcomes
-from proxytune.search.proposer import Proposer, Trial, Values, with_failures_as_worst
+from proxytune.search.proposer import Proposer
 from proxytune.search.random_points import RandomPoints
 from proxytune.search.scikit_optimize import ScikitOptimize
 from proxytune.search.sobol import Sobol
 from proxytune.search.tree_parzen import TreeParzen
 from proxytune.settings import nearest
-from proxytune.space import Space
 
 DEFAULT_ENGINE = "outcomes"
 SCORE_ENGINE = "gp"
@@ -29,34 +29,22 @@ STUDY_ENGINES = (*WITH_OUTPUTS, SCORE_ENGINE, "random", "sobol", "tpe")
 """What a study may name."""
 ENGINES = (*STUDY_ENGINES, "skopt", "gpsampler", "qlognei")
 """What can be compared."""
+OF_OUTPUTS: dict[str, Callable[[Goal], Proposer]] = {DEFAULT_ENGINE: Outcomes, "composite": Composite}
+OF_SCORES: dict[str, Callable[[], Proposer]] = {
+    SCORE_ENGINE: GaussianProcess,
+    "random": RandomPoints,
+    "sobol": Sobol,
+    "tpe": TreeParzen,
+    "skopt": ScikitOptimize,
+    "gpsampler": OptunaGP,
+    "qlognei": BotorchNEI,
+}
 NEEDS = {
     "tpe": (("optuna",), "Optuna", "tpe"),
     "gpsampler": (("optuna", "torch"), "Optuna and PyTorch", "peers"),
     "qlognei": (("botorch",), "BoTorch", "peers"),
 }
 """Modules that an engine needs, what they are called, and the extra that installs them."""
-
-
-@dataclass(frozen=True)
-class AfterDesign:
-    """A proposer that is asked only once the quasi-random design is through and something has a score.
-
-    It is told of a failed trial as if that had the worst score seen.
-
-    Attributes:
-        inner: The proposer.
-        initial: How many trials come from the design.
-    """
-
-    inner: Proposer
-    initial: int
-
-    def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point: of the design, or what the inner proposer says."""
-        told = with_failures_as_worst(trials)
-        if len(trials) < self.initial or not told:
-            return design_point(space, len(trials), seed)
-        return self.inner.propose(space, told, seed)
 
 
 def why_not(engine: str, *, composed: bool) -> str:
@@ -93,14 +81,10 @@ def make_proposer(engine: str, initial: int, goal: Goal | None = None) -> Propos
     if reason:
         raise InputError(reason)
     if goal is not None and engine in WITH_OUTPUTS:
-        return AfterDesign(Outcomes(goal) if engine == DEFAULT_ENGINE else Composite(goal), initial)
-    inner: dict[str, Proposer] = {
-        "gp": GaussianProcess(),
-        "random": RandomPoints(),
-        "sobol": Sobol(),
-        "tpe": TreeParzen(),
-        "skopt": ScikitOptimize(),
-        "gpsampler": OptunaGP(),
-        "qlognei": BotorchNEI(),
-    }
-    return AfterDesign(inner[engine], initial)
+        return AfterDesign(OF_OUTPUTS[engine](goal), initial)
+    return AfterDesign(OF_SCORES[engine](), initial)
+
+
+def engine_code(engine: str) -> str:
+    """A digest of the code that an engine's proposals depend on."""
+    return code_of(after_design.__name__, {**OF_OUTPUTS, **OF_SCORES}[engine].__module__)

@@ -39,7 +39,7 @@ class Ranking:
     tolerance: float = 14.0
     identity: str = "ranking 1"
 
-    def optimum(self, seed: int) -> Values:
+    def truth(self, seed: int) -> Values:
         """The true θ: each parameter drawn from the middle 60 % of its interval."""
         unit = np.random.default_rng([seed, 1]).uniform(0.2, 0.8, len(self.space.intervals))
         return from_unit(self.space, unit)
@@ -50,7 +50,7 @@ class Ranking:
         best = generator.uniform(0.4, 1.0, (AGENTS, len(METRICS)))
         weights = WEIGHTS * generator.lognormal(0.0, 0.7, (AGENTS, len(METRICS), len(WEIGHTS)))
         liked = generator.normal(0.0, 0.15, (AGENTS, 1, len(WEIGHTS)))
-        away = to_unit(self.space, values) - to_unit(self.space, self.optimum(seed))
+        away = to_unit(self.space, values) - to_unit(self.space, self.truth(seed))
         decay: Array = np.exp(-np.linalg.norm(weights * (away - liked), axis=-1))
         return best * decay
 
@@ -61,7 +61,7 @@ class Ranking:
 
     def target(self, seed: int) -> ScoreTable:
         """The target's episodes, measured once."""
-        return _episodes(self.means(self.optimum(seed), seed), np.random.default_rng([seed, 4]))
+        return _episodes(self.means(self.truth(seed), seed), np.random.default_rng([seed, 4]))
 
     def score(self, values: Values, seed: int) -> float:
         """PRPV of the episodes."""
@@ -80,7 +80,7 @@ class Ranking:
 
     def regret(self, values: Values, seed: int) -> float:
         """PRPV without noise on either side."""
-        return float(prpv_of_means(self.means(values, seed), self.means(self.optimum(seed), seed), METRICS))
+        return float(prpv_of_means(self.means(values, seed), self.means(self.truth(seed), seed), METRICS))
 
     def fresh_score(self, values: Values, seed: int) -> float:
         """PRPV without noise."""
@@ -92,7 +92,7 @@ class Ranking:
 
     def error(self, values: Values, seed: int) -> float:
         """Mean distance of the parameters from the true ones, in widths of the box."""
-        return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.optimum(seed))).mean())
+        return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.truth(seed))).mean())
 
 
 def _composed(outcomes: Array, target: Array) -> Array:

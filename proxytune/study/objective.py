@@ -86,6 +86,9 @@ class StudyObjective:
         """PRPV of fresh episodes above the noise floor."""
         return self._above(self.fresh_score(values, seed))
 
+    def truth(self, seed: int) -> None:
+        """Not known: a study's target is what was measured."""
+
     def error(self, values: Values, seed: int) -> None:
         """Not known: a study's target is what was measured."""
 

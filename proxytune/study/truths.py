@@ -100,8 +100,12 @@ class TruthObjective:
 
     def _level(self, seed: int) -> float:
         truth = self.truth(seed)
-        scores = (self.score(truth, seed), self.fresh_score(truth, seed))
-        return float(np.mean([np.inf if score is None else score for score in scores]))
+        scores = [found for found in (self.score(truth, seed), self.fresh_score(truth, seed)) if found is not None]
+        if len(scores) < 2:
+            raise EpisodeError(
+                f"seed {seed}: the truth has no score in the proxy: an agent fails there from every start"
+            )
+        return float(np.mean(scores))
 
     def _of(self, seed: int) -> StudyObjective:
         """The study against this seed's target, which is measured when first asked for."""

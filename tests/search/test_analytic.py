@@ -25,7 +25,7 @@ def test_the_score_is_a_whole_number_within_its_noise_of_the_regret_and_the_same
 @settings(derandomize=True, max_examples=50, deadline=None)
 @given(seed=SEEDS)
 def test_the_optimum_lies_in_the_box_and_has_no_regret_and_no_error(seed):
-    optimum = OBJECTIVE.optimum(seed)
+    optimum = OBJECTIVE.truth(seed)
     assert OBJECTIVE.regret(optimum, seed) == OBJECTIVE.fresh_regret(optimum, seed) == 0.0
     assert OBJECTIVE.error(optimum, seed) == 0.0
     assert all(0.2 <= unit <= 0.8 for unit in to_unit(OBJECTIVE.space, optimum))
@@ -42,7 +42,7 @@ def test_the_noise_takes_all_its_values_alike():
 def test_the_noise_is_drawn_anew_wherever_one_parameter_alone_is_moved():
     seed = 4
     for column in range(4):
-        unit = to_unit(OBJECTIVE.space, OBJECTIVE.optimum(seed))
+        unit = to_unit(OBJECTIVE.space, OBJECTIVE.truth(seed))
         noise = set()
         for step in range(12):
             unit[column] = 0.5 + 1e-3 * step
@@ -53,7 +53,7 @@ def test_the_noise_is_drawn_anew_wherever_one_parameter_alone_is_moved():
 
 def test_there_are_plateaus_and_blur_is_hardly_seen_while_trim_is():
     seed = 4
-    blur, pitch, delay, trim = to_unit(OBJECTIVE.space, OBJECTIVE.optimum(seed))
+    blur, pitch, delay, trim = to_unit(OBJECTIVE.space, OBJECTIVE.truth(seed))
 
     def moved(*unit):
         return OBJECTIVE.regret(from_unit(OBJECTIVE.space, np.array(unit)), seed)
@@ -63,4 +63,4 @@ def test_there_are_plateaus_and_blur_is_hardly_seen_while_trim_is():
 
 
 def test_other_seeds_are_other_problems():
-    assert OBJECTIVE.optimum(1) != OBJECTIVE.optimum(2)
+    assert OBJECTIVE.truth(1) != OBJECTIVE.optimum(2)

@@ -24,14 +24,14 @@ def test_the_score_is_prpv_of_its_episodes_and_what_is_composed_of_its_outcome(s
 @settings(derandomize=True, max_examples=20, deadline=None)
 @given(seed=st.integers(0, 1000))
 def test_the_optimum_lies_in_the_box_and_has_no_regret_and_no_error(seed):
-    optimum = OBJECTIVE.optimum(seed)
+    optimum = OBJECTIVE.truth(seed)
     assert OBJECTIVE.regret(optimum, seed) == OBJECTIVE.fresh_regret(optimum, seed) == 0.0
     assert OBJECTIVE.error(optimum, seed) == pytest.approx(0.0)
     assert all(0.2 <= unit <= 0.8 for unit in to_unit(OBJECTIVE.space, optimum))
 
 
 def test_the_floor_is_about_what_the_optimum_scores_on_its_episodes():
-    scores = [OBJECTIVE.score(OBJECTIVE.optimum(seed), seed) for seed in range(60)]
+    scores = [OBJECTIVE.score(OBJECTIVE.truth(seed), seed) for seed in range(60)]
     assert np.mean(scores) == pytest.approx(OBJECTIVE.tolerance, rel=0.3)
 
 
@@ -47,4 +47,4 @@ def test_the_noise_is_drawn_anew_at_every_point_and_seed():
     one, other = ((0.05, 20.0, 0.1, trim) for trim in (0.1, 0.1 + 1e-12))
     noise = [OBJECTIVE.table(values, 1).means - OBJECTIVE.means(values, 1) for values in (one, other)]
     assert np.abs(noise[0] - noise[1]).min() > 0
-    assert OBJECTIVE.optimum(1) != OBJECTIVE.optimum(2)
+    assert OBJECTIVE.truth(1) != OBJECTIVE.optimum(2)

@@ -1,7 +1,7 @@
 """Gaussian processes of what a score is computed from: every agent's mean metrics, over the search box.
 
-PRPV is a count and jumps; the metrics that it compares change smoothly with θ. Each output has a Gaussian process of its
-own, all with one kernel (Matérn 5/2, a length scale per parameter, one share of noise for what no smooth function
+PRPV is a count and jumps; the metrics that it compares change smoothly with θ. Each output has a Gaussian process of
+its own, all with one kernel (Matérn 5/2, a length scale per parameter, one share of noise for what no smooth function
 follows), fitted to the trials that have every output. How far an output's predictions are off when trials are left out
 one at a time scales its variance, so an output that the kernel does not suit is trusted less.
 """
@@ -96,7 +96,7 @@ class OutputModel:
     @cached_property
     def modelled(self) -> Rows:
         """Which outputs are modelled, in rising order."""
-        return np.sort(np.concatenate([group.columns for group in self.groups]))
+        return np.sort(np.concatenate([np.empty(0, dtype=np.intp), *(group.columns for group in self.groups)]))
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Mean and variance of every modelled output's smooth course at points (n, parameters) of the unit cube.
@@ -143,7 +143,7 @@ def fit_outputs(space: Space, trials: Sequence[Trial], kernel: Kernel | None = N
         kernel: The kernel; without one it is fitted too.
 
     Raises:
-        RunError: If no output is known to change.
+        RunError: If no trial has an outcome.
     """
     known = sorted((trial.values, trial.outcome) for trial in trials if trial.outcome is not None)
     if not known:
@@ -152,8 +152,6 @@ def fit_outputs(space: Space, trials: Sequence[Trial], kernel: Kernel | None = N
     with threadpool_limits(limits=1):
         kernel = kernel or _fitted_kernel(visited, outputs)
         groups = _groups(kernel, visited, outputs)
-    if not groups:
-        raise RunError("no output changes from trial to trial, so there is nothing to learn from")
     seen = ~np.isnan(outputs)
     with np.errstate(invalid="ignore"):
         constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)

@@ -17,7 +17,7 @@ FILE_NAME = "study.toml"
 FORMAT = 1
 OBJECTIVES = ("prpv", "plv")
 KEYS = (
-    "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
+    "format", "name", "family", "proxy", "target", "truth", "objective", "metrics", "agents",
     "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
     "cut_off", "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
@@ -47,6 +47,7 @@ class StudySettings:
         family: Where the domain family comes from, as "module:factory".
         proxy: A model.toml whose effects the proxy has, if any.
         target: The score table of the target.
+        truth: A model.toml of what made the target, where that is known.
         objective: The measure that is made small.
         metrics: How agents are compared.
         agents: Names of the agents, at least two.
@@ -71,6 +72,7 @@ class StudySettings:
     family: str
     proxy: Path | None
     target: Path
+    truth: Path | None
     objective: str
     metrics: tuple[Metric, ...]
     agents: tuple[str, ...]
@@ -116,6 +118,7 @@ def read_study_settings(path: Path) -> StudySettings:
         family=read.text("family", DEFAULT_FAMILY),
         proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
         target=path.parent / read.text("target"),
+        truth=path.parent / read.text("truth") if "truth" in read.values else None,
         objective=read.text("objective", "prpv", choices=OBJECTIVES),
         metrics=_metrics(read),
         agents=_agents(read),

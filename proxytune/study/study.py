@@ -15,6 +15,9 @@ from proxytune.settings import nearest
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
 
+UNSAID = {"batch": 1, "engine": DEFAULT_ENGINE}
+"""Facts that go without saying where they have these values."""
+
 
 @dataclass(frozen=True)
 class Study:
@@ -64,10 +67,11 @@ def facts(study: Study) -> dict[str, Any]:
     """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
 
     Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
-    identity covers it. The default engine goes without saying, as it did when there was no other.
+    identity covers it. The default engine goes without saying, as it did when there was no other, and so do batches of
+    one trial.
     """
     settings = study.settings
-    engine = {} if settings.engine == DEFAULT_ENGINE else {"engine": settings.engine}
+    said = {"batch": settings.batch, "engine": settings.engine}
     return {
         "family": settings.family,
         "target": _table_digest(study.target),
@@ -77,7 +81,7 @@ def facts(study: Study) -> dict[str, Any]:
         "starts": settings.starts,
         "initial": settings.initial,
         "seed": settings.seed,
-        **engine,
+        **{key: value for key, value in said.items() if value != UNSAID[key]},
         "cut_off": settings.cut_off,
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
@@ -99,9 +103,8 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
 def _change(key: str, before: Any, after: Any) -> str:
     if key == "target":
         return "target (its contents)"
-    if key == "engine" and before is None:
-        before = DEFAULT_ENGINE
-    shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
+    values = (UNSAID.get(key) if value is None else value for value in (before, after))
+    shown = [("nothing" if value is None else json.dumps(value)) for value in values]
     return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
 
 

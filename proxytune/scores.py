@@ -159,9 +159,9 @@ class ScoreTable:
         return bool(self.driven.all())
 
     def unpaired(self) -> "ScoreTable":
-        """The same scores with a label of its own for each agent's every episode, so that no start is shared."""
+        """The same scores with a number of its own for each agent's every episode, so that no start is shared."""
         rows, columns = np.nonzero(self.driven)
-        labels = tuple(f"{self.agents[row]}/{self.episodes[column]}" for row, column in zip(rows, columns, strict=True))
+        labels = tuple(map(str, range(len(rows))))
         values = np.full((len(self.agents), len(labels), len(self.metrics)), np.nan)
         values[rows, np.arange(len(labels))] = self.values[rows, columns]
         return ScoreTable(self.agents, labels, self.metrics, values)

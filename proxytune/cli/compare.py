@@ -78,7 +78,7 @@ def _answer(
 def _engines(arguments: argparse.Namespace) -> list[str]:
     """The engines asked for, the default first."""
     stand_in = STAND_INS.get(arguments.study)
-    composed = stand_in is None or stand_in.compose(1) is not None
+    composed = stand_in is None or stand_in.goal(1) is not None
     if arguments.engines is None:
         return [name for name in STUDY_ENGINES if not why_not(name, composed=composed)]
     named = [name.strip() for name in arguments.engines.split(",") if name.strip()]

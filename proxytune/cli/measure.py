@@ -21,6 +21,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", type=Path, required=True, metavar="MODEL", help="the model.toml of the domain")
     parser.add_argument("--output", type=Path, required=True, metavar="CSV", help="the score table to write")
     parser.add_argument(
+        "--repeats",
+        type=int,
+        default=1,
+        metavar="N",
+        help="episodes from every start under other placement noise each, labelled START/REPEAT where N > 1 [1]",
+    )
+    parser.add_argument(
         "--seed", type=int, metavar="N", help=f"seed of the episodes [the study's seed plus {SEED_OFFSET}]"
     )
 
@@ -31,12 +38,14 @@ def run(arguments: argparse.Namespace) -> Answer:
     seed = settings.seed + SEED_OFFSET if arguments.seed is None else arguments.seed
     if seed < 0:
         raise InputError(f"--seed must be at least 0, got {seed}")
+    if arguments.repeats < 1:
+        raise InputError(f"--repeats must be at least 1, got {arguments.repeats}")
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
     if not arguments.output.absolute().parent.is_dir():
         raise InputError(f"{arguments.output}: its folder does not exist; make it first")
-    with Bars(len(settings.agents) * settings.starts) as bars:
-        scores = measure(settings, arguments.model, seed, bars)
+    with Bars(len(settings.agents) * settings.starts * arguments.repeats) as bars:
+        scores = measure(settings, arguments.model, seed, bars, arguments.repeats)
     write_scores(scores, arguments.output)
     document = {
         "scores": str(arguments.output),
@@ -44,6 +53,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         "seed": seed,
         "agents": list(scores.agents),
         "episodes": len(scores.episodes),
+        "repeats": arguments.repeats,
         "means": {agent: _means(scores, row) for row, agent in enumerate(scores.agents)},
     }
     return Answer(document, Group(_table(scores), Text(f"seed {seed}\n{arguments.output}")))

@@ -9,7 +9,6 @@ from typing import Any
 from proxytune.cli.answer import Answer
 from proxytune.cli.learning_value import taught
 from proxytune.cli.study_folder import study_folder
-from proxytune.errors import InputError
 from proxytune.report.convergence import convergence
 from proxytune.report.importance_figure import importance_figure
 from proxytune.report.page import page
@@ -17,10 +16,9 @@ from proxytune.report.search_figures import evaluations_figure, profiles_figure
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import study_table
 from proxytune.report.writing import save, write_text
-from proxytune.search.engines import make_proposer
-from proxytune.search.proposer import Proposer
+from proxytune.search.engines import make_proposer, why_not
 from proxytune.study import confirmation, preflight
-from proxytune.study.composition import compose_of
+from proxytune.study.composition import goal_of
 from proxytune.study.evaluate import Spent
 from proxytune.study.lock import locked
 from proxytune.study.progress import Bars, Watcher
@@ -42,10 +40,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
     study = open_study(folder)
-    proposer = _proposer(study)
+    _check_engine(study)
     if study.settings.objective == "plv":
-        return taught(study, folder, proposer, lambda: searched(study, folder, proposer)[0].profiles)
-    result, spent = searched(study, folder, proposer)
+        return taught(study, folder, lambda: searched(study, folder)[0].profiles)
+    result, spent = searched(study, folder)
     figures, report = draw(result, folder)
     costs = _costs(result, spent, time.perf_counter() - begun)
     document = {**study_document(result), **costs, "figures": [str(path) for path in figures], "report": str(report)}
@@ -53,7 +51,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer(document, study_table(result, _told(costs), files))
 
 
-def searched(study: Study, folder: Path, proposer: Proposer) -> tuple[StudyResult, Spent]:
+def searched(study: Study, folder: Path) -> tuple[StudyResult, Spent]:
     """Search by PRPV from wherever it was left: pre-flight, trials, confirmation; what was found and what it cost."""
     settings = study.settings
     episodes = preflight.most_episodes(settings) + confirmation.most_episodes(settings)
@@ -61,6 +59,8 @@ def searched(study: Study, folder: Path, proposer: Proposer) -> tuple[StudyResul
     with locked(folder), Store.open(folder) as store:
         with Bars(episodes) as bars:
             spent = _prepared(study, store, bars)
+            # The pre-flight tells the noise that the proposer is to forgive.
+            proposer = make_proposer(settings.engine, settings.initial, goal_of(study, store))
             spent += run_study(study, store, proposer, bars)
             spent += confirmation.run_confirmation(study, store, bars)
         return result_of(study, store), spent
@@ -76,12 +76,11 @@ def _prepared(study: Study, store: Store, watcher: Watcher) -> Spent:
     return spent
 
 
-def _proposer(study: Study) -> Proposer:
+def _check_engine(study: Study) -> None:
     settings = study.settings
-    try:
-        return make_proposer(settings.engine, settings.initial, compose_of(study))
-    except InputError as problem:
-        raise settings.error("engine", str(problem)) from None
+    reason = why_not(settings.engine, composed=settings.objective == "prpv")
+    if reason:
+        raise settings.error("engine", reason)
 
 
 def draw(result: StudyResult, folder: Path) -> tuple[list[Path], Path]:

@@ -19,9 +19,20 @@ from proxytune.errors import EpisodeError
 Values = NDArray[np.float64]
 
 METRICS: Mapping[str, str] = MappingProxyType(
-    {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"}
+    {
+        "distance": "m",
+        "survival_time": "s",
+        "time_out_of_lane": "s",
+        "deviation": "m",
+        "early_distance": "m",
+        "early_offset": "m",
+        "speed": "m/s",
+    }
 )
 """What an episode yields, with units."""
+
+EARLY_S = 5.0
+"""What the first so many seconds show, no crash has cut off yet: of all that is measured it says most of θ."""
 
 
 def start_pose(
@@ -53,6 +64,9 @@ def score_trajectory(road: LoopMap, poses: Values, *, tick_s: float, seconds: fl
     - survival_time [s]: from the first pose to the first one off the map, or the last one; at most `seconds`.
     - time_out_of_lane [s]: time until then that was not spent in the lane.
     - deviation [m]: mean over that time of the distance from the lane's centre line, in the lane or out of it.
+    - early_distance [m]: distance within the first 5 s.
+    - early_offset [m]: mean over the first 5 s of how far left of the lane's centre line the robot is.
+    - speed [m/s]: mean speed over ground, in the lane or out of it.
 
     Distances and times of a drive's parts, the pose at the cut in both, add up to the whole drive's.
 
@@ -70,11 +84,16 @@ def score_trajectory(road: LoopMap, poses: Values, *, tick_s: float, seconds: fl
     pose = lane_pose(road, driven[:, :2], driven[:, 2])
     aside = np.abs(pose.deviation)
     in_lane = _over_steps((aside <= road.lane_width / 2.0).astype(float))
+    along, early = in_lane * _steps_along(road, pose), round(EARLY_S / tick_s)
+    way = np.hypot(*np.diff(driven[:, :2], axis=0).T)
     return {
-        "distance": float(np.sum(in_lane * _steps_along(road, pose))),
+        "distance": float(np.sum(along)),
         "survival_time": tick_s * len(in_lane),
         "time_out_of_lane": tick_s * float(np.sum(1.0 - in_lane)),
-        "deviation": float(np.mean(_over_steps(aside))) if len(in_lane) else float(aside[0]),
+        "deviation": _mean_over_steps(aside),
+        "early_distance": float(np.sum(along[:early])),
+        "early_offset": _mean_over_steps(pose.deviation[: early + 1]),
+        "speed": float(np.mean(way)) / tick_s if len(way) else 0.0,
     }
 
 
@@ -118,6 +137,11 @@ def _steps_along(road: LoopMap, pose: LanePose) -> Values:
     lap = lane_length(road, pose.counter_clockwise[:-1])
     way = np.mod(np.diff(pose.along) + lap / 2.0, lap) - lap / 2.0
     return np.where(pose.counter_clockwise[1:] == pose.counter_clockwise[:-1], way, 0.0)
+
+
+def _mean_over_steps(values: Values) -> float:
+    """Mean over time of what was sampled at the steps' ends; of a single sample that itself."""
+    return float(np.mean(_over_steps(values) if len(values) > 1 else values))
 
 
 def _over_steps(values: Values) -> Values:

@@ -16,6 +16,7 @@ def document_of(assessment: Assessment) -> dict[str, Any]:
         "expected_prpv": inner.expected,
         "noise_floor": noise.value,
         "noise_floor_interval": _ends(noise.low, noise.high),
+        "noise_floor_kind": noise.kind,
         "at_noise_floor": assessment.at_noise_floor,
         "chance": random.mean,
         "chance_deviation": random.deviation,

@@ -48,7 +48,7 @@ def ranking(assessments: Mapping[str, Assessment], selection: Selection, *, targ
         figures = (str(rank), name, str(value), inner, *random, _number(found.ppv.value), *correlations)
         table.add_row(*map(escape, (*figures, ", ".join(worse))))
     noise = first.noise_floor
-    floor = f"noise floor {_number(noise.value)}, 95 % of halves {_ends((noise.low, noise.high))}"
+    floor = f"{noise.title} {_number(noise.value)}, 95 % interval {_ends((noise.low, noise.high))}: {noise.meaning}"
     return Group(table, *([Text(floor)] if noise.value is not None else []), *_notes(assessments))
 
 
@@ -76,7 +76,7 @@ def _prpv_rows(assessment: Assessment) -> list[Row]:
         ("  normalised", _number(prpv.normalised), "", "lower", "0 to 1"),
         ("  flipped pairs", str(len(prpv.pairs)), "", "lower", reading),
         ("  expected", _number(inner.expected), "", "lower", "mean over resampled episodes"),
-        ("  noise floor", _number(noise.value), _ends((noise.low, noise.high)), "", "target against itself, by halves"),
+        (f"  {noise.title}", _number(noise.value), _ends((noise.low, noise.high)), "", noise.meaning),
         (
             "  chance",
             _number(random.mean),

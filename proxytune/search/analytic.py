@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from proxytune.search.design import to_unit
-from proxytune.search.proposer import Compose, Values
+from proxytune.search.goal import Goal
+from proxytune.search.proposer import Values
 from proxytune.space import Interval, Space
 
 BOX = Space(
@@ -57,8 +58,8 @@ class Objective(Protocol):
         """What that score is computed from; None where the trial fails, or a score has no such parts."""
         ...
 
-    def compose(self, seed: int) -> Compose | None:
-        """How a score is computed from outcomes; None where it has no such parts."""
+    def goal(self, seed: int) -> Goal | None:
+        """What the outcomes are to come to; None where a score has no such parts."""
         ...
 
     def regret(self, values: Values, seed: int) -> float | None:
@@ -103,7 +104,7 @@ class Analytic:
     def outcome(self, values: Values, seed: int) -> None:
         """A formula has no parts."""
 
-    def compose(self, seed: int) -> None:
+    def goal(self, seed: int) -> None:
         """A formula has no parts."""
 
     def regret(self, values: Values, seed: int) -> float:

@@ -76,7 +76,7 @@ def run_engine(objective: Objective, key: RunKey) -> Run:
         InputError: If there is no such engine, or it needs a library that is not installed.
         RunError: If no trial has a score.
     """
-    proposer, space, spent = make_proposer(key.engine, key.initial, objective.compose(key.seed)), objective.space, 0.0
+    proposer, space, spent = make_proposer(key.engine, key.initial, objective.goal(key.seed)), objective.space, 0.0
     trials: list[Trial] = []
     for number in range(key.budget):
         begun = time.perf_counter()

@@ -8,7 +8,9 @@ from proxytune.errors import InputError
 from proxytune.search.composite import Composite
 from proxytune.search.design import design_point
 from proxytune.search.gaussian_process import GaussianProcess
-from proxytune.search.proposer import Compose, Proposer, Trial, Values, with_failures_as_worst
+from proxytune.search.goal import Goal
+from proxytune.search.outcomes import Outcomes
+from proxytune.search.proposer import Proposer, Trial, Values, with_failures_as_worst
 from proxytune.search.random_points import RandomPoints
 from proxytune.search.scikit_optimize import ScikitOptimize
 from proxytune.search.sobol import Sobol
@@ -16,9 +18,12 @@ from proxytune.search.tree_parzen import TreeParzen
 from proxytune.settings import nearest
 from proxytune.space import Space
 
-DEFAULT_ENGINE = "gp"
-COMPOSITE = "composite"
-STUDY_ENGINES = (DEFAULT_ENGINE, COMPOSITE, "random", "sobol", "tpe")
+DEFAULT_ENGINE = "outcomes"
+SCORE_ENGINE = "gp"
+"""The default where a score has no parts."""
+WITH_OUTPUTS = (DEFAULT_ENGINE, "composite")
+"""What learns from the outputs that a score is computed from."""
+STUDY_ENGINES = (*WITH_OUTPUTS, SCORE_ENGINE, "random", "sobol", "tpe")
 """What a study may name."""
 ENGINES = (*STUDY_ENGINES, "skopt")
 """What can be compared."""
@@ -60,27 +65,27 @@ def why_not(engine: str, *, composed: bool) -> str:
         return f"unknown engine '{engine}'; {nearest(engine, ENGINES)}"
     if engine == "tpe" and find_spec("optuna") is None:
         return "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]', or use another engine"
-    if engine == COMPOSITE and not composed:
-        return f"'{COMPOSITE}' models what a score is computed from, and this one has no such parts; use another engine"
+    if engine in WITH_OUTPUTS and not composed:
+        return f"'{engine}' models what a score is computed from, and this one has no such parts; use '{SCORE_ENGINE}'"
     return ""
 
 
-def make_proposer(engine: str, initial: int, compose: Compose | None = None) -> Proposer:
+def make_proposer(engine: str, initial: int, goal: Goal | None = None) -> Proposer:
     """The proposer of this name, with so many trials from the quasi-random design first: all engines share it.
 
     Args:
         engine: Its name.
         initial: How many trials come from the design.
-        compose: How a score is computed from a trial's outcome; None where it has no such parts.
+        goal: What the outputs of a trial are to come to; None where a score has no such parts.
 
     Raises:
         InputError: If there is no such engine, or it cannot be used.
     """
-    reason = why_not(engine, composed=compose is not None)
+    reason = why_not(engine, composed=goal is not None)
     if reason:
         raise InputError(reason)
-    if engine == COMPOSITE and compose is not None:
-        return AfterDesign(Composite(compose), initial)
+    if goal is not None and engine in WITH_OUTPUTS:
+        return AfterDesign(Outcomes(goal) if engine == DEFAULT_ENGINE else Composite(goal), initial)
     inner: dict[str, Proposer] = {
         "gp": GaussianProcess(),
         "random": RandomPoints(),

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from proxytune.scores import Metric, ScoreTable
 from proxytune.search.analytic import BOX
 from proxytune.search.design import from_unit, to_unit
-from proxytune.search.proposer import Compose, Values
+from proxytune.search.goal import Goal
+from proxytune.search.proposer import Values
 from proxytune.space import Space
 from proxytune.usefulness.prpv import prpv_of_means
 
@@ -70,10 +71,12 @@ class Ranking:
         """Every agent's mean metrics."""
         return tuple(self.table(values, seed).means.ravel().tolist())
 
-    def compose(self, seed: int) -> Compose:
-        """PRPV of mean metrics."""
-        target = self.target(seed).means
-        return lambda outcomes: prpv_of_means(outcomes.reshape(*outcomes.shape[:-1], *target.shape), target, METRICS)
+    def goal(self, seed: int) -> Goal:
+        """The target's mean metrics, and PRPV of such."""
+        table = self.target(seed)
+        names = tuple((agent, metric) for agent in table.agents for metric in table.metrics)
+        noise = np.full(len(names), 2.0 * SPREAD**2 / EPISODES)
+        return Goal(names, table.means.ravel(), noise, lambda outcomes: _composed(outcomes, table.means))
 
     def regret(self, values: Values, seed: int) -> float:
         """PRPV without noise on either side."""
@@ -86,6 +89,10 @@ class Ranking:
     def error(self, values: Values, seed: int) -> float:
         """Mean distance of the parameters from the true ones, in widths of the box."""
         return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.optimum(seed))).mean())
+
+
+def _composed(outcomes: Array, target: Array) -> Array:
+    return prpv_of_means(outcomes.reshape(*outcomes.shape[:-1], *target.shape), target, METRICS)
 
 
 def _episodes(means: Array, generator: np.random.Generator) -> ScoreTable:

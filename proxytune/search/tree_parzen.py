@@ -23,9 +23,7 @@ class TreeParzen:
         """The next point, a function of the seed and the trials in their order; those not pending need a score."""
         import optuna
 
-        box: dict[str, optuna.distributions.BaseDistribution] = {
-            i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals
-        }
+        box: dict[str, Any] = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
         drawn = proposal_seed(seed, len(trials))
         with _quiet(optuna.logging):
             sampler = optuna.samplers.TPESampler(n_startup_trials=1, seed=drawn, constant_liar=True)

@@ -70,14 +70,12 @@ def reference(study: Study, store: Store, done: Sequence[TrialRecord]) -> Refere
     """What the next trials are held against; None where none is to be cut off.
 
     That is so during the design, on which all else rests, and where a tolerance is a percentage: what is a tie then
-    depends on agents not driven yet, so that no pair is decided before the last. The engine `composite` needs every
-    agent's metrics.
+    depends on agents not driven yet, so that no pair is decided before the last.
     """
     settings = study.settings
     scored = [trial for trial in done if trial.state == "finished"]
     percent = any(metric.percent for metric in settings.metrics)
-    whole = percent or settings.engine == "composite"
-    if not settings.cut_off or whole or len(done) < settings.initial or len(scored) < FEWEST:
+    if not settings.cut_off or percent or len(done) < settings.initial or len(scored) < FEWEST:
         return None
     surrogate = fit_surrogate(settings.space, as_trials(settings.space, done))
     means, _ = surrogate.at_visited()

@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+from proxytune.domain import Episode
 from proxytune.errors import EpisodeError
 from proxytune.scores import ScoreTable
 from proxytune.study.episodes import running
-from proxytune.study.evaluate import longest_first, plan, table, told
+from proxytune.study.evaluate import longest_first, plan, told
 from proxytune.study.family import load_family
+from proxytune.study.objective import FRESH
 from proxytune.study.progress import Watcher
 from proxytune.study.settings import StudySettings
 
@@ -14,24 +16,35 @@ SEED_OFFSET = 1000
 """A target is measured under seeds that the study does not use, so that their noise has nothing in common."""
 
 
-def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher) -> ScoreTable:
+def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
     """Score the study's agents over its starts in the domain that a model describes.
 
     Every metric of the family is kept. Rows are in the order of the study's agents and starts, whatever the number of
-    jobs: the same model, settings and seed give the same table.
+    jobs: the same model, settings and seed give the same table. Of several repeats, each has placement noise of its
+    own, and episodes are labelled START/REPEAT; the first repeat is what a single one would be.
 
     Raises:
         InputError: If the settings, the model or the family cannot be used.
         EpisodeError: If any episode fails: a target has no holes.
     """
     family = load_family(settings, model)
-    planned = plan(settings, {}, seed)
+    labels = _labelled(settings, seed, repeats)
     watcher.begin(f"measuring {model.name}", 0)
-    found = {}
-    with running(family, longest_first(planned, {}), settings.jobs) as outcomes:
+    metrics = {}
+    with running(family, longest_first(list(labels), {}), settings.jobs) as outcomes:
         for outcome in outcomes:
-            if outcome.failure:
+            if outcome.metrics is None:
                 raise EpisodeError(told(outcome))
-            found[outcome.episode] = outcome
+            metrics[outcome.episode] = outcome.metrics
             watcher.episode()
-    return table([found[episode] for episode in planned])
+    return ScoreTable.from_episodes({(episode.agent, label): metrics[episode] for episode, label in labels.items()})
+
+
+def _labelled(settings: StudySettings, seed: int, repeats: int) -> dict[Episode, str]:
+    """Every episode with its label: by agent, then start, then repeat."""
+    runs = [plan(settings, {}, seed + repeat * FRESH) for repeat in range(repeats)]
+    return {
+        episode: f"{episode.start}/{repeat}" if repeats > 1 else str(episode.start)
+        for alike in zip(*runs, strict=True)
+        for repeat, episode in enumerate(alike)
+    }

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass, replace
 
-from proxytune.search.proposer import Compose, Values
+from proxytune.search.goal import Goal
+from proxytune.search.proposer import Values
 from proxytune.space import Space
-from proxytune.study.composition import compose_of, outcome_of
-from proxytune.study.evaluate import Evaluation, evaluation, simulate
+from proxytune.study.composition import goal_of, outputs_of
+from proxytune.study.evaluate import Evaluation, evaluation, known_outcomes, plan, simulate
+from proxytune.study.preflight import run_preflight
 from proxytune.study.progress import Watcher
 from proxytune.study.store import Store
 from proxytune.study.study import Study, facts
@@ -57,11 +59,16 @@ class StudyObjective:
 
     def outcome(self, values: Values, seed: int) -> Values | None:
         """Every agent's mean metrics; None where an agent has no episode that worked."""
-        return outcome_of(self.study, self._evaluated(values, seed))
+        self._evaluated(values, seed)
+        seeded = self._seeded(seed)
+        planned = plan(seeded.settings, self.space.theta(values), seed)
+        return outputs_of(seeded, known_outcomes(seeded, self.store, planned).values())
 
-    def compose(self, seed: int) -> Compose:
-        """PRPV of mean metrics."""
-        return compose_of(self.study)
+    def goal(self, seed: int) -> Goal:
+        """The target's mean metrics, noise by this seed's pre-flight, and PRPV."""
+        seeded = self._seeded(seed)
+        run_preflight(seeded, self.store, self.watcher)
+        return goal_of(seeded, self.store)
 
     def regret(self, values: Values, seed: int) -> float | None:
         """The score above the noise floor."""
@@ -77,8 +84,11 @@ class StudyObjective:
     def _above(self, score: float | None) -> float | None:
         return None if score is None else score - self.floor
 
+    def _seeded(self, seed: int) -> Study:
+        return replace(self.study, settings=replace(self.study.settings, seed=seed))
+
     def _evaluated(self, values: Values, seed: int) -> Evaluation:
-        seeded = replace(self.study, settings=replace(self.study.settings, seed=seed))
+        seeded = self._seeded(seed)
         theta = self.space.theta(values)
         found = evaluation(seeded, self.store, theta)
         if found is None:

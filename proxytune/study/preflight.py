@@ -144,6 +144,29 @@ def preflight_of(study: Study, store: Store) -> Preflight | None:
     return Preflight(_base(study.settings), tuple(found[name] for name in study.settings.space.names), len(driven))
 
 
+def placement_pairs(study: Study, store: Store) -> Array:
+    """The base of a finished pre-flight under its own and another placement.
+
+    Returns:
+        Shape (places, 2, agents, metrics), in the order of the target's table; NaN where an episode failed; no places
+        where there was no pre-flight.
+    """
+    shape = study.target.means.shape
+    if preflight_of(study, store) is None:
+        return np.empty((0, 2, *shape))
+    settings, names = study.settings, study.target.metrics
+    known = store.outcomes(study.identity, _base(settings))
+    found = np.full((len(_places(settings, LOOKS - 1)), 2, *shape), np.nan)
+    for row, place in enumerate(_places(settings, LOOKS - 1)):
+        for column, agent in enumerate(settings.agents):
+            both = (_episode(settings, _base(settings), agent, place), _again(settings, agent, place))
+            for side, episode in enumerate(both):
+                metrics = known[episode].metrics if episode in known else None
+                if metrics is not None:
+                    found[row, side, column] = [metrics[name] for name in names]
+    return found
+
+
 def most_episodes(settings: StudySettings) -> int:
     """How many episodes a pre-flight takes at most."""
     return sum(_most(settings, look) for look in range(LOOKS)) if settings.preflight else 0

@@ -7,7 +7,7 @@ from typing import Any
 
 from proxytune.errors import InputError
 from proxytune.scores import Metric
-from proxytune.search.engines import DEFAULT_ENGINE, STUDY_ENGINES
+from proxytune.search.engines import DEFAULT_ENGINE, SCORE_ENGINE, STUDY_ENGINES
 from proxytune.settings import Section, read_settings
 from proxytune.space import Interval, Space
 from proxytune.study.teaching import TeachingSettings, read_teaching
@@ -125,7 +125,7 @@ def read_study_settings(path: Path) -> StudySettings:
         budget=read.whole("budget", low=1, high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
         batch=read.whole("batch", 1, low=1, high=100_000),
-        engine=read.text("engine", DEFAULT_ENGINE, choices=STUDY_ENGINES),
+        engine=read.text("engine", _default_engine(read), choices=STUDY_ENGINES),
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
@@ -137,6 +137,11 @@ def read_study_settings(path: Path) -> StudySettings:
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
     )
+
+
+def _default_engine(read: Section) -> str:
+    """Of learning value nothing is known but the score."""
+    return SCORE_ENGINE if read.text("objective", "prpv", choices=OBJECTIVES) == "plv" else DEFAULT_ENGINE
 
 
 def _metrics(read: Section) -> tuple[Metric, ...]:

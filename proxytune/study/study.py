@@ -2,21 +2,21 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from proxytune.domain import DomainFamily
-from proxytune.errors import InputError
+from proxytune.errors import InputError, ScoresError
 from proxytune.scores import ScoreTable, read_scores
-from proxytune.search.engines import DEFAULT_ENGINE
+from proxytune.search.engines import WITH_OUTPUTS
 from proxytune.settings import nearest
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
 
-UNSAID = {"batch": 1, "engine": DEFAULT_ENGINE}
-"""Facts that go without saying where they have these values."""
+UNSAID = {"batch": 1, "engine": "gp"}
+"""What a study.db that names none of these was run with."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class Study:
     Attributes:
         settings: What study.toml says.
         family: The proxy's domain family.
-        target: The target's scores of the study's agents, in the study's order.
+        target: The target's scores of the study's agents, in the study's order: the metrics by which they are compared,
+            then every other one that the family has too.
         identity: What determines the result of an episode in the proxy, apart from the episode.
     """
 
@@ -44,16 +45,17 @@ def open_study(path: Path) -> Study:
     """
     settings = read_study_settings(path)
     family = load_family(settings, settings.proxy)
-    return Study(settings, family, read_target(settings), family.identity)
+    return Study(settings, family, read_target(settings, family), family.identity)
 
 
-def read_target(settings: StudySettings) -> ScoreTable:
+def read_target(settings: StudySettings, family: DomainFamily) -> ScoreTable:
     """The target's scores of the study's agents.
 
     Raises:
         InputError: If the table lacks an agent or a metric, or has a value that is not finite.
     """
-    table = read_scores(settings.target, [metric.name for metric in settings.metrics])
+    compared = [metric.name for metric in settings.metrics]
+    table = read_scores(settings.target, [*compared, *_others(settings, family, compared)])
     missing = [agent for agent in settings.agents if agent not in table.agents]
     if missing:
         hint = nearest(missing[0], table.agents) if len(missing) == 1 else "add them, or take them out of the study"
@@ -63,25 +65,44 @@ def read_target(settings: StudySettings) -> ScoreTable:
     return chosen.arrange(agents=settings.agents, episodes=driven)
 
 
+def _others(settings: StudySettings, family: DomainFamily, compared: Sequence[str]) -> list[str]:
+    """The metrics beside those compared that the table has in full: what a search can learn from at no cost."""
+    return [name for name in family.metrics if name not in compared and _in_full(settings.target, name)]
+
+
+def _in_full(path: Path, metric: str) -> bool:
+    try:
+        read_scores(path, [metric])
+    except ScoresError:
+        return False
+    return True
+
+
 def facts(study: Study) -> dict[str, Any]:
     """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
 
     Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
-    identity covers it. The default engine goes without saying, as it did when there was no other, and so do batches of
-    one trial.
+    identity covers it. The engine `gp` goes without saying, as it did when there was no other, and so do batches of one
+    trial. An engine that learns from every output depends on the whole of the target's table, and on the pre-flight's
+    noise.
     """
     settings = study.settings
-    said = {"batch": settings.batch, "engine": settings.engine}
+    named: dict[str, Any] = {"batch": settings.batch, "engine": settings.engine}
+    said = {key: value for key, value in named.items() if value != UNSAID[key]}
+    compared = [metric.name for metric in settings.metrics]
+    learns = settings.engine in WITH_OUTPUTS
+    if learns:
+        said["preflight"] = settings.preflight
     return {
         "family": settings.family,
-        "target": _table_digest(study.target),
+        "target": _table_digest(study.target if learns else study.target.select(compared)),
         "objective": settings.objective,
         "metrics": sorted(str(metric) for metric in settings.metrics),
         "agents": sorted(settings.agents),
         "starts": settings.starts,
         "initial": settings.initial,
         "seed": settings.seed,
-        **{key: value for key, value in said.items() if value != UNSAID[key]},
+        **said,
         "cut_off": settings.cut_off,
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
@@ -103,8 +124,8 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
 def _change(key: str, before: Any, after: Any) -> str:
     if key == "target":
         return "target (its contents)"
-    values = (UNSAID.get(key) if value is None else value for value in (before, after))
-    shown = [("nothing" if value is None else json.dumps(value)) for value in values]
+    before = UNSAID.get(key) if before is None else before
+    shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
     return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
 
 

@@ -1,11 +1,12 @@
 """How useful a proxy is as a predictor: measures on score tables and trajectories, with their uncertainty."""
 
-from proxytune.usefulness.assessment import Assessment, Intervals, assess
+from proxytune.usefulness.assessment import Assessment, assess
 from proxytune.usefulness.chance import Chance, chance
 from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.correlation import Correlation, kendall_tau, srcc
+from proxytune.usefulness.intervals import Intervals
 from proxytune.usefulness.mmrv import Mmrv, mmrv
-from proxytune.usefulness.noise import NoiseFloor, noise_floor
+from proxytune.usefulness.noise import FloorKind, NoiseFloor, floor_of_repeats, noise_floor
 from proxytune.usefulness.pod import Pod, pod_of_images, pod_of_poses
 from proxytune.usefulness.ppv import Ppv, ppv
 from proxytune.usefulness.prpv import FlippedPair, Prpv, prpv
@@ -19,6 +20,7 @@ __all__ = [
     "Correlation",
     "Difference",
     "FlippedPair",
+    "FloorKind",
     "Intervals",
     "Mmrv",
     "NoiseFloor",
@@ -31,6 +33,7 @@ __all__ = [
     "bootstrap_prpv",
     "chance",
     "compare",
+    "floor_of_repeats",
     "kendall_tau",
     "mmrv",
     "noise_floor",

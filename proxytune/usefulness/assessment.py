@@ -3,46 +3,26 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from proxytune.scores import Array, Metric, ScoreTable
+from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.chance import Chance, chance
 from proxytune.usefulness.comparison import Comparison, compare
-from proxytune.usefulness.correlation import (
-    Correlation,
-    kendall_of_means,
-    kendall_tau,
-    pearson_of_means,
-    srcc,
-)
-from proxytune.usefulness.mmrv import Mmrv, mmrv, mmrv_of_means
+from proxytune.usefulness.correlation import Correlation, kendall_tau, srcc
+from proxytune.usefulness.intervals import Intervals, intervals
+from proxytune.usefulness.mmrv import Mmrv, mmrv
 from proxytune.usefulness.noise import NoiseFloor, noise_floor
-from proxytune.usefulness.ppv import Ppv, ppv, ppv_of_means
+from proxytune.usefulness.ppv import Ppv, ppv
 from proxytune.usefulness.prpv import Prpv, prpv
-from proxytune.usefulness.resampling import (
-    PrpvInterval,
-    bootstrap_means,
-    bootstrap_prpv,
-    in_blocks,
-    interval,
-    why_not_repeated,
-)
+from proxytune.usefulness.resampling import PrpvInterval, bootstrap_prpv
 
-Ends = tuple[float, float]
 FEW_EPISODES = 5
 PAIRED = "the same label counts as the same start, which leaves few resamples; treat them as unpaired if it is not"
-UNDEFINED_SHARE = 0.05
-"""A measure undefined in more of the resamples than this gets no interval."""
-
-
-@dataclass(frozen=True)
-class Intervals:
-    """Percentile bootstrap intervals of the measures beside PRPV; None where one is undefined."""
-
-    ppv: Ends | None
-    srcc: Mapping[str, Ends | None]
-    kendall_tau: Mapping[str, Ends | None]
-    mmrv: Mapping[str, Ends | None]
+ONE_START = "an agent has all its episodes from one start: intervals do not say what other starts would give"
+PERFECT = "PRPV is within the noise floor, by the same starts: this proxy cannot be told from a perfect one"
+HALVES = (
+    "PRPV is no higher than what halves of the target's episodes score against each other, but these are other starts "
+    "and half the episodes: that does not show that the proxy is perfect; measure the target at least twice from each "
+    "start (episodes START/REPEAT) to know"
+)
 
 
 @dataclass(frozen=True)
@@ -58,7 +38,7 @@ class Assessment:
         kendall_tau: Kendall's correlation per metric.
         mmrv: Mean maximum rank violation per metric.
         intervals: Their bootstrap intervals; None where episodes are not repeated.
-        noise_floor: PRPV of the target against itself.
+        noise_floor: PRPV of the target, or of a domain like it, against itself.
         chance: PRPV of a proxy that knows nothing.
     """
 
@@ -75,8 +55,14 @@ class Assessment:
 
     @property
     def at_noise_floor(self) -> bool | None:
-        """Whether PRPV is within the target's noise, so that no better proxy could be told from this one."""
-        return None if self.noise_floor.high is None else self.prpv.value <= self.noise_floor.high
+        """Whether it is shown that PRPV is what a perfect proxy would score; None where nothing can show it.
+
+        That takes a noise floor of the same starts, and a PRPV that chance does not explain.
+        """
+        floor = self.noise_floor
+        if floor.kind != "same starts" or floor.high is None:
+            return None
+        return self.prpv.value <= floor.high and not self.chance.explains
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -97,8 +83,18 @@ def assess(
     beta: Mapping[str, float] | None = None,
     resamples: int = 1000,
     seed: int = 0,
+    floor: NoiseFloor | None = None,
 ) -> Assessment:
     """Measure a proxy in every way that score tables allow.
+
+    Args:
+        proxy: Scores in the proxy.
+        target: Scores on the target.
+        metrics: How agents are compared.
+        beta: Weights of the metrics in PPV.
+        resamples: How many to draw, and permutations.
+        seed: Seed of both.
+        floor: The noise floor, where one is known; by default it is found from the target's episodes.
 
     Raises:
         ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
@@ -115,38 +111,38 @@ def assess(
         srcc=srcc(proxy=one, target=other, metrics=metrics),
         kendall_tau=kendall_tau(proxy=one, target=other, metrics=metrics),
         mmrv=mmrv(proxy=one, target=other, metrics=metrics),
-        intervals=None if why_not_repeated(inputs) else _intervals(inputs, error, resamples, seed),
-        noise_floor=noise_floor(target=other, metrics=metrics, seed=seed),
+        intervals=intervals(inputs=inputs, error=error, resamples=resamples, seed=seed),
+        noise_floor=floor or noise_floor(target=other, metrics=metrics, seed=seed),
         chance=chance(proxy=one, target=other, metrics=metrics, permutations=resamples, seed=seed),
     )
 
 
-def _intervals(inputs: Comparison, error: Ppv, resamples: int, seed: int) -> Intervals:
-    means = bootstrap_means(inputs, resamples=resamples, seed=seed)
-    weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])
-    return Intervals(
-        ppv=None if error.value is None else interval(ppv_of_means(*means, weights)),
-        srcc=_per_metric(inputs.metrics, pearson_of_means(*means)),
-        kendall_tau=_per_metric(inputs.metrics, in_blocks(kendall_of_means, *means)),
-        mmrv=_per_metric(inputs.metrics, in_blocks(lambda p, t: mmrv_of_means(p, t, inputs.metrics), *means)),
-    )
-
-
-def _per_metric(metrics: Sequence[Metric], values: Array) -> dict[str, Ends | None]:
-    """Intervals of values of shape (resamples, metrics)."""
-    undefined = np.isnan(values).mean(axis=0)
-    return {
-        metric.name: interval(column[~np.isnan(column)]) if share <= UNDEFINED_SHARE else None
-        for metric, column, share in zip(metrics, values.T, undefined, strict=True)
-    }
-
-
 def _caution(assessment: Assessment) -> list[str]:
-    fewest = min(assessment.inputs.proxy_episodes[0], assessment.inputs.target_episodes[0])
-    lines = []
-    if assessment.intervals is not None and fewest < FEW_EPISODES:
-        pairing = f", the more so as {PAIRED}" if assessment.inputs.paired else ""
-        lines.append(f"{fewest} episodes per agent are few: intervals come out too narrow{pairing}")
+    return [*_few(assessment), *_level(assessment)]
+
+
+def _few(assessment: Assessment) -> list[str]:
+    """That starts are few, or else episodes, where there are intervals."""
+    inputs = assessment.inputs
+    episodes, starts = min(inputs.proxy_episodes[0], inputs.target_episodes[0]), inputs.fewest_starts
+    if assessment.intervals is None or starts >= FEW_EPISODES:
+        return []
+    if starts == 1:
+        return [ONE_START]
+    pairing = f", the more so as {PAIRED}" if inputs.paired else ""
+    what = f"{episodes} episodes" if starts >= episodes else f"{starts} starts"
+    return [f"{what} per agent are few: intervals come out too narrow{pairing}"]
+
+
+def _level(assessment: Assessment) -> list[str]:
+    """Where PRPV lies between chance and the noise floor, as far as anything is shown."""
+    lines, floor, random = [], assessment.noise_floor, assessment.chance
+    if random.explains:
+        lines.append(
+            f"chance explains as much: a proxy that knows nothing has so low a PRPV with p = {random.p_value:.2g}"
+        )
     if assessment.at_noise_floor:
-        lines.append("PRPV is within the target's own noise: this proxy cannot be told from a perfect one")
+        lines.append(PERFECT)
+    if floor.kind == "halves" and floor.high is not None and assessment.prpv.value <= floor.high:
+        lines.append(HALVES)
     return lines

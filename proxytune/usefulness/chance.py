@@ -9,6 +9,9 @@ from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.prpv import dominance
 
+LEVEL = 0.05
+"""Chance explains a PRPV as low as is found by chance at least so often."""
+
 
 @dataclass(frozen=True)
 class Chance:
@@ -27,6 +30,11 @@ class Chance:
     p_value: float
     permutations: int
     inputs: Comparison
+
+    @property
+    def explains(self) -> bool:
+        """Whether a proxy that knows nothing would do as well too often to be ruled out."""
+        return self.p_value >= LEVEL
 
 
 def chance(

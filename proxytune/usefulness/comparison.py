@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Array, Metric, ScoreTable
+from proxytune.usefulness.repeats import repeats, starts_of
 
 
 @dataclass(frozen=True)
@@ -28,13 +29,24 @@ class Comparison:
 
     @property
     def paired(self) -> bool:
-        """Whether both domains have the same episodes of every agent, so that starts are paired across domains."""
-        return self.proxy.complete and self.target.complete and self.proxy.episodes == self.target.episodes
+        """Whether both domains have the same starts of every agent, so that these are paired across domains.
+
+        Of one start alone, the same repeats are asked for.
+        """
+        if not (self.proxy.complete and self.target.complete):
+            return False
+        starts, others = (set(starts_of(side.episodes)) for side in (self.proxy, self.target))
+        return self.proxy.episodes == self.target.episodes or (starts == others and len(starts) > 1)
 
     @property
     def means(self) -> tuple[Array, Array]:
         """Mean scores in the proxy and on the target, each of shape (agents, metrics)."""
         return self.proxy.means, self.target.means
+
+    @property
+    def fewest_starts(self) -> int:
+        """How many starts an agent drove on either side, the fewest; repeats of a start count once."""
+        return int(min((repeats(side) > 0).sum(axis=1).min() for side in (self.proxy, self.target)))
 
     @property
     def proxy_episodes(self) -> tuple[int, int]:

@@ -1,47 +1,71 @@
-"""The noise floor: the PRPV that the target gets against itself."""
+"""The noise floor: the PRPV that a domain gets against itself from the same starts, or what stands in for it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness.comparison import compare
+from proxytune.scores import Array, Metric, ScoreTable
+from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.prpv import prpv_of_means
-from proxytune.usefulness.resampling import counted_means, in_blocks, interval, too_few
+from proxytune.usefulness.repeats import by_start, is_repeated, split_repeats
+from proxytune.usefulness.resampling import counted_means, draw_counts, in_blocks, interval, too_few
+
+FloorKind = Literal["same starts", "halves", "none"]
+MEANINGS: dict[FloorKind, str] = {
+    "same starts": "target against itself, same starts",
+    "halves": "target against itself, other starts and half the episodes: an upper bound of the noise floor",
+    "none": "target against itself",
+}
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """PRPV between two halves of the target's own episodes.
-
-    A half has half the episodes, so this is on the high side: a perfect proxy with as many episodes as the target
-    would do somewhat better.
+    """PRPV of one domain against itself.
 
     Attributes:
-        value: Mean over splits; None if there is no noise floor.
-        low: Lower end of the central 95 % of the splits; None if there is no noise floor.
+        kind: "same starts": two sets of episodes from the same starts under other placement noise, what a perfect
+            proxy would score. "halves": halves of the episodes, which hold other starts; no more than an upper bound
+            of that. "none": there is neither.
+        value: Of the means, or the mean over splits; None if there is no noise floor.
+        low: Lower end of the central 95 % of resamples or splits; None if there is no noise floor.
         high: Upper end of the same; None if there is no noise floor.
-        splits: How many random splits were made.
-        target: The scores that were split.
+        splits: How many resamples or random splits were made.
+        target: The scores of the domain.
         metrics: How agents were compared.
+        again: The domain's scores when it was measured again; None where its episodes were split.
         reason: Why there is no noise floor, empty if there is one.
     """
 
+    kind: FloorKind
     value: float | None
     low: float | None
     high: float | None
     splits: int
     target: ScoreTable
     metrics: tuple[Metric, ...]
+    again: ScoreTable | None = None
     reason: str = ""
+
+    @property
+    def title(self) -> str:
+        """What a row or a line of a figure that shows it is to be called."""
+        return "halves" if self.kind == "halves" else "noise floor"
+
+    @property
+    def meaning(self) -> str:
+        """What it is, in one phrase."""
+        return MEANINGS[self.kind]
 
 
 def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 200, seed: int = 0) -> NoiseFloor:
-    """Compare random halves of the target's episodes: no proxy can be told to do better.
+    """Compare the target with itself, by two sets of its own episodes that are drawn at random many times.
 
-    Where all agents drove the same episodes, all are split alike.
+    Where every start has repeats (episodes labelled START/REPEAT), both sets hold the same starts, each with half of
+    its repeats; so the floor is on the high side by what half as many repeats are noisier. Otherwise the sets are
+    halves of the episodes, and with them of the starts. Where all agents drove the same episodes, all are split alike.
 
     Raises:
         ScoresError: If there are fewer than two agents or a metric is unknown.
@@ -49,12 +73,50 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
     chosen = compare(proxy=target, target=target, metrics=metrics).target
     reason = too_few(chosen, "on the target")
     if reason:
-        return NoiseFloor(None, None, None, 0, chosen, tuple(metrics), reason)
-    first = split_halves(chosen, np.random.default_rng(seed), splits)
-    second = chosen.driven[:, None, :] - first
-    means = counted_means(chosen, first), counted_means(chosen, second)
-    values = in_blocks(lambda one, other: prpv_of_means(one, other, metrics), *means)
-    return NoiseFloor(float(values.mean()), *interval(values), splits, chosen, tuple(metrics))
+        return NoiseFloor("none", None, None, None, 0, chosen, tuple(metrics), reason=reason)
+    rng, same_starts = np.random.default_rng(seed), is_repeated(chosen)
+    if same_starts:
+        first, second = split_repeats(chosen, rng, splits)
+    else:
+        first = split_halves(chosen, rng, splits)
+        second = chosen.driven[:, None, :] - first
+    values = _prpv(counted_means(chosen, first), counted_means(chosen, second), metrics)
+    kind: FloorKind = "same starts" if same_starts else "halves"
+    return NoiseFloor(kind, float(values.mean()), *interval(values), splits, chosen, tuple(metrics))
+
+
+def floor_of_repeats(
+    *, domain: ScoreTable, again: ScoreTable, metrics: Sequence[Metric], resamples: int = 1000, seed: int = 0
+) -> NoiseFloor:
+    """Compare a domain with itself, measured again from the same starts under other placement noise.
+
+    Each agent is compared over the starts that it drove both times, each start by the mean over its repeats. The
+    interval is a bootstrap over starts, which both measurements share, and all agents too where none is missing. It
+    covers the mean PRPV of many such pairs, so like every bootstrap of PRPV it lies on the high side.
+
+    Args:
+        domain: Scores of the domain.
+        again: Its scores under other placement noise: the same agents, episodes labelled START or START/REPEAT.
+        metrics: How agents are compared.
+        resamples: How many to draw.
+        seed: Seed of the resampling.
+
+    Raises:
+        ScoresError: As in prpv.
+    """
+    inputs = compare(proxy=again, target=domain, metrics=metrics)
+    one, other = _shared_starts(inputs)
+    absent = [agent for agent, count in zip(one.agents, one.counts, strict=True) if not count]
+    reason = (
+        f"agent '{absent[0]}' drove no start both times" if absent else too_few(one, "from starts driven both times")
+    )
+    if reason:
+        return NoiseFloor("none", None, None, None, 0, inputs.target, inputs.metrics, inputs.proxy, reason)
+    value = float(prpv_of_means(one.means, other.means, metrics))
+    counts = draw_counts(one, np.random.default_rng(seed), resamples)
+    low, high = interval(_prpv(counted_means(one, counts), counted_means(other, counts), metrics))
+    ends = min(low, value), max(high, value)
+    return NoiseFloor("same starts", value, *ends, resamples, inputs.target, inputs.metrics, inputs.proxy)
 
 
 def split_halves(table: ScoreTable, rng: np.random.Generator, splits: int) -> NDArray[np.int64]:
@@ -64,3 +126,20 @@ def split_halves(table: ScoreTable, rng: np.random.Generator, splits: int) -> ND
     order = np.where(table.driven[:, None, :], order, np.inf)
     rank = order.argsort(axis=-1).argsort(axis=-1)
     return np.asarray(rank < (table.counts // 2)[:, None, None], dtype=np.int64)
+
+
+def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:
+    """Both tables by start, each agent with those starts only that it drove on both sides."""
+    one, other = by_start(inputs.target), by_start(inputs.proxy)
+    shared = [start for start in one.episodes if start in other.episodes]
+    one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
+    both = (one.driven & other.driven)[..., None]
+    first, second = (
+        ScoreTable(inputs.agents, tuple(shared), table.metrics, np.where(both, table.values, np.nan))
+        for table in (one, other)
+    )
+    return first, second
+
+
+def _prpv(one: Array, other: Array, metrics: Sequence[Metric]) -> Array:
+    return in_blocks(lambda p, t: prpv_of_means(p, t, metrics), one, other)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from proxytune.scores import Array, Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.usefulness.repeats import start_of, start_places
 
 CONFIDENCE = 0.95
 BLOCK = 4_000_000
@@ -64,25 +65,38 @@ def too_few(table: ScoreTable, name: str) -> str:
 def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> tuple[Array, Array]:
     """Mean scores of resampled episodes, in the proxy and on the target.
 
-    Where all agents drove the same episodes, all get the same resample of them; where both domains have the same
-    episodes, both do.
+    Where all agents drove the same episodes, all get the same resample of their starts, each with all its repeats;
+    where both domains have the same starts, both do.
 
     Returns:
         Two arrays of shape (resamples, agents, metrics).
     """
     rng = np.random.default_rng(seed)
     target_counts = draw_counts(inputs.target, rng, resamples)
-    proxy_counts = target_counts if inputs.paired else draw_counts(inputs.proxy, rng, resamples)
+    proxy_counts = _alike(inputs, target_counts) if inputs.paired else draw_counts(inputs.proxy, rng, resamples)
     return counted_means(inputs.proxy, proxy_counts), counted_means(inputs.target, target_counts)
 
 
 def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> NDArray[np.int64]:
-    """How often each episode is drawn: shape (agents, or 1 if all share the draw; resamples, episodes)."""
+    """How often each episode is drawn: shape (agents, or 1 if all share the draw; resamples, episodes).
+
+    Starts are drawn, and with a start all its repeats: these are no new starts. Of one start alone, repeats are drawn.
+    """
     if table.complete:
-        episodes = len(table.episodes)
-        return rng.multinomial(episodes, np.full(episodes, 1 / episodes), size=(1, resamples))
+        places = start_places(table)
+        places = places if places.any() else np.arange(len(places))
+        starts = int(places.max()) + 1
+        return rng.multinomial(starts, np.full(starts, 1 / starts), size=(1, resamples))[..., places]
     chances = table.driven / table.counts[:, None]
     return rng.multinomial(table.counts[:, None], chances[:, None, :], size=(len(table.agents), resamples))
+
+
+def _alike(inputs: Comparison, target_counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The target's draws for the proxy's episodes: by label or, of other repeats, by start."""
+    labels = inputs.target.episodes
+    columns = {start_of(label): column for column, label in enumerate(labels)}
+    columns |= {label: column for column, label in enumerate(labels)}
+    return target_counts[..., [columns.get(label, columns[start_of(label)]) for label in inputs.proxy.episodes]]
 
 
 def counted_means(table: ScoreTable, counts: NDArray[np.int64]) -> Array:

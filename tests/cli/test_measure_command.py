@@ -37,6 +37,25 @@ def test_another_seed_gives_other_scores(measured):
     assert measured("one.csv")[1].read_bytes() != measured("two.csv", "--seed", "7")[1].read_bytes()
 
 
+def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured, capsys):
+    plain, one = measured("plain.csv")[1], measured("one.csv", "--repeats", "1")[1]
+    assert one.read_bytes() == plain.read_bytes()
+    capsys.readouterr()
+    status, two = measured("two.csv", "--repeats", "2", "--json")
+    document = json.loads(capsys.readouterr().out)
+    assert (status, document["repeats"], document["episodes"]) == (0, 2, 6)
+    found = read_scores(two, ["distance"])
+    assert found.episodes == ("0/0", "0/1", "1/0", "1/1", "2/0", "2/1")
+    assert (found.values[:, ::2] == read_scores(plain, ["distance"]).values).all()
+
+
+def test_no_repeat_at_all_is_refused(measured, capsys):
+    status, output = measured("one.csv", "--repeats", "0")
+    assert status == 2
+    assert "--repeats must be at least 1, got 0" in capsys.readouterr().err
+    assert not output.exists()
+
+
 def test_the_document_names_the_seed_and_the_means(measured, capsys):
     measured("one.csv", "--json")
     document = json.loads(capsys.readouterr().out)

@@ -18,6 +18,7 @@ SIM = "agent,episode,distance,time\n" + "".join(
 )
 REAL = SIM.replace("C,", "c,").replace("D,", "C,").replace("c,", "D,")
 PROMISED = {"prpv", "prpv_normalised", "ppv", "srcc", "mmrv", "kendall_tau", "prpv_interval", "noise_floor", "chance"}
+PROMISED |= {"noise_floor_interval", "noise_floor_kind", "at_noise_floor", "chance_deviation", "p_value"}
 
 
 @pytest.fixture
@@ -93,7 +94,17 @@ def test_a_file_with_a_colon_in_its_name_is_a_file(tables):
 
 def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
     text = shown("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
-    for part in ("PRPV", "noise floor", "chance", "PPV", "SRCC distance", "Kendall τ time", "MMRV time", "1 reversed"):
+    for part in (
+        "PRPV",
+        "halves",
+        "upper bound of the noise floor",
+        "chance",
+        "PPV",
+        "SRCC distance",
+        "Kendall τ time",
+        "MMRV time",
+        "1 reversed",
+    ):
         assert part in text
     assert "note: 3 episodes per agent are few" in text
     assert "sim as a proxy of real: 4 agents, 3 proxy episodes and 3 target episodes each" in text
@@ -116,12 +127,36 @@ def test_single_rows_give_no_interval_but_a_note(tables):
     assert "–" in shown("--proxy", "one.csv", "--target", "one.csv", "--metric", "distance:max")
 
 
+def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables):
+    base = ("--proxy", "sim.csv", "--target")
+    halves = document(*base, "real.csv", *METRIC)
+    assert (halves["noise_floor_kind"], halves["at_noise_floor"]) == ("halves", None)
+    rows = [line.split(",", 2) for line in REAL.splitlines()]
+    again = [f"{agent},{episode}/{repeat},{rest}" for agent, episode, rest in rows[1:] for repeat in (0, 1)]
+    Path("twice.csv").write_text("\n".join([",".join(rows[0]), *again]) + "\n")
+    found = document(*base, "twice.csv", *METRIC)
+    assert (found["noise_floor_kind"], found["noise_floor"]) == ("same starts", 0.0)
+    assert found["at_noise_floor"] is False
+    assert found["prpv_interval"] == halves["prpv_interval"]
+    text = shown(*base, "twice.csv", *METRIC)
+    assert "target against itself, same starts" in text
+    assert "halves" not in text
+    loose = document(*base, "twice.csv", *METRIC, "--unpaired")
+    assert (loose["noise_floor_kind"], loose["at_noise_floor"]) == ("halves", None)
+
+
+def test_a_ranking_says_what_its_floor_is(tables):
+    text = shown("--proxy", "sim.csv", "--proxy", "real.csv", "--target", "real.csv", *METRIC)
+    assert "halves 0" in text
+    assert "an upper bound of the noise floor" in text
+
+
 def test_a_constant_metric_is_null_with_a_note(tables):
     Path("flat.csv").write_text("agent,distance\nA,1\nB,1\nC,1\n")
     found = document("--proxy", "flat.csv", "--target", "flat.csv", "--metric", "distance:max")
     assert found["srcc"] == found["kendall_tau"] == {"distance": None}
     assert found["ppv"] is None
-    assert len(found["notes"]) == len(set(found["notes"])) == 7
+    assert len(found["notes"]) == len(set(found["notes"])) == 8
 
 
 def test_weights_unpaired_episodes_and_the_seed_are_obeyed(tables):

@@ -57,7 +57,19 @@ def wandering(seed, samples=400):
 
 def test_a_drive_is_scored_by_every_metric_in_order():
     assert list(score(drive(OUTER, OUTER_LAP))) == list(METRICS)
-    assert dict(METRICS) == {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"}
+    early = {"early_distance": "m", "early_offset": "m", "speed": "m/s"}
+    assert {"distance": "m", "survival_time": "s", "time_out_of_lane": "s", "deviation": "m"} | early == METRICS
+
+
+def test_early_metrics_are_those_of_the_first_five_seconds_whatever_comes_after():
+    short = drive(moved_left(OUTER, 0.03), [(0.4, 0.0)])
+    still = np.repeat(short[-1:], 60 * 20, axis=0)
+    whole = np.concatenate((short, still))
+    first = score(whole[: 5 * 60 + 1])
+    result = score(whole)
+    assert result["early_distance"] == first["distance"] == pytest.approx(0.4)
+    assert result["early_offset"] == pytest.approx(0.03)
+    assert result["speed"] == pytest.approx(0.4 / (len(whole) - 1) * 60)
 
 
 @pytest.mark.parametrize("start", [OUTER, INNER], ids=("outer", "inner"))
@@ -120,6 +132,9 @@ def test_a_stopped_robot_survives_and_gets_nowhere():
         "survival_time": 60,
         "time_out_of_lane": 0,
         "deviation": pytest.approx(0.05),
+        "early_distance": 0,
+        "early_offset": pytest.approx(0.05),
+        "speed": 0,
     }
 
 
@@ -160,7 +175,8 @@ def test_a_survivor_survives_for_the_whole_duration(rate, seconds):
 
 def test_an_episode_that_ends_at_once_has_survived_for_no_time():
     result = score(np.array([moved_left(OUTER, 0.05)]))
-    assert result == {"distance": 0, "survival_time": 0, "time_out_of_lane": 0, "deviation": pytest.approx(0.05)}
+    nothing = dict.fromkeys(("distance", "survival_time", "time_out_of_lane", "early_distance", "speed"), 0)
+    assert result == nothing | {"deviation": pytest.approx(0.05), "early_offset": pytest.approx(0.05)}
 
 
 def zig_zag(amplitude):
@@ -194,6 +210,9 @@ def test_a_step_across_the_lanes_edge_counts_half(order):
         "survival_time": pytest.approx(1 / 60),
         "time_out_of_lane": pytest.approx(0.5 / 60),
         "deviation": pytest.approx(0.11),
+        "early_distance": pytest.approx(0.01),
+        "early_offset": pytest.approx(-0.11),
+        "speed": pytest.approx(60 * math.hypot(0.02, 0.02)),
     }
 
 

@@ -1,9 +1,11 @@
+import numpy as np
 import pytest
 
 from proxytune.errors import EpisodeError
 from proxytune.study.measure import measure
 from proxytune.study.progress import Silent
 from proxytune.study.settings import read_study_settings
+from proxytune.usefulness import noise_floor
 
 
 @pytest.fixture
@@ -32,6 +34,25 @@ def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_s
     assert (measure(one, model, 1002, Silent()).values != table.values).all()
     model.write_text("trim = 0.1\n")
     assert (measure(one, model, 1001, Silent()).values != table.values).any()
+
+
+def test_repeats_have_noise_of_their_own_and_the_first_is_what_one_alone_would_be(make_study, model):
+    settings = read_study_settings(make_study())
+    once, thrice = measure(settings, model, 1001, Silent()), measure(settings, model, 1001, Silent(), 3)
+    assert thrice.episodes == ("0/0", "0/1", "0/2", "1/0", "1/1", "1/2", "2/0", "2/1", "2/2")
+    assert thrice.complete
+    assert (thrice.values[:, ::3] == once.values).all()
+    for agent in thrice.values:
+        assert len(np.unique(agent[:, 0])) == 9
+    again = measure(settings, model, 1001, Silent(), 3)
+    assert (again.values == thrice.values).all()
+
+
+def test_a_target_of_repeats_has_a_floor_of_the_same_starts(make_study, model):
+    settings = read_study_settings(make_study())
+    once, twice = (measure(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))
+    assert noise_floor(target=twice, metrics=settings.metrics).kind == "same starts"
+    assert noise_floor(target=once, metrics=settings.metrics).kind == "halves"
 
 
 def test_the_study_needs_no_target_yet(make_study, model):

@@ -1,9 +1,10 @@
 """One call gives every measure of a proxy, and says what is missing."""
 
 import numpy as np
+import pytest
 
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import assess, kendall_tau, mmrv, ppv, prpv, srcc
+from proxytune.usefulness import assess, floor_of_repeats, kendall_tau, mmrv, ppv, prpv, srcc
 
 M = (Metric("m"), Metric("n", "min"))
 
@@ -52,7 +53,74 @@ def test_few_episodes_are_warned_of():
     assert not any("are few" in note for note in assess(proxy=table(1), target=table(2), metrics=M).notes)
 
 
-def test_a_proxy_within_the_targets_noise_is_said_to_be():
-    found = assess(proxy=table(2), target=table(2), metrics=M)
-    assert found.at_noise_floor
-    assert any("cannot be told from a perfect one" in note for note in found.notes)
+PERFECT = "cannot be told from a perfect one"
+CLEAR = (Metric("m"),)
+"""By this metric alone agents are in a clear order."""
+
+
+def again(one, noise=0.1, seed=9):
+    """The same domain from the same starts under other noise."""
+    values = one.values + noise * np.random.default_rng(seed).normal(size=one.values.shape)
+    return ScoreTable(one.agents, one.episodes, one.metrics, values)
+
+
+def test_a_proxy_within_the_noise_of_the_same_starts_is_said_to_be():
+    target = table(2, agents=8)
+    floor = floor_of_repeats(domain=target, again=again(target), metrics=CLEAR)
+    found = assess(proxy=target, target=target, metrics=CLEAR, floor=floor)
+    assert found.noise_floor is floor
+    assert found.at_noise_floor is True
+    assert any(PERFECT in note for note in found.notes)
+
+
+def test_a_proxy_above_the_floor_is_not():
+    target = table(2, agents=8)
+    floor = floor_of_repeats(domain=target, again=target, metrics=CLEAR)
+    found = assess(proxy=table(3, agents=8), target=target, metrics=CLEAR, floor=floor)
+    assert found.prpv.value > floor.high
+    assert found.at_noise_floor is False
+    assert not any(PERFECT in note for note in found.notes)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_halves_never_show_that_a_proxy_is_perfect(seed):
+    target = table(seed, agents=8)
+    found = assess(proxy=target, target=target, metrics=CLEAR)
+    assert found.noise_floor.kind == "halves"
+    assert found.prpv.value == 0
+    assert found.at_noise_floor is None
+    assert not any(PERFECT in note for note in found.notes)
+    assert any("does not show that the proxy is perfect" in note for note in found.notes)
+
+
+def test_above_what_halves_score_nothing_is_said_of_them():
+    target, worst = table(2, agents=8), table(2, agents=8)
+    worst = ScoreTable(worst.agents, worst.episodes, worst.metrics, -worst.values)
+    found = assess(proxy=worst, target=target, metrics=CLEAR)
+    assert found.prpv.value > found.noise_floor.high
+    assert not any("halves" in note for note in found.notes)
+
+
+def test_what_chance_explains_is_no_perfect_proxy_and_is_said_to_be_chance():
+    """Of three agents every order comes by chance too often."""
+    target = table(2, agents=3)
+    floor = floor_of_repeats(domain=target, again=again(target), metrics=CLEAR)
+    found = assess(proxy=target, target=target, metrics=CLEAR, floor=floor)
+    assert found.prpv.value == 0 <= floor.high
+    assert found.chance.p_value >= 0.05
+    assert found.at_noise_floor is False
+    assert any(note.startswith("chance explains as much") for note in found.notes)
+    assert not any(PERFECT in note for note in found.notes)
+    sure = assess(proxy=table(2, agents=8), target=table(2, agents=8), metrics=CLEAR)
+    assert not any(note.startswith("chance") for note in sure.notes)
+
+
+def test_the_target_s_own_repeats_are_taken_where_it_has_them():
+    one = table(4, agents=8)
+    values = np.concatenate([one.values, again(one).values], axis=1)
+    labels = tuple(f"{episode}/{repeat}" for repeat in range(2) for episode in one.episodes)
+    target = ScoreTable(one.agents, labels, one.metrics, values)
+    found = assess(proxy=again(one, seed=5), target=target, metrics=CLEAR)
+    assert found.noise_floor.kind == "same starts"
+    assert found.at_noise_floor is True
+    assert found.inputs.paired

@@ -1,13 +1,16 @@
-"""The noise floor is the target against itself."""
+"""The noise floor is a domain against itself from the same starts; halves are called halves."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from proxytune.scores import Metric, ScoreTable, read_domains
-from proxytune.usefulness import noise_floor
+from proxytune.usefulness import floor_of_repeats, noise_floor
 from proxytune.usefulness.noise import split_halves
+from proxytune.usefulness.prpv import prpv_of_means
 
 SCORES = Path(__file__).parents[2] / "../shared/data/scores"
 M = (Metric("m"),)
@@ -18,6 +21,24 @@ def table(values):
     return ScoreTable(
         tuple(f"A{i}" for i in range(agents)), tuple(map(str, range(episodes))), ("m",), values[:, :, None]
     )
+
+
+def repeated(values, repeats):
+    """A table of START/REPEAT from values of shape (agents, starts · repeats)."""
+    plain = table(values)
+    labels = (f"{episode // repeats}/{episode % repeats}" for episode in range(values.shape[1]))
+    return ScoreTable(plain.agents, tuple(labels), plain.metrics, plain.values)
+
+
+def planted(seed, starts=6, noise=0.2):
+    """Twelve agents whose order depends strongly on the start, measured twice under a little placement noise."""
+    rng = np.random.default_rng(seed)
+    truth = rng.normal(size=(12, 1)) + 3.0 * rng.normal(size=(12, starts))
+    return tuple(truth + noise * rng.normal(size=truth.shape) for _ in range(2)), rng
+
+
+def interleaved(one, two):
+    return np.stack([one, two], axis=2).reshape(len(one), -1)
 
 
 def test_episodes_without_noise_have_no_floor_above_zero():
@@ -52,7 +73,80 @@ def test_agents_with_the_same_episodes_are_split_alike():
 def test_one_episode_gives_no_floor_and_says_why():
     result = noise_floor(target=table(np.arange(3.0)[:, None]), metrics=M)
     assert result.value is None
+    assert result.kind == "none"
     assert "each agent has one episode on the target" in result.reason
+
+
+@given(seed=st.integers(0, 10_000), starts=st.integers(2, 5), repeats=st.integers(2, 5))
+def test_without_placement_noise_a_domain_has_a_floor_of_zero(seed, starts, repeats):
+    values = np.random.default_rng(seed).normal(size=(6, starts))
+    result = noise_floor(target=repeated(values.repeat(repeats, axis=1), repeats), metrics=M, splits=20)
+    assert (result.kind, result.value, result.high) == ("same starts", 0.0, 0.0)
+    same = floor_of_repeats(domain=table(values), again=table(values), metrics=M, resamples=20)
+    assert (same.kind, same.value, same.low, same.high) == ("same starts", 0.0, 0.0, 0.0)
+
+
+def test_with_strong_starts_and_little_noise_the_floor_lies_far_below_that_of_halves():
+    (one, two), _ = planted(1)
+    halves = noise_floor(target=table(interleaved(one, two)), metrics=M)
+    floor = noise_floor(target=repeated(interleaved(one, two), 2), metrics=M)
+    again = floor_of_repeats(domain=table(one), again=table(two), metrics=M)
+    assert (halves.kind, floor.kind, again.kind) == ("halves", "same starts", "same starts")
+    assert 0.0 < floor.value < 0.4 * halves.value
+    assert again.high < 0.4 * halves.value
+    assert again.low <= again.value <= again.high
+
+
+def test_the_floor_is_what_a_perfect_proxy_scores():
+    """Over 60 planted domains: a third measurement scores about the floor's value, and seldom more than its end."""
+    scored, values, within = [], [], []
+    for seed in range(60):
+        (one, two), rng = planted(seed, noise=1.0)
+        third = planted(seed, noise=0.0)[0][0] + rng.normal(size=one.shape)
+        perfect = float(prpv_of_means(third.mean(axis=1)[:, None], one.mean(axis=1)[:, None], M))
+        floor = floor_of_repeats(domain=table(one), again=table(two), metrics=M, resamples=200)
+        scored.append(perfect)
+        values.append(floor.value)
+        within.append(perfect <= floor.high)
+    assert np.mean(values) == pytest.approx(np.mean(scored), rel=0.15)
+    assert np.mean(within) >= 0.93
+
+
+def test_starts_are_paired_by_their_label_and_those_not_driven_both_times_left_out():
+    (one, _), rng = planted(2)
+    again = table(one).arrange(agents=table(one).agents, episodes=tuple("543210"))
+    holes = again.values.copy()
+    holes[0, 2], holes[3, :4] = np.nan, np.nan
+    again = ScoreTable(again.agents, again.episodes, again.metrics, holes)
+    found = floor_of_repeats(domain=table(one), again=again, metrics=M)
+    assert (found.value, found.low, found.high) == (0.0, 0.0, 0.0)
+    assert found.again.driven.sum() == again.driven.sum()
+    loud = ScoreTable(again.agents, again.episodes, again.metrics, holes + rng.normal(size=holes.shape))
+    assert floor_of_repeats(domain=table(one), again=loud, metrics=M).value > 0.0
+
+
+def test_both_sides_may_have_repeats():
+    (one, _), _ = planted(3)
+    domain, again = repeated(one.repeat(2, axis=1), 2), repeated(one.repeat(3, axis=1), 3)
+    assert floor_of_repeats(domain=domain, again=again, metrics=M).high == 0.0
+
+
+@pytest.mark.parametrize(
+    ("driven", "told"), [([], "'A5' drove no start both times"), ([0], "'A5' has one episode from starts driven both")]
+)
+def test_an_agent_with_less_than_two_starts_driven_both_times_gives_no_floor_but_a_reason(driven, told):
+    (one, two), _ = planted(4)
+    two[5, [column for column in range(6) if column not in driven]] = np.nan
+    two[5, 0] = two[4, 0] if driven else np.nan
+    found = floor_of_repeats(domain=table(one), again=table(two), metrics=M)
+    assert (found.kind, found.value, found.high) == ("none", None, None)
+    assert told in found.reason
+
+
+def test_tables_without_a_start_in_common_give_no_floor():
+    (one, two), _ = planted(5)
+    other = ScoreTable(table(two).agents, tuple("abcdef"), ("m",), two[:, :, None])
+    assert "both times" in floor_of_repeats(domain=table(one), again=other, metrics=M).reason
 
 
 @pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")

@@ -1,0 +1,147 @@
+"""What a search has learnt of θ from every output of its trials: the answer, the region, and whether the model fits."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from proxytune.search.composite import composed_scores
+from proxytune.search.design import from_unit, to_unit
+from proxytune.search.goal import Goal
+from proxytune.search.information import Information, information_of
+from proxytune.search.likelihood import Likelihood
+from proxytune.search.misfit import Misfit, misfit_of
+from proxytune.search.output_model import OutputModel, fit_outputs
+from proxytune.search.proposer import Trial, Values
+from proxytune.search.region import Posterior, posterior_of
+from proxytune.search.surrogate import Array, unit_array
+from proxytune.space import Space
+
+Ends = tuple[float, float]
+FRESH_DRAWS = 400
+UPPER = 97.5
+"""Percentile of fresh scores of the answer, up to which another θ cannot be told from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """What finished trials say of θ; everything is a function of them, the goal and the seed.
+
+    Attributes:
+        model: Of every output.
+        goal: The target.
+        trials: What it was learnt from.
+        seed: Seeds what is drawn.
+    """
+
+    model: OutputModel
+    goal: Goal
+    trials: tuple[Trial, ...]
+    seed: int
+
+    @property
+    def space(self) -> Space:
+        """The search box."""
+        return self.model.space
+
+    @cached_property
+    def likelihood(self) -> Likelihood:
+        """How well any θ explains the target's outputs."""
+        return Likelihood(self.model, self.goal)
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """θ given the target's outputs, over the unit cube."""
+        return posterior_of(self.likelihood.log, len(self.space.intervals))
+
+    @property
+    def intervals(self) -> Mapping[str, Ends]:
+        """The 95 % interval of every parameter."""
+        low, high = (from_unit(self.space, ends) for ends in self.posterior.intervals.T)
+        return {name: (low[row], high[row]) for row, name in enumerate(self.space.names)}
+
+    @property
+    def unidentified(self) -> tuple[str, ...]:
+        """The parameters whose interval fills more than 0.9 of their range."""
+        pairs = zip(self.space.names, self.posterior.unidentified, strict=True)
+        return tuple(name for name, flag in pairs if flag)
+
+    @property
+    def trades(self) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of parameters that make up for each other, with their correlation."""
+        names = self.space.names
+        return tuple((names[i], names[j], value) for i, j, value in self.posterior.trades)
+
+    def holds(self, values: Values) -> bool:
+        """Whether a θ of the box is in the 95 % region."""
+        return bool(self.likelihood.log(to_unit(self.space, values)[None])[0] >= self.posterior.threshold)
+
+    def scores(self, points: Sequence[Values]) -> tuple[Array, Array]:
+        """Mean and standard deviation of what PRPV is expected to be at points of the box, rough and noise left out."""
+        drawn = self._drawn(unit_array(self.space, points))
+        return drawn.mean(axis=0), drawn.std(axis=0)
+
+    def _drawn(self, unit: Array) -> Array:
+        return composed_scores(self.model, self.goal, self.seed)(unit)
+
+    @cached_property
+    def ranked(self) -> tuple[Values, ...]:
+        """The visited θ whose outputs are known, that of lowest expected PRPV first."""
+        visited = sorted({trial.values for trial in self.trials if trial.outcome is not None})
+        mean, _ = self.scores(visited)
+        return tuple(visited[row] for row in np.argsort(mean, kind="stable"))
+
+    @property
+    def answer(self) -> Values:
+        """The visited θ of lowest expected PRPV."""
+        return self.ranked[0]
+
+    @property
+    def likeliest(self) -> Values:
+        """The visited θ that explains the target's outputs best."""
+        density = self.likelihood.log(unit_array(self.space, self.ranked))
+        return self.ranked[int(np.argmax(density))]
+
+    def fresh_scores(self, values: Values) -> Array:
+        """PRPV that a θ would come to in fresh episodes, as drawn from the model, roughness and noise included."""
+        unit = unit_array(self.space, [values])
+        mean, variance = self.model.predict(unit)
+        known = np.where(np.isnan(self.model.constant), self.goal.values, self.model.constant)
+        middle = np.where(np.isnan(mean[0]), known, mean[0])
+        deviation = np.sqrt(np.nan_to_num(variance[0] + self.model.rough) + self.goal.noise / 2.0)
+        normal = np.random.default_rng(self.seed).standard_normal((FRESH_DRAWS, len(middle)))
+        return self.goal.compose(middle + normal * deviation)
+
+    @cached_property
+    def as_good(self) -> tuple[float, Mapping[str, Ends]]:
+        """The θ that PRPV cannot tell from the answer: their share of the box, and the ends of each parameter.
+
+        Their expected PRPV is not above what fresh episodes of the answer come to in 97.5 % of cases.
+        """
+        limit = float(np.percentile(self.fresh_scores(self.answer), UPPER))
+        box = posterior_of(lambda unit: -np.maximum(0.0, self._drawn(unit).mean(axis=0) - limit), len(self.space.names))
+        inside = box.points[box.density == 0.0]
+        found = np.vstack([inside, to_unit(self.space, self.answer)])
+        low, high = (from_unit(self.space, ends) for ends in (found.min(axis=0), found.max(axis=0)))
+        ends = {name: (low[row], high[row]) for row, name in enumerate(self.space.names)}
+        return len(inside) / len(box.points) * box.volume, ends
+
+    @cached_property
+    def misfit(self) -> Misfit:
+        """Whether any θ explains the target."""
+        return misfit_of(self.model, self.trials, self.goal, self.seed)
+
+    @cached_property
+    def information(self) -> tuple[Information, ...]:
+        """Which agents and metrics tell what of each parameter, in the order of the box."""
+        return information_of(self.likelihood, self.posterior.mode)
+
+
+def learn(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:
+    """Learn what finished trials say of θ; same trials in any order, same knowledge.
+
+    Raises:
+        RunError: If no trial has an outcome, or no output changes.
+    """
+    return Knowledge(fit_outputs(space, trials), goal, tuple(trials), seed)

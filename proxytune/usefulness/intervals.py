@@ -1,0 +1,57 @@
+"""Bootstrap intervals of the measures beside PRPV."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proxytune.scores import Array, Metric
+from proxytune.usefulness.comparison import Comparison
+from proxytune.usefulness.correlation import kendall_of_means, pearson_of_means
+from proxytune.usefulness.mmrv import mmrv_of_means
+from proxytune.usefulness.ppv import Ppv, ppv_of_means
+from proxytune.usefulness.resampling import bootstrap_means, in_blocks, interval, why_not_repeated
+
+Ends = tuple[float, float]
+UNDEFINED_SHARE = 0.05
+"""A measure undefined in more of the resamples than this gets no interval."""
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Percentile bootstrap intervals of the measures beside PRPV; None where one is undefined."""
+
+    ppv: Ends | None
+    srcc: Mapping[str, Ends | None]
+    kendall_tau: Mapping[str, Ends | None]
+    mmrv: Mapping[str, Ends | None]
+
+
+def intervals(*, inputs: Comparison, error: Ppv, resamples: int, seed: int) -> Intervals | None:
+    """Resample episodes for every measure at once; None where episodes are not repeated.
+
+    Args:
+        inputs: What is compared.
+        error: PPV, with the weights that it has.
+        resamples: How many to draw.
+        seed: Seed of the resampling.
+    """
+    if why_not_repeated(inputs):
+        return None
+    means = bootstrap_means(inputs, resamples=resamples, seed=seed)
+    weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])
+    return Intervals(
+        ppv=None if error.value is None else interval(ppv_of_means(*means, weights)),
+        srcc=_per_metric(inputs.metrics, pearson_of_means(*means)),
+        kendall_tau=_per_metric(inputs.metrics, in_blocks(kendall_of_means, *means)),
+        mmrv=_per_metric(inputs.metrics, in_blocks(lambda p, t: mmrv_of_means(p, t, inputs.metrics), *means)),
+    )
+
+
+def _per_metric(metrics: Sequence[Metric], values: Array) -> dict[str, Ends | None]:
+    """Intervals of values of shape (resamples, metrics)."""
+    undefined = np.isnan(values).mean(axis=0)
+    return {
+        metric.name: interval(column[~np.isnan(column)]) if share <= UNDEFINED_SHARE else None
+        for metric, column, share in zip(metrics, values.T, undefined, strict=True)
+    }

@@ -239,7 +239,8 @@ def test_pre_flight_cut_trials_and_confirmation_survive_being_stopped(make_study
 @pytest.mark.parametrize("engine", [name for name in ("gp", "outcomes") if name in STUDY_ENGINES])
 def test_a_study_killed_within_batches_gives_the_trials_of_one_that_was_not(make_study, launcher, engine, jobs, capsys):
     """To the last bit, with trials cut off and the answer confirmed, by `kill -9` alone."""
-    keys = {"engine": f'"{engine}"', "batch": "3", "initial": "4", "budget": "12", "cut_off": "true", "confirm": "1"}
+    phases = {"initial": "4", "budget": "12", "cut_off": "true", "confirm": "1"}
+    keys = {"engine": f'"{engine}"', "batch": "3", "seed": "6", **phases}
     whole = make_study("whole", **keys)
     assert main(["study", str(whole), "--json"]) == 0
     expected = json.loads(capsys.readouterr().out)

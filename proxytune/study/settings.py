@@ -18,7 +18,7 @@ FORMAT = 1
 OBJECTIVES = ("prpv", "plv")
 KEYS = (
     "format", "name", "family", "proxy", "target", "truth", "objective", "metrics", "agents",
-    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
+    "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
     "cut_off", "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
 
@@ -54,6 +54,7 @@ class StudySettings:
         starts: How many of the family's starting conditions, the first ones, each agent drives from.
         budget: How many trials.
         initial: How many of them come from the quasi-random design.
+        batch: How many trials are proposed together, and their episodes run together.
         engine: What proposes the others.
         seed: Seed of the episodes and of the search.
         jobs: How many processes run episodes.
@@ -79,6 +80,7 @@ class StudySettings:
     starts: int
     budget: int
     initial: int
+    batch: int
     engine: str
     seed: int
     jobs: int
@@ -125,6 +127,7 @@ def read_study_settings(path: Path) -> StudySettings:
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", low=1, high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
+        batch=read.whole("batch", 1, low=1, high=100_000),
         engine=read.text("engine", _default_engine(read), choices=STUDY_ENGINES),
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
@@ -196,6 +199,7 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "starts": settings.starts,
         "budget": settings.budget,
         "initial": settings.initial,
+        "batch": settings.batch,
         "engine": settings.engine,
         "seed": settings.seed,
         "jobs": settings.jobs,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from proxytune.search.composite import expected_gain
 from proxytune.search.engines import WITH_OUTPUTS
 from proxytune.search.gaussian_process import expected_improvement
+from proxytune.search.proposer import batch_at
 from proxytune.study.composition import goal_of, trials_of
 from proxytune.study.evaluate import plan
 from proxytune.study.history import as_trials
@@ -19,12 +20,15 @@ def stopped(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
     """Why a study with these finished trials runs no further, in one phrase; empty while it goes on.
 
     Only finished trials and the time of their own episodes count, never the clock of this process: a study that was
-    stopped stays so when it is run again, and without the rule it goes on to the trials it would have had anyway.
+    stopped stays so when it is run again, and without the rule it goes on to the trials it would have had anyway. Rules
+    are asked where a batch has ended: a budget that cut one short has no say in what they would have said of the whole.
     """
     settings = study.settings
     if len(done) >= settings.budget:
         kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
         return f"the budget of {settings.budget} trials is spent{kept}"
+    if batch_at(len(done), settings.batch, settings.initial).start < len(done):
+        return ""
     return _out_of_time(settings, store, done) or _nothing_to_gain(study, store, done)
 
 

@@ -17,8 +17,8 @@ from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
 
-UNSAID = "gp"
-"""The engine of a study.db that names none."""
+UNSAID = {"batch": 1, "engine": "gp"}
+"""What a study.db that names none of these was run with."""
 
 
 @dataclass(frozen=True)
@@ -109,15 +109,17 @@ def facts(study: Study) -> dict[str, Any]:
     """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
 
     Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
-    identity covers it. The engine `gp` goes without saying, as it did when there was no other. An engine that learns
-    from every output depends on the whole of the target's table, and on the pre-flight's noise.
+    identity covers it. The engine `gp` goes without saying, as it did when there was no other, and so do batches of one
+    trial. An engine that learns from every output depends on the whole of the target's table, and on the pre-flight's
+    noise.
     """
     settings = study.settings
-    engine: dict[str, Any] = {} if settings.engine == UNSAID else {"engine": settings.engine}
+    named: dict[str, Any] = {"batch": settings.batch, "engine": settings.engine}
+    said = {key: value for key, value in named.items() if value != UNSAID[key]}
     compared = [metric.name for metric in settings.metrics]
     learns = settings.engine in WITH_OUTPUTS
     if learns:
-        engine["preflight"] = settings.preflight
+        said["preflight"] = settings.preflight
     return {
         "family": settings.family,
         "target": _table_digest(study.target if learns else study.target.select(compared)),
@@ -127,7 +129,7 @@ def facts(study: Study) -> dict[str, Any]:
         "starts": settings.starts,
         "initial": settings.initial,
         "seed": settings.seed,
-        **engine,
+        **said,
         "cut_off": settings.cut_off,
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
@@ -149,8 +151,7 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
 def _change(key: str, before: Any, after: Any) -> str:
     if key == "target":
         return "target (its contents)"
-    if key == "engine" and before is None:
-        before = UNSAID
+    before = UNSAID.get(key) if before is None else before
     shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
     return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
 

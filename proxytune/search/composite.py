@@ -1,7 +1,7 @@
 """Bayesian optimisation of a composite score: expected improvement of PRPV composed of modelled outputs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -49,7 +49,19 @@ def most_improving(space: Space, trials: Sequence[Trial], goal: Goal, seed: int)
         RunError: If no trial has an outcome.
     """
     with threadpool_limits(limits=1):
-        return from_unit(space, _most_improving(fit_outputs(space, trials), trials, goal, seed)[0])
+        model = _believed(fit_outputs(space, trials), trials)
+        return from_unit(space, _most_improving(model, trials, goal, seed)[0])
+
+
+def _believed(model: OutputModel, trials: Sequence[Trial]) -> OutputModel:
+    """The model as if every pending trial had come out as expected, so that it is worth no second look."""
+    pending = [trial for trial in trials if trial.pending]
+    if not pending or not model.groups:
+        return model
+    mean, _ = model.predict(unit_array(model.space, [trial.values for trial in pending]))
+    told = [replace(trial, outcome=tuple(row)) for trial, row in zip(pending, mean.tolist(), strict=True)]
+    finished = [trial for trial in trials if not trial.pending]
+    return fit_outputs(model.space, [*finished, *told], model.kernel)
 
 
 def expected_gain(space: Space, trials: Sequence[Trial], goal: Goal, seed: int) -> tuple[float, float]:
@@ -89,7 +101,7 @@ def composed_scores(model: OutputModel, goal: Goal, seed: int) -> Callable[[Arra
 
     def scores(points: Array) -> Array:
         mean, variance = _every_output(model, goal, points)
-        return np.stack([goal.compose(mean + np.sqrt(variance) * row) for row in normal])
+        return np.stack([goal.compose(_at_most(model, mean + np.sqrt(variance) * row)) for row in normal])
 
     return scores
 
@@ -98,7 +110,16 @@ def fresh_scores(model: OutputModel, goal: Goal, point: Array, seed: int) -> Arr
     """Scores that a point of the unit cube would come to in fresh episodes, roughness and noise included, (draws,)."""
     mean, variance = _every_output(model, goal, point[None])
     deviation = np.sqrt(variance + np.nan_to_num(model.rough) + goal.noise / 2.0)
-    return goal.compose(mean + deviation * np.random.default_rng(seed).standard_normal((FRESH_DRAWS, model.outputs)))
+    drawn = mean + deviation * np.random.default_rng(seed).standard_normal((FRESH_DRAWS, model.outputs))
+    return goal.compose(_at_most(model, drawn))
+
+
+def _at_most(model: OutputModel, drawn: Array) -> Array:
+    """Outputs (…, outputs) that come to their bound where they are beyond it, or as near as they are rough.
+
+    Agents that survive the whole episode tie with each other, which a smooth function alone would never show.
+    """
+    return np.where(drawn > model.bound - np.sqrt(np.nan_to_num(model.rough)), model.bound, drawn)
 
 
 def _every_output(model: OutputModel, goal: Goal, points: Array) -> tuple[Array, Array]:

@@ -3,9 +3,9 @@
 All trials share the placement noise of the study's seed, so the θ that the search likes best also suits that noise.
 The candidates (the visited θ of lowest expected PRPV given all trials, the one that explains the target's outputs best,
 and others not more than a standard deviation of a fresh score's noise behind) get episodes under seeds that the search
-has not seen. The answer is the candidate of lowest expected PRPV given trials and fresh episodes; what fresh episodes
-say of it beside the search's own is how much of that was luck. They tell the noise floor too: what the same domain
-scores against itself from the same starts. No trial depends on any of this.
+has not seen. The answer is the candidate whose expected PRPV and fresh scores are lowest on average; what fresh
+episodes say of it beside the search's own is how much of that was luck. They tell the noise floor too: what the same
+domain scores against itself from the same starts. No trial depends on any of this.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,8 +16,7 @@ import numpy as np
 from proxytune.domain import Episode
 from proxytune.scores import ScoreTable
 from proxytune.search.knowledge import learn
-from proxytune.search.proposer import Trial
-from proxytune.study.composition import goal_of, outputs_of, trials_of
+from proxytune.study.composition import goal_of, trials_of
 from proxytune.study.evaluate import Spent, known_outcomes, plan, run_missing, score, table
 from proxytune.study.objective import FRESH
 from proxytune.study.progress import Watcher
@@ -38,13 +37,11 @@ class Candidate:
     Attributes:
         trial: The trial that visited it.
         scores: PRPV of each fresh repetition of it; None where an agent has no episode that worked.
-        told: Each fresh repetition as a search would see it.
         assessment: How useful the proxy is there, over all fresh episodes; None if an agent has none that worked.
     """
 
     trial: TrialRecord
     scores: tuple[int | None, ...]
-    told: tuple[Trial, ...]
     assessment: Assessment | None
 
     @property
@@ -59,7 +56,7 @@ class Confirmation:
     """What fresh episodes say.
 
     Attributes:
-        answer: The candidate of lowest expected PRPV given trials and fresh episodes.
+        answer: The candidate whose expected PRPV and fresh scores are lowest on average.
         candidates: All that were driven again, the search's own favourite first.
         episodes: How many fresh episodes each was driven in.
     """
@@ -112,11 +109,11 @@ def candidates(study: Study, store: Store, trials: Sequence[TrialRecord]) -> lis
     # Of a trial that was cut off it is certain that it is none of the best.
     scored = {space.values(trial.theta): trial for trial in trials if trial.prpv is not None}
     known = learn(space, trials_of(study, store, trials), goal_of(study, store), study.settings.seed)
-    ranked = [values for values in known.ranked if values in scored]
-    means, _ = known.scores(ranked)
-    noise = float(known.fresh_scores(ranked[0]).std())
-    near = [values for values, mean in zip(ranked, means, strict=True) if mean - means[0] <= noise]
-    likeliest = known.likeliest_of(ranked)
+    expected = {values: mean for values, mean in known.expected.items() if values in scored}
+    best = min(expected, key=expected.__getitem__)
+    noise = float(known.fresh_scores(best).std())
+    near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
+    likeliest = known.likeliest_of(list(expected))
     return [scored[values] for values in dict.fromkeys([near[0], likeliest, *near[1:]])][:CANDIDATES]
 
 
@@ -144,10 +141,8 @@ def _driven_again(study: Study, store: Store, trial: TrialRecord) -> Candidate |
             return None
         runs.append(list(known.values()))
     scores = tuple(score(study, trial.theta, outcomes).prpv for outcomes in runs)
-    values = study.settings.space.values(trial.theta)
-    again = tuple(Trial(values, one, outputs_of(study, run)) for one, run in zip(scores, runs, strict=True))
     own = list(known_outcomes(study, store, plan(study.settings, trial.theta, study.settings.seed)).values())
-    return Candidate(trial, scores, again, _assessed(study, own, runs))
+    return Candidate(trial, scores, _assessed(study, own, runs))
 
 
 def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
@@ -170,8 +165,8 @@ def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]
 
 def _answer(study: Study, store: Store, trials: Sequence[TrialRecord], known: Sequence[Candidate]) -> Candidate:
     """Each candidate has as many fresh episodes, so what fresh noise does to all of them alike favours none."""
-    space = study.settings.space
-    fresh = [told for one in known for told in one.told]
-    learnt = learn(space, [*trials_of(study, store, trials), *fresh], goal_of(study, store), study.settings.seed)
-    means, _ = learnt.scores([space.values(one.trial.theta) for one in known])
-    return known[int(np.argmin(means))]
+    values = study.settings.space.values
+    trials_told = trials_of(study, store, trials)
+    expected = learn(study.settings.space, trials_told, goal_of(study, store), study.settings.seed).expected
+    scores = [[expected[values(one.trial.theta)], *(s for s in one.scores if s is not None)] for one in known]
+    return known[int(np.argmin([np.mean(each) for each in scores]))]

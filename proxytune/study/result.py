@@ -31,7 +31,7 @@ class Best:
 
     Attributes:
         trial: The trial that visited it.
-        posterior_mean: PRPV that is expected there, composed of the outputs as all trials tell them.
+        posterior_mean: PRPV that is expected there in fresh episodes.
         posterior_deviation: Its standard deviation.
         assessment: How useful the proxy is there in the trial's own episodes, by every measure, with noise floor and
             chance level.
@@ -156,8 +156,7 @@ def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | N
 
 def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialRecord | None, ...]:
     scored = [trial for trial in trials if trial.prpv is not None]
-    means, _ = learnt.scores([learnt.space.values(trial.theta) for trial in scored])
-    expected = {trial.number: float(mean) for trial, mean in zip(scored, means, strict=True)}
+    expected = {trial.number: learnt.expected[learnt.space.values(trial.theta)] for trial in scored}
     found: list[TrialRecord | None] = []
     best: TrialRecord | None = None
     for trial in trials:
@@ -173,11 +172,12 @@ def _cautions(study: Study, store: Store) -> tuple[str, ...]:
 
 
 def _best(study: Study, store: Store, answer: TrialRecord, learnt: Knowledge) -> Best:
-    mean, deviation = learnt.scores([learnt.space.values(answer.theta)])
+    values = learnt.space.values(answer.theta)
+    _, deviation = learnt.scores([values])
     proxy = known_evaluation(study, store, answer).proxy
     assert proxy is not None
     assessment = assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
-    return Best(answer, float(mean[0]), float(deviation[0]), assessment)
+    return Best(answer, learnt.expected[values], float(deviation[0]), assessment)
 
 
 def known_evaluation(study: Study, store: Store, trial: TrialRecord) -> Evaluation:

@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 METRICS = ("distance", "survival_time", "early_distance", "early_offset")
 COMPARED = (Metric("distance"), Metric("survival_time"))
 LONGEST, ALMOST = 20.0, 18.5
-"""An agent that is not stopped drives for so long [s], and is tied with all that do. Next to none is between the two:
-if one start of four ends early, the mean is lower. So as many are tied as in the simulator."""
+"""An agent that is not stopped drives for so long [s], and is tied with all that do. If one start of four ends early, the
+mean is lower by seconds; so whoever is above the second is taken for one that is not stopped."""
 FRESH_DRAWS = 64
 
 
@@ -95,8 +95,8 @@ class Calibrated:
 def replaced(means: Array, count: int, generator: np.random.Generator) -> Array:
     """The outputs under so many other placements, shape (count, outputs).
 
-    Each agent changes as it did in one of the placements that were simulated: if it is not stopped, in one of those that
-    left its survival as it was, otherwise in one of those that did not.
+    Each agent changes as it did in one of the placements that were simulated: if it is not stopped, in one of those
+    that left its survival as it was, otherwise in one of those that did not.
     """
     by_agent = means.reshape(-1, len(METRICS))
     changes = simulated().placements.reshape(-1, *by_agent.shape)

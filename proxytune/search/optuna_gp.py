@@ -1,13 +1,11 @@
 """Optuna's Gaussian-process sampler, where Optuna and PyTorch are installed; for comparison only."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from proxytune.search.one_thread import on_one_thread
 from proxytune.search.proposer import Trial, Values, proposal_seed
-from proxytune.search.tree_parzen import quiet
+from proxytune.search.tree_parzen import quiet, suggested
 from proxytune.space import Space
 
 
@@ -20,15 +18,9 @@ class OptunaGP:
     """
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point, a function of the trials in their order and the seed alone; every trial needs a score."""
+        """The next point, a function of the seed and the trials in their order; those not pending need a score."""
         import optuna
 
-        box: dict[str, Any] = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
-        with quiet(optuna.logging), warnings.catch_warnings(), on_one_thread():
-            warnings.simplefilter("ignore")
+        with quiet(optuna.logging), on_one_thread():
             sampler = optuna.samplers.GPSampler(seed=proposal_seed(seed, len(trials)), n_startup_trials=1)
-            study = optuna.create_study(sampler=sampler, direction="minimize")
-            for trial in trials:
-                theta = space.theta(trial.values)
-                study.add_trial(optuna.trial.create_trial(params=theta, distributions=box, value=trial.score))
-            return space.values(study.ask(box).params)
+            return suggested(optuna, sampler, space, trials)

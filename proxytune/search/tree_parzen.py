@@ -1,5 +1,6 @@
 """Optuna's tree-structured Parzen estimator, where Optuna is installed."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,29 +15,39 @@ class TreeParzen:
     """Proposes what Optuna's TPE sampler suggests, with its defaults but for the start: the design stands in for it.
 
     Optuna's study is built anew from the trials at every proposal, in memory, so nothing is remembered. Its sampler
-    weighs later trials more, so the order of the trials counts.
+    weighs later trials more, so the order of the trials counts. Pending trials are running ones to it, which it takes
+    for bad ("constant liar").
     """
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point, a function of the trials in their order and the seed alone; every trial needs a score."""
+        """The next point, a function of the seed and the trials in their order; those not pending need a score."""
         import optuna
 
-        box: dict[str, Any] = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
-        sampler = optuna.samplers.TPESampler(n_startup_trials=1, seed=proposal_seed(seed, len(trials)))
+        drawn = proposal_seed(seed, len(trials))
         with quiet(optuna.logging):
-            study = optuna.create_study(sampler=sampler, direction="minimize")
-            for trial in trials:
-                theta = space.theta(trial.values)
-                study.add_trial(optuna.trial.create_trial(params=theta, distributions=box, value=trial.score))
-            return space.values(study.ask(box).params)
+            sampler = optuna.samplers.TPESampler(n_startup_trials=1, seed=drawn, constant_liar=True)
+            return suggested(optuna, sampler, space, trials)
+
+
+def suggested(optuna: Any, sampler: Any, space: Space, trials: Sequence[Trial]) -> Values:
+    """What a sampler of Optuna suggests after these trials; pending ones are running to it."""
+    box = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
+    study = optuna.create_study(sampler=sampler, direction="minimize")
+    for trial in trials:
+        theta = space.theta(trial.values)
+        state = optuna.trial.TrialState.RUNNING if trial.pending else optuna.trial.TrialState.COMPLETE
+        study.add_trial(optuna.trial.create_trial(params=theta, distributions=box, value=trial.score, state=state))
+    return space.values(study.ask(box).params)
 
 
 @contextmanager
 def quiet(logging: Any) -> Iterator[None]:
-    """Without the lines that Optuna writes for every study it makes, and of what would make it faster."""
+    """Without the lines that Optuna writes: of every study, of what is experimental, of what would be faster."""
     before = logging.get_verbosity()
     logging.set_verbosity(logging.ERROR)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     finally:
         logging.set_verbosity(before)

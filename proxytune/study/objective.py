@@ -54,7 +54,7 @@ class StudyObjective:
 
     def identity_without(self, named: Sequence[str]) -> str:
         """The same, but for some of the study's facts."""
-        left_out = {"seed", "initial", "engine", "cut_off", *named}
+        left_out = {"seed", "initial", "batch", "engine", "cut_off", *named}
         return repr(sorted((key, value) for key, value in facts(self.study).items() if key not in left_out))
 
     def score(self, values: Values, seed: int) -> float | None:

@@ -62,8 +62,8 @@ class Objective(Protocol):
         """What the outcomes are to come to; None where a score has no such parts."""
         ...
 
-    def regret(self, values: Values, seed: int) -> float | None:
-        """How much worse than the optimum a visited point is, as well as that is known without further simulation."""
+    def regret(self, values: Values, seed: int, lowest: float = math.inf) -> float | None:
+        """How much worse than the optimum a visited point is; if no less than `lowest`, anything no less will do."""
         ...
 
     def fresh_score(self, values: Values, seed: int) -> float | None:
@@ -115,7 +115,7 @@ class Analytic:
     def goal(self, seed: int) -> None:
         """A formula has no parts."""
 
-    def regret(self, values: Values, seed: int) -> float:
+    def regret(self, values: Values, seed: int, lowest: float = math.inf) -> float:
         """The score without noise; 0 at the optimum."""
         blur, pitch, delay, trim = to_unit(self.space, values) - to_unit(self.space, self.truth(seed))
         far = math.hypot(2.5 * trim, 1.5 * (delay + 0.5 * blur), 1.2 * pitch, 0.3 * blur)

@@ -1,6 +1,7 @@
 """A stand-in for a study whose agents' metrics are a simulator's: nothing of it is made up but courses between 48 θ."""
 
 import hashlib
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +21,8 @@ Array = NDArray[np.float64]
 METRICS = ("distance", "survival_time", "early_distance", "early_offset")
 COMPARED = (Metric("distance"), Metric("survival_time"))
 LONGEST, ALMOST = 20.0, 18.5
-"""An agent that is not stopped drives for so long [s], and is tied with all that do. If one start of four ends early, the
-mean is lower by seconds; so whoever is above the second is taken for one that is not stopped."""
+"""An agent that is not stopped drives for so long [s], and is tied with all that do. If one start of four ends early,
+the mean is lower by seconds; so whoever is above the second is taken for one that is not stopped."""
 FRESH_DRAWS = 64
 
 
@@ -79,7 +80,7 @@ class Calibrated:
         fresh = replaced(self.means(values, seed), FRESH_DRAWS, _generator(values, seed, 5))
         return float(_prpv(fresh, self.target(seed)).mean())
 
-    def regret(self, values: Values, seed: int) -> float:
+    def regret(self, values: Values, seed: int, lowest: float = math.inf) -> float:
         """That above the truth's."""
         return self.fresh_score(values, seed) - self.fresh_score(self.truth(seed), seed)
 

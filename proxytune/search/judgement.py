@@ -36,7 +36,8 @@ class Judgement:
     """What an engine achieved.
 
     Attributes:
-        regrets: Regret of every visited point, in order; None where the trial failed.
+        regrets: Regret of every visited point, in order, or of one no better than those before it a figure that is no
+            less than theirs; None where the trial failed.
         answer: The visited point that a study would report.
         answer_score: Its score, free of the noise that the engine has seen; None where it failed.
         answer_regret: Its regret, free of that noise; None where it failed.
@@ -85,7 +86,7 @@ def judge(objective: Objective, visited: Sequence[Values], seed: int, *, by_outp
     known = None if goal is None else learn(objective.space, trials, goal, seed)
     answer = known.answer if known and by_outputs else fit_surrogate(objective.space, trials).incumbent()[0]
     return Judgement(
-        regrets=tuple(objective.regret(values, seed) for values in visited),
+        regrets=_regrets(objective, visited, seed),
         answer=answer,
         answer_score=objective.fresh_score(answer, seed),
         answer_regret=objective.fresh_regret(answer, seed),
@@ -93,6 +94,15 @@ def judge(objective: Objective, visited: Sequence[Values], seed: int, *, by_outp
         reading=None if known is None else _read(known, objective.truth(seed)),
         code=judging_code(),
     )
+
+
+def _regrets(objective: Objective, visited: Sequence[Values], seed: int) -> tuple[float | None, ...]:
+    lowest, found = math.inf, []
+    for values in visited:
+        regret = objective.regret(values, seed, lowest)
+        lowest = min(lowest, math.inf if regret is None else regret)
+        found.append(regret)
+    return tuple(found)
 
 
 def _read(known: Knowledge, truth: Values | None) -> Reading:

@@ -1,5 +1,6 @@
 """A stand-in for a study with agents, metrics and episodes: slower than the analytic one, nearer to what PRPV is."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +79,7 @@ class Ranking:
         noise = np.full(len(names), 2.0 * SPREAD**2 / EPISODES)
         return Goal(names, table.means.ravel(), noise, lambda outcomes: _composed(outcomes, table.means))
 
-    def regret(self, values: Values, seed: int) -> float:
+    def regret(self, values: Values, seed: int, lowest: float = math.inf) -> float:
         """PRPV without noise on either side."""
         return float(prpv_of_means(self.means(values, seed), self.means(self.truth(seed), seed), METRICS))
 

@@ -1,5 +1,6 @@
 """A study as something that engines are compared on: each seed is a study of its own, simulated once."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -74,7 +75,7 @@ class StudyObjective:
         run_preflight(seeded, self.store, self.watcher)
         return goal_of(seeded, self.store)
 
-    def regret(self, values: Values, seed: int) -> float | None:
+    def regret(self, values: Values, seed: int, lowest: float = math.inf) -> float | None:
         """The score above the noise floor."""
         return self._above(self.score(values, seed))
 

@@ -1,5 +1,6 @@
 """A study with a truth of its own for every seed: how well a search finds what made a target is then known."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -81,10 +82,13 @@ class TruthObjective:
         """The target's mean metrics, noise by this seed's pre-flight, and PRPV."""
         return self._of(seed).goal(seed)
 
-    def regret(self, values: Values, seed: int) -> float | None:
-        """PRPV above the truth's: where its own is not above that, the larger of its own and that of fresh episodes."""
+    def regret(self, values: Values, seed: int, lowest: float = math.inf) -> float | None:
+        """PRPV above the truth's: where its own is not above that, the larger of its own and that of fresh episodes.
+
+        These are left out where its own is no lower than the lowest so far.
+        """
         own, level = self.score(values, seed), self._level(seed)
-        if own is None or own > level:
+        if own is None or own > level or own - level >= lowest:
             return None if own is None else own - level
         fresh = self.fresh_score(values, seed)
         return None if fresh is None else max(own, fresh) - level

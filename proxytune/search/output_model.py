@@ -9,14 +9,14 @@ one at a time scales its variance, so an output that the kernel does not suit is
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import Kernel
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from proxytune.errors import RunError
 from proxytune.search.proposer import Trial
@@ -108,7 +108,7 @@ class OutputModel:
         """
         mean, variance = (np.full((len(points), self.outputs), np.nan) for _ in range(2))
         smooth = self.kernel.k1
-        with threadpool_limits(limits=1):
+        with _libraries().limit(limits=1):
             for group in self.groups:
                 near = smooth(points, group.visited)
                 left = smooth.diag(points) - np.einsum("ij,jk,ik->i", near, group.inverse, near, optimize=True)
@@ -158,6 +158,12 @@ def fit_outputs(space: Space, trials: Sequence[Trial], kernel: Kernel | None = N
     with np.errstate(invalid="ignore"):
         constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)
     return OutputModel(space, kernel, groups, constant, _bounds(outputs), visited)
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """Found once: looking for them takes as long as a prediction."""
+    return ThreadpoolController()
 
 
 def _fitted_kernel(visited: Array, outputs: Array) -> Kernel:

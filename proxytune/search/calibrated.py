@@ -32,7 +32,7 @@ class Calibrated:
 
     Per seed a draw of all agents' mean metrics given those simulated at 48 θ, with the roughness that was found round
     them; the truth is drawn from the middle 80 % of the box, and its outputs, with the noise of another placement, are
-    the target. Regret is PRPV above the truth's, both the mean over 64 fresh placements; the floor is one pair reversed.
+    the target. Regret is PRPV above the truth's, both the mean over 64 fresh placements; the floor is a pair reversed.
     """
 
     name: str = "calibrated"
@@ -66,7 +66,7 @@ class Calibrated:
     def target(self, seed: int) -> Array:
         """The truth's outputs under another placement."""
         truth = self.truth(seed)
-        return replaced(self.means(truth, seed), 1, _generator(truth, seed, 4))[0]
+        return np.asarray(replaced(self.means(truth, seed), 1, _generator(truth, seed, 4))[0])
 
     def goal(self, seed: int) -> Goal:
         """The target's mean metrics, and PRPV of such."""

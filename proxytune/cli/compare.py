@@ -66,8 +66,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         keys = _keys(objective, engines, arguments.seeds, budget, initial)
         runs = _finished(objective, keys, output / FILE_NAME, jobs)
     grouped = [[runs[key] for key in keys if key.engine == engine] for engine in engines]
-    names = objective.space.names
-    summaries = [summarise(group, grouped[0], objective.tolerance, names) for group in grouped]
+    summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
     return _answer(objective, summaries, grouped, output)
 
 

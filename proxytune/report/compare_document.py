@@ -73,7 +73,7 @@ def _table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) 
     table = Table(box=None, pad_edge=False, title=title, title_justify="left")
     table.add_column("engine")
     for column in columns:
-        table.add_column(column, justify="right", vertical="bottom")
+        table.add_column(column, justify="right")
     for row in rows:
         table.add_row(*row)
     return table

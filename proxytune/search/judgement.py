@@ -26,7 +26,7 @@ class Reading:
 
     share: float
     holds: bool | None
-    intervals_hold: tuple[bool, ...] | None
+    intervals_hold: Mapping[str, bool] | None
     p_value: float | None
     fits: bool | None
 
@@ -108,8 +108,8 @@ def _regrets(objective: Objective, visited: Sequence[Values], seed: int) -> tupl
 def _read(known: Knowledge, truth: Values | None) -> Reading:
     held = None
     if truth is not None:
-        ends = known.intervals.values()
-        held = tuple(bool(low <= value <= high) for value, (low, high) in zip(truth, ends, strict=True))
+        values = known.space.theta(truth)
+        held = {name: bool(low <= values[name] <= high) for name, (low, high) in known.intervals.items()}
     misfit = known.misfit
     holds = None if truth is None else known.holds(truth)
     return Reading(known.posterior.share, holds, held, misfit.p_value, misfit.fits)
@@ -130,10 +130,4 @@ def judgement_from(document: Mapping[str, Any]) -> Judgement:
     fields = dict(document)
     reading = fields.pop("reading")
     regrets, answer = (tuple(fields.pop(name)) for name in ("regrets", "answer"))
-    return Judgement(regrets=regrets, answer=answer, reading=None if reading is None else _reading(reading), **fields)
-
-
-def _reading(document: Mapping[str, Any]) -> Reading:
-    fields = dict(document)
-    held = fields.pop("intervals_hold")
-    return Reading(intervals_hold=None if held is None else tuple(held), **fields)
+    return Judgement(regrets=regrets, answer=answer, reading=None if reading is None else Reading(**reading), **fields)

@@ -73,15 +73,8 @@ class EngineSummary:
     seconds: float
 
 
-def summarise(runs: Sequence[Run], first: Sequence[Run], tolerance: float, names: Sequence[str]) -> EngineSummary:
-    """Sum up the runs of one engine against those of the first on the same seeds, both in the order of the seeds.
-
-    Args:
-        runs: Of the engine.
-        first: Of the engine that it is compared with.
-        tolerance: Regret that cannot be told from none.
-        names: The parameters.
-    """
+def summarise(runs: Sequence[Run], first: Sequence[Run], tolerance: float) -> EngineSummary:
+    """Sum up the runs of one engine against those of the first on the same seeds, both in the order of the seeds."""
     needed, firsts = _needed(runs, tolerance), _needed(first, tolerance)
     errors = [run.judgement.error for run in runs if run.judgement.error is not None]
     other = runs[0].key.engine != first[0].key.engine
@@ -98,7 +91,7 @@ def summarise(runs: Sequence[Run], first: Sequence[Run], tolerance: float, names
         saved=estimate(needed - firsts, np.mean) if other else None,
         ratio=ratio(firsts, needed) if other else None,
         error=estimate(np.array(errors), np.median) if errors else None,
-        region=_region(runs, names),
+        region=_region(runs),
         seconds=float(np.median([run.seconds for run in runs])),
     )
 
@@ -141,14 +134,14 @@ def _regrets(runs: Sequence[Run]) -> Array:
     )
 
 
-def _region(runs: Sequence[Run], names: Sequence[str]) -> Region | None:
+def _region(runs: Sequence[Run]) -> Region | None:
     found = [run.judgement.reading for run in runs if run.judgement.reading is not None]
     if not found:
         return None
     return Region(
         covered=_count([reading.holds for reading in found]),
         share=estimate(np.array([reading.share for reading in found]), np.median),
-        intervals_covered=_by_parameter(found, names),
+        intervals_covered=_by_parameter(found),
         misfits=sum(reading.fits is False for reading in found),
     )
 
@@ -157,8 +150,8 @@ def _count(flags: Sequence[bool | None]) -> int | None:
     return None if None in flags else sum(bool(flag) for flag in flags)
 
 
-def _by_parameter(found: Sequence[Reading], names: Sequence[str]) -> dict[str, int] | None:
+def _by_parameter(found: Sequence[Reading]) -> dict[str, int] | None:
     held = [reading.intervals_hold for reading in found if reading.intervals_hold is not None]
     if len(held) < len(found):
         return None
-    return {name: sum(column) for name, column in zip(names, zip(*held, strict=True), strict=True)}
+    return {name: sum(one[name] for one in held) for name in held[0]}

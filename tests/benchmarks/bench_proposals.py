@@ -19,6 +19,7 @@ from proxytune.search.analytic import Analytic
 from proxytune.search.comparison import Run, RunKey
 from proxytune.search.design import design_point, from_unit, unit_points
 from proxytune.search.gaussian_process import GaussianProcess, highest
+from proxytune.search.judgement import Judgement
 from proxytune.search.proposer import Trial, proposal_seed
 from proxytune.search.ranking import METRICS, Ranking
 from proxytune.search.summary import summarise
@@ -211,9 +212,10 @@ def run(objective, name, variant, seed):
             values = from_unit(objective.space, variant.propose(search))
         search.trials.append(Trial(values, objective.score(values, seed)))
     answer, _ = variant.model(search).incumbent()
-    regrets = tuple(objective.regret(trial.values, seed) for trial in search.trials)
+    regrets, regret = tuple(objective.regret(t.values, seed) for t in search.trials), objective.regret(answer, seed)
     key = RunKey(objective.identity, name, seed, BUDGET, INITIAL, "")
-    return Run(key, regrets, answer, objective.regret(answer, seed), None, 0.0)
+    found = Judgement(regrets, answer, regret, regret, None, None, "")
+    return Run(key, tuple(trial.values for trial in search.trials), 0.0, found)
 
 
 def main():

@@ -54,7 +54,7 @@ def test_a_stopped_sweep_goes_on_to_the_same_curve(make_study, capsys, number, j
 @pytest.mark.parametrize(("number", "jobs"), [(signal.SIGTERM, "2"), (signal.SIGINT, "1")])
 def test_a_stopped_comparison_goes_on_to_the_same_runs(make_study, tmp_path, number, jobs):
     folder, whole = make_study(domain={"sleep": "0.01"}, jobs=jobs), make_study("whole")
-    few = ("--engines", "sobol", "--seeds", "2", "--budget", "4", "--initial", "2", "--output")
+    few = ("--engines", "gp,sobol", "--seeds", "2", "--budget", "4", "--initial", "2", "--output")
     process = start("compare", folder, *few, tmp_path / "out")
     wait_for(tmp_path / "out", process, 30)
     ended(process, number)
@@ -63,7 +63,7 @@ def test_a_stopped_comparison_goes_on_to_the_same_runs(make_study, tmp_path, num
     for home, output in ((folder, tmp_path / "out"), (whole, tmp_path / "never stopped")):
         assert main(["compare", str(home), *few, str(output)]) == 0
         runs = read_runs(output / "runs.jsonl").items()
-        found.append({(key.engine, key.seed): (run.regrets, run.answer, run.answer_regret) for key, run in runs})
+        found.append({(key.engine, key.seed): (run.visited, run.judgement) for key, run in runs})
     assert found[0] == found[1]
     assert len(found[0]) == 4
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from proxytune.search.engines import why_not
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Trial
 from proxytune.space import Interval, Space
@@ -38,3 +39,8 @@ def search(proposer, budget, seed, score=steps):
         found = score(values)
         trials.append(Trial(values, found, None if found is None else (found,)))
     return trials
+
+
+def lacking(engine):
+    """Why an engine cannot be tried here, empty if it can."""
+    return why_not(engine, composed=True)

@@ -3,17 +3,17 @@ import importlib.util
 
 import numpy as np
 import pytest
-from steps import SPACE, WHOLE, search, steps
+from steps import SPACE, WHOLE, lacking, search, steps
 
 from proxytune.errors import InputError
 from proxytune.search import engines
+from proxytune.search.after_design import AfterDesign
 from proxytune.search.design import design_point
-from proxytune.search.engines import ENGINES, STUDY_ENGINES, AfterDesign, make_proposer
+from proxytune.search.engines import ENGINES, NEEDS, STUDY_ENGINES, engine_code, make_proposer, why_not
 from proxytune.search.proposer import Trial
 
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
-WITHOUT = () if HAS_OPTUNA else ("tpe",)
-HERE = [name for name in ENGINES if name not in WITHOUT]
+HERE = [pytest.param(name, marks=pytest.mark.skipif(bool(lacking(name)), reason=lacking(name))) for name in ENGINES]
 
 
 def made(engine, initial):
@@ -35,9 +35,9 @@ def test_resuming_anywhere_with_a_new_proposer_proposes_what_an_uninterrupted_se
 
 @pytest.mark.parametrize("engine", HERE)
 def test_every_proposal_lies_in_the_box_and_is_a_new_one(engine):
-    """Also where the best is at its corner."""
+    """Also where the best is at its corner; only Optuna's sampler goes there more than once."""
     trials = search(made(engine, 3), 8, seed=1, score=lambda values: -100 * values[0] - values[1])
-    assert len({trial.values for trial in trials}) == 8
+    assert len({trial.values for trial in trials}) == 8 or engine == "gpsampler"
     for trial in trials:
         assert 0.0 <= trial.values[0] <= 0.3
         assert -0.3 <= trial.values[1] <= 0.3
@@ -92,27 +92,64 @@ def test_tpe_learns_from_the_scores_and_says_nothing(capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_tpe_without_optuna_is_refused_in_one_line_with_what_to_do(monkeypatch):
+@pytest.mark.parametrize("engine", ["gpsampler", "qlognei"])
+def test_a_peer_learns_from_the_scores_and_says_nothing(engine, capfd):
+    if lacking(engine):
+        pytest.skip(lacking(engine))
+    low, high = (search(made(engine, 4), 10, 1, score) for score in (steps, lambda v: -steps(v)))
+    assert np.mean([steps(trial.values) for trial in low[4:]]) < np.mean([steps(trial.values) for trial in high[4:]])
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("engine", ["gpsampler", "qlognei"])
+def test_a_peer_leaves_the_threads_and_the_random_numbers_of_pytorch_as_they_were(engine):
+    if lacking(engine):
+        pytest.skip(lacking(engine))
+    import torch
+
+    before = torch.get_num_threads(), torch.random.get_rng_state()
+    search(made(engine, 3), 4, 1)
+    assert torch.get_num_threads() == before[0]
+    if engine == "qlognei":
+        assert torch.equal(torch.random.get_rng_state(), before[1])
+
+
+NEED = {
+    "tpe": "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]'",
+    "gpsampler": "'gpsampler' needs Optuna and PyTorch, which are not installed; pip install 'proxytune[peers]'",
+    "qlognei": "'qlognei' needs BoTorch, which is not installed; pip install 'proxytune[peers]'",
+}
+
+
+@pytest.mark.parametrize("engine", NEEDS)
+def test_an_engine_whose_library_is_missing_is_refused_in_one_line_with_what_to_do(engine, monkeypatch):
     monkeypatch.setattr(engines, "find_spec", lambda name: None)
-    with pytest.raises(
-        InputError, match=r"^'tpe' needs Optuna, which is not installed; pip install 'proxytune\[tpe\]'"
-    ):
-        make_proposer("tpe", 3)
+    with pytest.raises(InputError) as refused:
+        make_proposer(engine, 3)
+    assert str(refused.value).startswith(NEED[engine])
 
 
-def test_no_other_engine_needs_optuna(monkeypatch):
+def test_no_other_engine_needs_these_libraries(monkeypatch):
     whole = builtins.__import__
 
     def without(name, *arguments, **more):
-        if name.startswith("optuna"):
+        if name.split(".")[0] in ("optuna", "torch", "botorch", "gpytorch"):
             raise ModuleNotFoundError(name)
         return whole(name, *arguments, **more)
 
     monkeypatch.setattr(builtins, "__import__", without)
     told = [Trial(design_point(SPACE, index, 1), float(index), (float(index),)) for index in range(3)]
     for engine in ENGINES:
-        if engine != "tpe":
+        if engine not in NEEDS:
             assert len(made(engine, 3).propose(SPACE, told, 1)) == 2
+
+
+def test_every_engine_that_is_not_refused_can_be_made_and_has_a_digest_of_its_own_code():
+    digests = [engine_code(engine) for engine in ENGINES]
+    assert len(set(digests)) == len(ENGINES)
+    for engine in ENGINES:
+        if not why_not(engine, composed=True):
+            assert made(engine, 3).initial == 3
 
 
 def test_an_unknown_engine_is_refused_with_the_nearest_name():
@@ -121,4 +158,4 @@ def test_an_unknown_engine_is_refused_with_the_nearest_name():
 
 
 def test_what_is_for_comparison_only_is_no_engine_of_a_study():
-    assert set(ENGINES) - set(STUDY_ENGINES) == {"skopt"}
+    assert set(ENGINES) - set(STUDY_ENGINES) == {"skopt", "gpsampler", "qlognei"}

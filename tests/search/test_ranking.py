@@ -47,4 +47,4 @@ def test_the_noise_is_drawn_anew_at_every_point_and_seed():
     one, other = ((0.05, 20.0, 0.1, trim) for trim in (0.1, 0.1 + 1e-12))
     noise = [OBJECTIVE.table(values, 1).means - OBJECTIVE.means(values, 1) for values in (one, other)]
     assert np.abs(noise[0] - noise[1]).min() > 0
-    assert OBJECTIVE.truth(1) != OBJECTIVE.optimum(2)
+    assert OBJECTIVE.truth(1) != OBJECTIVE.truth(2)

@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     study = open_study(folder)
     _check_engine(study)
     if study.settings.objective == "plv":
-        return taught(study, folder, lambda: searched(study, folder)[0].profiles)
+        return taught(study, folder, lambda: searched(study, folder)[0].knowledge.as_good[1])
     result, spent = searched(study, folder)
     figures, report = draw(result, folder)
     costs = _costs(result, spent, time.perf_counter() - begun)

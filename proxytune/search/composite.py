@@ -1,7 +1,7 @@
 """Bayesian optimisation of a composite score: expected improvement of PRPV composed of modelled outputs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -14,6 +14,7 @@ from proxytune.search.proposer import Trial, Values, proposal_seed
 from proxytune.search.surrogate import Array, unit_array
 from proxytune.space import Space
 
+FRESH_DRAWS = 400
 DRAWS = 24
 """Outputs drawn at every point; all points share the normal numbers behind them."""
 
@@ -48,12 +49,39 @@ def most_improving(space: Space, trials: Sequence[Trial], goal: Goal, seed: int)
         RunError: If no trial has an outcome.
     """
     with threadpool_limits(limits=1):
+        model = _believed(fit_outputs(space, trials), trials)
+        return from_unit(space, _most_improving(model, trials, goal, seed)[0])
+
+
+def _believed(model: OutputModel, trials: Sequence[Trial]) -> OutputModel:
+    """The model as if every pending trial had come out as expected, so that it is worth no second look."""
+    pending = [trial for trial in trials if trial.pending]
+    if not pending or not model.groups:
+        return model
+    mean, _ = model.predict(unit_array(model.space, [trial.values for trial in pending]))
+    told = [replace(trial, outcome=tuple(row)) for trial, row in zip(pending, mean.tolist(), strict=True)]
+    finished = [trial for trial in trials if not trial.pending]
+    return fit_outputs(model.space, [*finished, *told], model.kernel)
+
+
+def expected_gain(space: Space, trials: Sequence[Trial], goal: Goal, seed: int) -> tuple[float, float]:
+    """The most that any θ is expected to improve the score, and the standard deviation of a fresh score of the best.
+
+    Raises:
+        RunError: If no trial has an outcome.
+    """
+    with threadpool_limits(limits=1):
         model = fit_outputs(space, trials)
-        scores = composed_scores(model, goal, seed)
-        incumbent = float(scores(model.visited).mean(axis=0).min())
-        taken = unit_array(space, [trial.values for trial in trials])
-        best, _ = highest(lambda points: np.maximum(0.0, incumbent - scores(points)).mean(axis=0), taken, seed)
-        return from_unit(space, best)
+        _, gain = _most_improving(model, trials, goal, proposal_seed(seed, len(trials)))
+        best = model.visited[int(np.argmin(composed_scores(model, goal, seed)(model.visited).mean(axis=0)))]
+        return gain, float(fresh_scores(model, goal, best, seed).std())
+
+
+def _most_improving(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int) -> tuple[Array, float]:
+    scores = composed_scores(model, goal, seed)
+    incumbent = float(scores(model.visited).mean(axis=0).min())
+    taken = unit_array(model.space, [trial.values for trial in trials])
+    return highest(lambda points: np.maximum(0.0, incumbent - scores(points)).mean(axis=0), taken, seed)
 
 
 def composed_scores(model: OutputModel, goal: Goal, seed: int) -> Callable[[Array], Array]:
@@ -70,11 +98,32 @@ def composed_scores(model: OutputModel, goal: Goal, seed: int) -> Callable[[Arra
         A function of points (n, parameters) of the unit cube that gives draws of their scores, shape (draws, n).
     """
     normal = np.random.default_rng(seed).standard_normal((DRAWS, 1, model.outputs))
-    known = np.where(np.isnan(model.constant), goal.values, model.constant)
 
     def scores(points: Array) -> Array:
-        mean, variance = model.predict(points)
-        mean, deviation = np.where(np.isnan(mean), known, mean), np.sqrt(np.nan_to_num(variance))
-        return np.stack([goal.compose(mean + deviation * row) for row in normal])
+        mean, variance = _every_output(model, goal, points)
+        return np.stack([goal.compose(_at_most(model, mean + np.sqrt(variance) * row)) for row in normal])
 
     return scores
+
+
+def fresh_scores(model: OutputModel, goal: Goal, point: Array, seed: int) -> Array:
+    """Scores that a point of the unit cube would come to in fresh episodes, roughness and noise included, (draws,)."""
+    mean, variance = _every_output(model, goal, point[None])
+    deviation = np.sqrt(variance + np.nan_to_num(model.rough) + goal.noise / 2.0)
+    drawn = mean + deviation * np.random.default_rng(seed).standard_normal((FRESH_DRAWS, model.outputs))
+    return goal.compose(_at_most(model, drawn))
+
+
+def _at_most(model: OutputModel, drawn: Array) -> Array:
+    """Outputs (…, outputs) that come to their bound where they are beyond it, or as near as they are rough.
+
+    Agents that survive the whole episode tie with each other, which a smooth function alone would never show.
+    """
+    return np.where(drawn > model.bound - np.sqrt(np.nan_to_num(model.rough)), model.bound, drawn)
+
+
+def _every_output(model: OutputModel, goal: Goal, points: Array) -> tuple[Array, Array]:
+    """Mean and variance of every output at points (n, parameters), those included that are not modelled."""
+    mean, variance = model.predict(points)
+    known = np.where(np.isnan(model.constant), goal.values, model.constant)
+    return np.where(np.isnan(mean), known, mean), np.nan_to_num(variance)

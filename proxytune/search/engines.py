@@ -33,7 +33,8 @@ ENGINES = (*STUDY_ENGINES, "skopt")
 class AfterDesign:
     """A proposer that is asked only once the quasi-random design is through and something has a score.
 
-    It is told of a failed trial as if that had the worst score seen.
+    It is told of a failed trial as if that had the worst score seen. Where it proposes a pending point once more, the
+    design goes on in its place: what is tried together differs.
 
     Attributes:
         inner: The proposer.
@@ -48,7 +49,9 @@ class AfterDesign:
         told = with_failures_as_worst(trials)
         if len(trials) < self.initial or not told:
             return design_point(space, len(trials), seed)
-        return self.inner.propose(space, told, seed)
+        values = self.inner.propose(space, told, seed)
+        again = any(trial.pending and trial.values == values for trial in trials)
+        return design_point(space, len(trials), seed) if again else values
 
 
 def why_not(engine: str, *, composed: bool) -> str:

@@ -1,10 +1,11 @@
 """Bayesian optimisation: expected improvement over a Gaussian process of the finished trials.
 
-There are no pending trials to be told of: a study tries one θ at a time and spreads its episodes over the jobs.
+Of a pending trial it believes the posterior mean given the finished ones (Ginsbourger, Le Riche and Carraro, Kriging is
+well-suited to parallelize optimization, 2010): nothing is left to be learnt there, so the next proposal goes elsewhere.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from skopt.acquisition import gaussian_ei
@@ -32,13 +33,13 @@ class GaussianProcess:
     """
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point, a function of the set of trials and the seed alone; never a point visited before.
+        """The next point, a function of the set of trials and the seed alone; never a point visited or pending.
 
         Raises:
             RunError: If no trial has a score.
         """
         with threadpool_limits(limits=1):
-            return from_unit(space, _most_promising(fit_surrogate(space, trials), proposal_seed(seed, len(trials)))[0])
+            return from_unit(space, _most_promising(_believing(space, trials), proposal_seed(seed, len(trials)))[0])
 
 
 def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tuple[float, float]:
@@ -51,6 +52,17 @@ def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tu
     with threadpool_limits(limits=1):
         _, gain = _most_promising(surrogate, proposal_seed(seed, len(trials)))
     return gain, surrogate.noise_deviation
+
+
+def _believing(space: Space, trials: Sequence[Trial]) -> Surrogate:
+    """The surrogate of the trials, a pending one taken for one that scored what is expected of it."""
+    surrogate = fit_surrogate(space, trials)
+    pending = [trial for trial in trials if trial.pending]
+    if not pending:
+        return surrogate
+    means = surrogate.mean(unit_array(space, [trial.values for trial in pending]))
+    believed = [replace(trial, score=float(mean)) for trial, mean in zip(pending, means, strict=True)]
+    return fit_surrogate(space, [*surrogate.visited, *believed])
 
 
 def _most_promising(surrogate: Surrogate, seed: int) -> tuple[Array, float]:

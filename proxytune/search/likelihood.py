@@ -72,8 +72,8 @@ def deviance(distance: Array) -> Array:
 def temper(errors: Array) -> float:
     """κ: how many outputs count as one, by the correlation of the errors of left-out trials.
 
-    With C the correlations of p outputs, κ = 1 + Σ_{j≠k} (C_jk² − 1/n_jk) / p, at least 1: n_jk trials know both, and two
-    independent outputs correlate with a mean square of 1/n_jk by chance.
+    With C the correlations of p outputs, κ = 1 + Σ_{j≠k} (C_jk² − 1/n_jk) / p, at least 1: n_jk trials know both, and
+    two independent outputs correlate with a mean square of 1/n_jk by chance.
 
     Args:
         errors: Shape (trials, outputs); NaN where a trial does not know an output.
@@ -85,5 +85,5 @@ def temper(errors: Array) -> float:
     filled = filled / np.where(size > 0.0, size, 1.0)
     excess = ((filled.T @ filled) ** 2 / np.maximum(both, 1.0) - 1.0) / np.maximum(both, 1.0)
     np.fill_diagonal(excess, 0.0)
-    together: float = excess.sum()
-    return 1.0 + max(0.0, together) / max(1, errors.shape[1])
+    columns: int = errors.shape[1]
+    return 1.0 + max(0.0, float(np.sum(excess))) / max(1, columns)

@@ -30,12 +30,12 @@ class Misfit:
     """Whether some θ explains the target's outputs.
 
     Attributes:
-        deviance: Mean deviance of the target's outputs at its best θ.
+        deviance: Mean deviance of the target's outputs at its best θ; None where no output tells of θ.
         expected: The same of trials left out, their middle: what a proxy that fits has.
         p_value: How likely a proxy that fits is to be as far off; None with too few trials to tell.
     """
 
-    deviance: float
+    deviance: float | None
     expected: float | None
     p_value: float | None
 
@@ -57,17 +57,20 @@ def misfit_of(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int
     found = _least_deviance(model, goal)
     known = sorted((trial for trial in trials if trial.outcome is not None), key=lambda trial: trial.values)
     whole = [row for row, trial in enumerate(known) if not np.isnan(trial.outcome or ()).any()]
-    if len(whole) < FEWEST:
+    if len(whole) < FEWEST or found is None:
         return Misfit(found, None, None)
     chosen = [whole[place] for place in np.unique(np.linspace(0, len(whole) - 1, MOST).round().astype(int))]
     normal = np.random.default_rng(seed).standard_normal((len(known), len(goal.values)))
-    ours = np.log([_left_out(model, known, goal, row, normal[row]) for row in chosen])
+    ours = np.log([_left_out(model, known, goal, row, normal[row]) or np.nan for row in chosen])
+    ours = ours[~np.isnan(ours)]
+    if len(ours) < FEWEST:
+        return Misfit(found, None, None)
     spread = max(float(ours.std(ddof=1)), 1e-9) * np.sqrt(1.0 + 1.0 / len(ours))
     away = (np.log(found) - ours.mean()) / spread
     return Misfit(found, float(np.exp(ours.mean())), float(student.sf(away, len(ours) - 1)))
 
 
-def _left_out(model: OutputModel, known: Sequence[Trial], goal: Goal, row: int, normal: Array) -> float:
+def _left_out(model: OutputModel, known: Sequence[Trial], goal: Goal, row: int, normal: Array) -> float | None:
     """The least deviance of one trial as a target, given the others and the kernel of them all."""
     others = fit_outputs(model.space, [*known[:row], *known[row + 1 :]], model.kernel)
     values = np.array(known[row].outcome) + normal * np.sqrt(goal.noise)
@@ -75,8 +78,10 @@ def _left_out(model: OutputModel, known: Sequence[Trial], goal: Goal, row: int, 
     return _least_deviance(others, replace(goal, values=np.where(np.isnan(goal.values), np.nan, values)))
 
 
-def _least_deviance(model: OutputModel, goal: Goal) -> float:
+def _least_deviance(model: OutputModel, goal: Goal) -> float | None:
     likelihood = Likelihood(model, goal)
+    if not likelihood.columns.size:
+        return None
     mode = posterior_of(likelihood.log, len(model.space.intervals), POINTS).mode
     distance, _ = likelihood.standardised(mode[None])
     return float(deviance(distance).mean()) + 1e-12

@@ -1,8 +1,8 @@
 """The engine `outcomes`: it learns from every output of a trial, not from PRPV alone.
 
 In turn it draws θ from what is known of it, and looks where the score composed of the outputs is expected to improve
-most. Draws find the θ that made the target and escape what a greedy search sticks to; expected improvement keeps PRPV the
-goal where the proxy cannot be like the target whatever θ is.
+most. Draws find the θ that made the target and escape what a greedy search sticks to; expected improvement keeps PRPV
+the goal where the proxy cannot be like the target whatever θ is.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """Gaussian processes of what a score is computed from: every agent's mean metrics, over the search box.
 
-PRPV is a count and jumps; the metrics that it compares change smoothly with θ. Each output has a Gaussian process of its
-own, all with one kernel (Matérn 5/2, a length scale per parameter, one share of noise for what no smooth function
+PRPV is a count and jumps; the metrics that it compares change smoothly with θ. Each output has a Gaussian process of
+its own, all with one kernel (Matérn 5/2, a length scale per parameter, one share of noise for what no smooth function
 follows), fitted to the trials that have every output. How far an output's predictions are off when trials are left out
 one at a time scales its variance, so an output that the kernel does not suit is trusted less.
 """
@@ -9,14 +9,14 @@ one at a time scales its variance, so an output that the kernel does not suit is
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import Kernel
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from proxytune.errors import RunError
 from proxytune.search.proposer import Trial
@@ -74,6 +74,7 @@ class OutputModel:
         kernel: Covariance of a standardised output over the unit cube: its smooth course, and noise round that.
         groups: The outputs, by where they are known.
         constant: What each output is on average over the trials that know it, shape (outputs,); NaN where none does.
+        bound: What no trial's output exceeds though several come to it, shape (outputs,); infinite where there is none.
         visited: All trials that know any output, in the unit cube, shape (trials, parameters).
     """
 
@@ -81,6 +82,7 @@ class OutputModel:
     kernel: Kernel
     groups: tuple[OutputGroup, ...]
     constant: Array
+    bound: Array
     visited: Array
 
     @property
@@ -96,7 +98,7 @@ class OutputModel:
     @cached_property
     def modelled(self) -> Rows:
         """Which outputs are modelled, in rising order."""
-        return np.sort(np.concatenate([group.columns for group in self.groups]))
+        return np.sort(np.concatenate([np.empty(0, dtype=np.intp), *(group.columns for group in self.groups)]))
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Mean and variance of every modelled output's smooth course at points (n, parameters) of the unit cube.
@@ -106,7 +108,7 @@ class OutputModel:
         """
         mean, variance = (np.full((len(points), self.outputs), np.nan) for _ in range(2))
         smooth = self.kernel.k1
-        with threadpool_limits(limits=1):
+        with _libraries().limit(limits=1):
             for group in self.groups:
                 near = smooth(points, group.visited)
                 left = smooth.diag(points) - np.einsum("ij,jk,ik->i", near, group.inverse, near, optimize=True)
@@ -143,7 +145,7 @@ def fit_outputs(space: Space, trials: Sequence[Trial], kernel: Kernel | None = N
         kernel: The kernel; without one it is fitted too.
 
     Raises:
-        RunError: If no output is known to change.
+        RunError: If no trial has an outcome.
     """
     known = sorted((trial.values, trial.outcome) for trial in trials if trial.outcome is not None)
     if not known:
@@ -152,12 +154,16 @@ def fit_outputs(space: Space, trials: Sequence[Trial], kernel: Kernel | None = N
     with threadpool_limits(limits=1):
         kernel = kernel or _fitted_kernel(visited, outputs)
         groups = _groups(kernel, visited, outputs)
-    if not groups:
-        raise RunError("no output changes from trial to trial, so there is nothing to learn from")
     seen = ~np.isnan(outputs)
     with np.errstate(invalid="ignore"):
         constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)
-    return OutputModel(space, kernel, groups, constant, visited)
+    return OutputModel(space, kernel, groups, constant, _bounds(outputs), visited)
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    """Found once: looking for them takes as long as a prediction."""
+    return ThreadpoolController()
 
 
 def _fitted_kernel(visited: Array, outputs: Array) -> Kernel:
@@ -189,6 +195,12 @@ def _worth_modelling(outputs: Array) -> Rows:
         changes = np.nanmax(filled, axis=0) - np.nanmin(filled, axis=0)
         largest = np.nanmax(np.abs(filled), axis=0)
     return np.flatnonzero(often & (np.nan_to_num(changes) > 1e-9 * np.nan_to_num(largest)))
+
+
+def _bounds(outputs: Array) -> Array:
+    """The largest value of each output where at least two trials have it."""
+    highest = np.max(np.where(np.isnan(outputs), -np.inf, outputs), axis=0)
+    return np.where(np.sum(outputs == highest, axis=0) >= 2, highest, np.inf)
 
 
 def _groups(kernel: Kernel, visited: Array, outputs: Array) -> tuple[OutputGroup, ...]:

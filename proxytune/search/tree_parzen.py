@@ -1,5 +1,6 @@
 """Optuna's tree-structured Parzen estimator, where Optuna is installed."""
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,29 +15,35 @@ class TreeParzen:
     """Proposes what Optuna's TPE sampler suggests, with its defaults but for the start: the design stands in for it.
 
     Optuna's study is built anew from the trials at every proposal, in memory, so nothing is remembered. Its sampler
-    weighs later trials more, so the order of the trials counts.
+    weighs later trials more, so the order of the trials counts. Pending trials are running ones to it, which it takes
+    for bad ("constant liar").
     """
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
-        """The next point, a function of the trials in their order and the seed alone; every trial needs a score."""
+        """The next point, a function of the seed and the trials in their order; those not pending need a score."""
         import optuna
 
         box: dict[str, Any] = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
-        sampler = optuna.samplers.TPESampler(n_startup_trials=1, seed=proposal_seed(seed, len(trials)))
+        drawn = proposal_seed(seed, len(trials))
         with _quiet(optuna.logging):
+            sampler = optuna.samplers.TPESampler(n_startup_trials=1, seed=drawn, constant_liar=True)
             study = optuna.create_study(sampler=sampler, direction="minimize")
             for trial in trials:
                 theta = space.theta(trial.values)
-                study.add_trial(optuna.trial.create_trial(params=theta, distributions=box, value=trial.score))
+                state = optuna.trial.TrialState.RUNNING if trial.pending else optuna.trial.TrialState.COMPLETE
+                told = optuna.trial.create_trial(params=theta, distributions=box, value=trial.score, state=state)
+                study.add_trial(told)
             return space.values(study.ask(box).params)
 
 
 @contextmanager
 def _quiet(logging: Any) -> Iterator[None]:
-    """Without the line that Optuna writes for every study it makes."""
+    """Without the line that Optuna writes for every study it makes, and its warning that a setting is experimental."""
     before = logging.get_verbosity()
     logging.set_verbosity(logging.WARNING)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     finally:
         logging.set_verbosity(before)

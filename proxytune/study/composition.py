@@ -1,6 +1,6 @@
 """A study as a search that learns from every output sees it: each agent's mean of every metric that both sides have."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
@@ -22,6 +22,11 @@ def trial_of(study: Study, store: Store, done: TrialRecord) -> Trial:
     """
     outcomes = known_outcomes(study, store, episodes_of(study.settings, done)).values()
     return Trial(study.settings.space.values(done.theta), done.score, outputs_of(study, outcomes))
+
+
+def trials_of(study: Study, store: Store, done: Iterable[TrialRecord]) -> list[Trial]:
+    """Finished trials as the search sees them."""
+    return [trial_of(study, store, trial) for trial in done]
 
 
 def outputs_of(study: Study, outcomes: Collection[Outcome]) -> Values | None:

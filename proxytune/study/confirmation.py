@@ -1,10 +1,11 @@
 """After the search: the answer is driven again in fresh episodes, together with those that are nearly as good.
 
 All trials share the placement noise of the study's seed, so the θ that the search likes best also suits that noise.
-The candidates (lowest posterior means given all trials, not more than a standard deviation of the score's noise apart)
-get episodes under seeds that the search has not seen. The answer is the candidate with the lowest posterior mean given
-trials and fresh scores; what fresh episodes say of it beside the search's own is how much of that was luck. No trial
-depends on any of this.
+The candidates (the visited θ of lowest expected PRPV given all trials, the one that explains the target's outputs best,
+and others not more than a standard deviation of a fresh score's noise behind) get episodes under seeds that the search
+has not seen. The answer is the candidate whose expected PRPV and fresh scores are lowest on average; what fresh
+episodes say of it beside the search's own is how much of that was luck. They tell the noise floor too: what the same
+domain scores against itself from the same starts. No trial depends on any of this.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,17 +15,16 @@ import numpy as np
 
 from proxytune.domain import Episode
 from proxytune.scores import ScoreTable
-from proxytune.search.proposer import Trial
-from proxytune.search.surrogate import fit_surrogate, unit_array
-from proxytune.study.evaluate import Spent, known_outcomes, plan, run_missing, score
-from proxytune.study.history import as_trials
+from proxytune.search.knowledge import learn
+from proxytune.study.composition import goal_of, trials_of
+from proxytune.study.evaluate import Spent, known_outcomes, plan, run_missing, score, table
 from proxytune.study.objective import FRESH
 from proxytune.study.progress import Watcher
 from proxytune.study.settings import StudySettings
 from proxytune.study.stopping import stopped
 from proxytune.study.store import Outcome, Store, TrialRecord
 from proxytune.study.study import Study
-from proxytune.usefulness import Assessment, assess
+from proxytune.usefulness import Assessment, assess, floor_of_repeats
 
 CANDIDATES = 3
 """At most so many θ are driven again."""
@@ -56,7 +56,7 @@ class Confirmation:
     """What fresh episodes say.
 
     Attributes:
-        answer: The candidate with the lowest posterior mean given trials and fresh scores.
+        answer: The candidate whose expected PRPV and fresh scores are lowest on average.
         candidates: All that were driven again, the search's own favourite first.
         episodes: How many fresh episodes each was driven in.
     """
@@ -76,7 +76,7 @@ def run_confirmation(study: Study, store: Store, watcher: Watcher) -> Spent:
     trials, spent = [trial for trial in store.trials() if trial.state != "open"], Spent()
     if not study.settings.confirm or not stopped(study, store, trials):
         return spent
-    chosen = candidates(study, trials)
+    chosen = candidates(study, store, trials)
     watcher.begin("fresh episodes", most_episodes(study.settings) - len(chosen) * per_candidate(study.settings))
     for number, trial in enumerate(chosen, start=1):
         planned = [episode for run in _plans(study.settings, trial) for episode in run]
@@ -92,26 +92,29 @@ def confirmation_of(study: Study, store: Store, trials: Sequence[TrialRecord]) -
     """
     if not study.settings.confirm:
         return None
-    found = [_driven_again(study, store, trial) for trial in candidates(study, trials)]
+    found = [_driven_again(study, store, trial) for trial in candidates(study, store, trials)]
     known = tuple(candidate for candidate in found if candidate is not None)
     if len(known) < len(found):
         return None
-    return Confirmation(_answer(study, trials, known), known, per_candidate(study.settings))
+    return Confirmation(_answer(study, store, trials, known), known, per_candidate(study.settings))
 
 
-def candidates(study: Study, trials: Sequence[TrialRecord]) -> list[TrialRecord]:
-    """The trials that are driven again, the lowest posterior mean first: a function of the trials alone.
+def candidates(study: Study, store: Store, trials: Sequence[TrialRecord]) -> list[TrialRecord]:
+    """The trials that are driven again, that of lowest expected PRPV first: a function of what was finished alone.
 
     Raises:
         RunError: If no trial has a score.
     """
     space = study.settings.space
-    surrogate = fit_surrogate(space, as_trials(space, trials))
     # Of a trial that was cut off it is certain that it is none of the best.
-    scored = list({space.values(trial.theta): trial for trial in trials if trial.prpv is not None}.values())
-    means, _ = surrogate.predict(unit_array(space, [space.values(trial.theta) for trial in scored]))
-    near = [row for row in np.argsort(means, kind="stable") if means[row] - means.min() <= surrogate.noise_deviation]
-    return [scored[row] for row in near[:CANDIDATES]]
+    scored = {space.values(trial.theta): trial for trial in trials if trial.prpv is not None}
+    known = learn(space, trials_of(study, store, trials), goal_of(study, store), study.settings.seed)
+    expected = {values: mean for values, mean in known.expected.items() if values in scored}
+    best = min(expected, key=expected.__getitem__)
+    noise = float(known.fresh_scores(best).std())
+    near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
+    likeliest = known.likeliest_of(list(expected))
+    return [scored[values] for values in dict.fromkeys([near[0], likeliest, *near[1:]])][:CANDIDATES]
 
 
 def per_candidate(settings: StudySettings) -> int:
@@ -138,11 +141,15 @@ def _driven_again(study: Study, store: Store, trial: TrialRecord) -> Candidate |
             return None
         runs.append(list(known.values()))
     scores = tuple(score(study, trial.theta, outcomes).prpv for outcomes in runs)
-    return Candidate(trial, scores, _assessed(study, runs))
+    own = list(known_outcomes(study, store, plan(study.settings, trial.theta, study.settings.seed)).values())
+    return Candidate(trial, scores, _assessed(study, own, runs))
 
 
-def _assessed(study: Study, runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
-    """All fresh episodes as one table; of several repetitions, each start is another episode every time."""
+def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
+    """All fresh episodes as one table; of several repetitions, each start is another episode every time.
+
+    The noise floor is what the domain's own trial scores against them.
+    """
     scored: dict[tuple[str, str | int], Mapping[str, float]] = {}
     for repetition, outcomes in enumerate(runs):
         for one in outcomes:
@@ -151,14 +158,15 @@ def _assessed(study: Study, runs: Sequence[Sequence[Outcome]]) -> Assessment | N
                 scored[one.episode.agent, label] = one.metrics
     if {agent for agent, _ in scored} != set(study.settings.agents):
         return None
-    proxy = ScoreTable.from_episodes(scored)
-    return assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
+    proxy, metrics = ScoreTable.from_episodes(scored), study.settings.metrics
+    floor = floor_of_repeats(domain=table(own), again=proxy, metrics=metrics)
+    return assess(proxy=proxy, target=study.target, metrics=metrics, floor=floor)
 
 
-def _answer(study: Study, trials: Sequence[TrialRecord], known: Sequence[Candidate]) -> Candidate:
-    """Each candidate has as many fresh scores, so what fresh noise does to all of them alike favours none."""
-    space = study.settings.space
-    fresh = [Trial(space.values(one.trial.theta), score) for one in known for score in one.scores]
-    surrogate = fit_surrogate(space, [*as_trials(space, trials), *fresh])
-    means, _ = surrogate.predict(unit_array(space, [space.values(one.trial.theta) for one in known]))
-    return known[int(np.argmin(means))]
+def _answer(study: Study, store: Store, trials: Sequence[TrialRecord], known: Sequence[Candidate]) -> Candidate:
+    """Each candidate has as many fresh episodes, so what fresh noise does to all of them alike favours none."""
+    values = study.settings.space.values
+    trials_told = trials_of(study, store, trials)
+    expected = learn(study.settings.space, trials_told, goal_of(study, store), study.settings.seed).expected
+    scores = [[expected[values(one.trial.theta)], *(s for s in one.scores if s is not None)] for one in known]
+    return known[int(np.argmin([np.mean(each) for each in scores]))]

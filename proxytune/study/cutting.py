@@ -6,6 +6,7 @@ that bound lies above the limit, the evaluation cannot end among the incumbents 
 deviation of the score's noise of the lowest posterior mean), whatever the other agents do, and they are not driven. The
 order of the agents puts those first that disagreed most with the target so far. Order, limit and verdict follow from
 the finished trials and the decided agents' episodes alone: a trial comes to the same end with any number of processes.
+The trials of a batch are all held against the trials before it, each by its own episodes.
 
 What the search is told of such a trial is an estimate: the bound, divided by the share that these pairs had of PRPV in
 the trials that were not cut off.
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from proxytune.domain import Episode
 from proxytune.scores import ScoreTable
 from proxytune.search.surrogate import fit_surrogate
-from proxytune.study.evaluate import Spent, evaluation, known_outcomes, plan, run_missing, table
+from proxytune.study.evaluate import Instance, Spent, evaluation, known_outcomes, plan, run_missing, table
 from proxytune.study.history import as_trials, episodes_of
 from proxytune.study.progress import Watcher
 from proxytune.study.store import Outcome, Store, TrialRecord
@@ -36,10 +37,10 @@ SHARE = 1e-3
 
 @dataclass(frozen=True)
 class Reference:
-    """What an evaluation is held against: a function of the finished trials.
+    """What the evaluations of a batch are held against: a function of the trials finished before it.
 
     Attributes:
-        limit: The score above which it is not among the incumbents.
+        limit: The score above which one is not among the incumbents.
         order: The agents in the order in which they are driven.
         disagreement: Mean |α_proxy − α_target| of each pair over the scored trials, shape (agents, agents), in the
             same order.
@@ -66,7 +67,7 @@ class Cut:
 
 
 def reference(study: Study, store: Store, done: Sequence[TrialRecord]) -> Reference | None:
-    """What the next trial is held against; None where it is not to be cut off.
+    """What the next trials are held against; None where none is to be cut off.
 
     That is so during the design, on which all else rests, and where a tolerance is a percentage: what is a tie then
     depends on agents not driven yet, so that no pair is decided before the last.
@@ -87,35 +88,31 @@ def reference(study: Study, store: Store, done: Sequence[TrialRecord]) -> Refere
 
 
 def run_or_cut(
-    study: Study, store: Store, trial: TrialRecord, against: Reference, watcher: Watcher, what: str
-) -> tuple[Spent, Cut | None]:
-    """Simulate what is missing of a trial until it is through or cut off.
+    study: Study, store: Store, trials: Sequence[TrialRecord], against: Reference, watcher: Watcher, what: str
+) -> tuple[Spent, list[Cut | None]]:
+    """Simulate what is missing of the trials until each is through or cut off.
 
-    Episodes that other processes have begun by then are kept in the store, but the trial does not stand on them.
+    Episodes that other processes have begun by then are kept in the store, but no trial stands on them.
 
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
     """
-    settings = study.settings
-    place = {agent: number for number, agent in enumerate(against.order)}
-    planned = sorted(plan(settings, trial.theta, settings.seed), key=lambda episode: place[episode.agent])
+    plans = [_in_order(study, trial, against) for trial in trials]
+    planned, plan_of = [episode for one in plans for episode in one], {one[0].theta: one for one in plans}
     before = known_outcomes(study, store, planned)
 
-    def enough(known: Mapping[Episode, Outcome]) -> bool:
+    def enough(instance: Instance, known: Mapping[Episode, Outcome]) -> bool:
         # The bound never falls, so the last of the agents decided tells for those before it.
-        count = _decided(study, against, planned, known)
-        return count >= 2 and _cut_at(study, against, planned, known, count) is not None
+        count = _decided(study, against, plan_of[instance], known)
+        return count >= 2 and _cut_at(study, against, plan_of[instance], known, count) is not None
 
     spent = run_missing(study, store, planned, watcher, what, enough)
     known = known_outcomes(study, store, planned)
-    last = _decided(study, against, planned, known)
-    cuts = (_cut_at(study, against, planned, known, count) for count in range(2, last + 1))
-    cut = next((found for found in cuts if found is not None), None)
-    if cut is None:
-        return spent, None
+    cuts = [_first_cut(study, against, one, known) for one in plans]
     watcher.begin(what, len(planned) - len(known))
-    unused = sum(episode.agent not in cut.decided for episode in known if episode not in before)
-    return spent + Spent(unused=unused), cut
+    ended = [(cut, one) for cut, one in zip(cuts, plans, strict=True) if cut]
+    vain = [episode for cut, one in ended for episode in one if episode.agent not in cut.decided]
+    return spent + Spent(unused=sum(episode in known and episode not in before for episode in vain)), cuts
 
 
 def by_other_metrics(study: Study, store: Store, trial: TrialRecord) -> TrialRecord:
@@ -141,6 +138,22 @@ def spared(study: Study, store: Store, trials: Sequence[TrialRecord]) -> tuple[i
     known = known_outcomes(study, store, planned)
     missing = [episode for episode in planned if episode not in known]
     return len(missing), sum(seconds.get((episode.agent, episode.start), 0.0) for episode in missing)
+
+
+def _in_order(study: Study, trial: TrialRecord, against: Reference) -> list[Episode]:
+    """The episodes of a trial, agent by agent as they are driven."""
+    place = {agent: number for number, agent in enumerate(against.order)}
+    planned = plan(study.settings, trial.theta, study.settings.seed)
+    return sorted(planned, key=lambda episode: place[episode.agent])
+
+
+def _first_cut(
+    study: Study, against: Reference, planned: Sequence[Episode], known: Mapping[Episode, Outcome]
+) -> Cut | None:
+    """The cut by the fewest agents; None if the trial is through."""
+    last = _decided(study, against, planned, known)
+    cuts = (_cut_at(study, against, planned, known, count) for count in range(2, last + 1))
+    return next((found for found in cuts if found is not None), None)
 
 
 def _decided(study: Study, against: Reference, planned: Sequence[Episode], known: Mapping[Episode, Outcome]) -> int:

@@ -19,14 +19,14 @@ OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.
 
 
 def running(
-    family: DomainFamily, episodes: Sequence[Episode], jobs: int, over: Callable[[], bool] = lambda: False
+    family: DomainFamily, episodes: Sequence[Episode], jobs: int, skip: Callable[[Episode], bool] = lambda _: False
 ) -> AbstractContextManager[Iterator[Outcome]]:
     """Run episodes and give each outcome as soon as it is there, in no particular order; see `working`.
 
     Raises:
         RunError: If the machine fails rather than an episode: a process dies, memory or disk run out.
     """
-    return working(functools.partial(run_episode, family), episodes, jobs, over)
+    return working(functools.partial(run_episode, family), episodes, jobs, skip)
 
 
 def run_episode(family: DomainFamily, episode: Episode) -> Outcome:

@@ -16,8 +16,11 @@ from proxytune.study.store import Outcome, Store
 from proxytune.study.study import Study
 from proxytune.usefulness import ppv, prpv
 
-Enough = Callable[[Mapping[Episode, Outcome]], bool]
-"""Whether the outcomes known so far are enough."""
+Instance = tuple[tuple[str, float], ...]
+"""θ as an episode names it."""
+
+Enough = Callable[[Instance, Mapping[Episode, Outcome]], bool]
+"""Whether the outcomes known so far are enough of a domain instance."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +86,8 @@ def run_missing(
     """Run the episodes that are not in the store yet; each is there as soon as it is finished.
 
     A failed episode counts as known where failures do not stop the study; where they do, it is tried again, since
-    something is expected to have been mended. Where it is asked whether what is known is enough, episodes begin in
-    their order, and none more begins after a yes.
+    something is expected to have been mended. Where it is asked whether what is known of a domain instance is enough,
+    agents begin in their order, each in all instances, and none more begins in an instance after a yes.
 
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
@@ -95,13 +98,14 @@ def run_missing(
     known = {episode: outcome for episode, outcome in known.items() if not (stop and outcome.failure)}
     missing = [episode for episode in planned if episode not in known]
     watcher.begin(what, len(planned) - len(missing))
-    over = bool(enough and enough(known))
+    instances = dict.fromkeys(episode.theta for episode in planned)
+    over = {instance for instance in instances if enough and enough(instance, known)}
     order = longest_first(missing, store.seconds())
     if enough:
         # Agent by agent as planned; only within an agent the longest come first.
         place = {agent: number for number, agent in enumerate(dict.fromkeys(episode.agent for episode in planned))}
         order.sort(key=lambda episode: place[episode.agent])
-    with running(study.family, order, settings.jobs, lambda: over) as outcomes:
+    with running(study.family, order, settings.jobs, lambda episode: episode.theta in over) as outcomes:
         for outcome in outcomes:
             store.save_outcome(study.identity, outcome)
             watcher.episode()
@@ -109,7 +113,9 @@ def run_missing(
             if stop and outcome.failure:
                 raise EpisodeError(f"{told(outcome)}; mend it and run again, or set on_failure = 'continue'")
             known[outcome.episode] = outcome
-            over = over or bool(enough and enough(known))
+            instance = outcome.episode.theta
+            if enough and instance not in over and enough(instance, known):
+                over.add(instance)
     return spent
 
 

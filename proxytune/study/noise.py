@@ -1,9 +1,9 @@
 """How far chance alone puts proxy and target apart at the same θ: what a search has to forgive.
 
 Both sides drive from the same starts, so it is the placement noise that differs, not the starts. The pre-flight has
-driven the centre of the box under two placements, from which follows the variance of a difference of two episodes. Without
-shared starts, or without a pre-flight, there is the spread between episodes only, which is far larger: starts differ
-more than placements.
+driven the centre of the box under two placements, from which follows the variance of a difference of two episodes.
+Without shared starts, or without a pre-flight, there is the spread between episodes only, which is far larger: starts
+differ more than placements.
 """
 
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ def _apart(values: Array) -> Array:
 
 
 def _shrunk(squares: Array) -> Array:
-    """Mean squares per agent and metric (agents, metrics) of squares (pairs, agents, metrics), NaN where one is missing.
+    """Mean squares per agent and metric of squares (pairs, agents, metrics), NaN where one is missing.
 
     Drawn towards the median over agents, since few pairs tell little of one agent.
     """

@@ -49,7 +49,7 @@ class StudyObjective:
     @property
     def identity(self) -> str:
         """All that its figures depend on, apart from the seed."""
-        of_the_search = ("seed", "initial", "engine", "cut_off")
+        of_the_search = ("seed", "initial", "batch", "engine", "cut_off")
         kept = {key: value for key, value in facts(self.study).items() if key not in of_the_search}
         return repr(sorted(kept.items()))
 

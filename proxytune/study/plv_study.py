@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from proxytune.errors import RunError
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Curve, Teaching, settled, teaching
-from proxytune.search.profile import Profile
 from proxytune.search.proposer import Proposer, Trial
 from proxytune.space import Interval, Space, Theta
 from proxytune.study.progress import Watcher
@@ -81,14 +80,14 @@ def known(trial: PlvTrial) -> float:
 
 
 def search_space(
-    settings: StudySettings, widths: Mapping[str, tuple[float, float]], seen: tuple[Profile, ...]
+    settings: StudySettings, widths: Mapping[str, tuple[float, float]], left: Mapping[str, tuple[float, float]]
 ) -> Space:
     """The box that is searched for PLV: centres where PRPV cannot tell θ from the best, and widths as asked for.
 
     Args:
         settings: Of the study.
         widths: Bounds of the width of each parameter's distribution, by parameter.
-        seen: What a study by PRPV knows of each parameter; empty where the box is not narrowed.
+        left: The ends of what PRPV cannot tell from the best, by parameter; empty where the box is not narrowed.
 
     Raises:
         SettingsError: If a width is of a parameter that is not searched.
@@ -96,7 +95,6 @@ def search_space(
     for name in widths:
         if name not in settings.space.names:
             raise settings.error(f"teaching.width.{name}", "is not among [parameters]; add it there, or take this out")
-    left = {profile.name: profile.interval for profile in seen}
     centres = [_narrowed(box, left.get(box.name)) for box in settings.space.intervals]
     return Space((*centres, *(Interval(name + WIDTH, *bounds) for name, bounds in sorted(widths.items()))))
 

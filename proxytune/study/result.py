@@ -3,34 +3,35 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from proxytune.errors import RunError
 from proxytune.search.importance import Importance, importances
-from proxytune.search.profile import Profile, profiles
-from proxytune.search.surrogate import Surrogate, fit_surrogate, unit_array
+from proxytune.search.knowledge import Knowledge, learn
+from proxytune.search.surrogate import fit_surrogate
+from proxytune.space import Theta
+from proxytune.study.composition import goal_of, trials_of
 from proxytune.study.confirmation import Confirmation, confirmation_of
 from proxytune.study.cutting import spared
 from proxytune.study.evaluate import Evaluation, evaluation, known_outcomes, told
 from proxytune.study.history import as_trials, episodes_of
+from proxytune.study.noise import noise_of
 from proxytune.study.preflight import Preflight, preflight_of
 from proxytune.study.stopping import stopped
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
-from proxytune.usefulness import Assessment, assess
+from proxytune.usefulness import Assessment, NoiseFloor, assess
 
 FAILURES_TOLD = 10
 
 
 @dataclass(frozen=True)
 class Best:
-    """The answer: the θ that fresh episodes confirm, and until then the visited one with the lowest posterior mean.
+    """The answer: the θ that fresh episodes confirm, and until then the visited one of lowest expected PRPV.
 
     It is never the trial with the lowest PRPV for that alone, which is partly luck.
 
     Attributes:
         trial: The trial that visited it.
-        posterior_mean: Mean of PRPV there, given all trials.
+        posterior_mean: PRPV that is expected there in fresh episodes.
         posterior_deviation: Its standard deviation.
         assessment: How useful the proxy is there in the trial's own episodes, by every measure, with noise floor and
             chance level.
@@ -50,30 +51,54 @@ class StudyResult:
         study: Which one.
         trials: Its finished and failed trials, in order.
         best: The best of them.
-        profiles: What is known of each parameter, in the order of the box.
+        knowledge: What is known of θ.
+        answers: After each trial, the visited θ of lowest expected PRPV as all trials judge it; None while none has
+            a score.
+        truth: The θ that made the target, where that is known.
         importances: How much each parameter matters, in the order of the box.
         confirmation: What fresh episodes say of it; None if they are off, or not all driven yet.
         preflight: What was learnt of the parameters before the first trial; None if it is off or was never run.
         stopped: Why it runs no further; empty while it is not at its end.
         spared: What the trials that were cut off did without: episodes, and about how many seconds of them.
         failures: The first failed episodes, told in one line each.
+        cautions: What the target's table does not allow, in one line each.
     """
 
     study: Study
     trials: tuple[TrialRecord, ...]
     best: Best
-    profiles: tuple[Profile, ...]
+    knowledge: Knowledge
+    answers: tuple[TrialRecord | None, ...]
+    truth: Theta | None
     importances: tuple[Importance, ...]
     confirmation: Confirmation | None
     preflight: Preflight | None
     stopped: str
     spared: tuple[int, float]
     failures: tuple[str, ...]
+    cautions: tuple[str, ...]
 
     @property
     def unidentified(self) -> tuple[str, ...]:
-        """The parameters of which every value in the box is as good as the best, beyond noise."""
-        return tuple(profile.name for profile in self.profiles if profile.unidentified)
+        """The parameters of which nearly any value in the box is compatible with the target."""
+        return self.knowledge.unidentified
+
+    @property
+    def judged(self) -> Assessment:
+        """What the answer is judged by: its fresh episodes, or while there are none its trial's own."""
+        fresh = self.confirmation.answer.assessment if self.confirmation else None
+        return fresh or self.best.assessment
+
+    @property
+    def floor(self) -> NoiseFloor:
+        """What a perfect proxy would score: of the same starts where fresh episodes tell."""
+        return self.judged.noise_floor
+
+    @property
+    def perfect(self) -> bool:
+        """Whether it has been shown that the proxy cannot be told from a perfect one."""
+        fresh = self.confirmation is not None and self.confirmation.answer.assessment is not None
+        return fresh and bool(self.judged.at_noise_floor) and self.knowledge.misfit.fits is not False
 
     @property
     def failed_episodes(self) -> int:
@@ -107,34 +132,52 @@ def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | N
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
         raise RunError(f"{store.path}: {reason}")
     space = study.settings.space
-    surrogate = fit_surrogate(space, as_trials(space, trials))
+    learnt = learn(space, trials_of(study, store, trials), goal_of(study, store), study.settings.seed)
     confirmation = confirmation_of(study, store, trials)
-    answer = confirmation.answer.trial if confirmation else _favourite(scored, surrogate)
+    answers = _answers(trials, learnt)
+    answer = confirmation.answer.trial if confirmation else answers[-1]
+    assert answer is not None
     return StudyResult(
         study=study,
         trials=trials,
-        best=_best(study, store, answer, surrogate),
-        profiles=profiles(surrogate, space.values(answer.theta)),
-        importances=importances(surrogate),
+        best=_best(study, store, answer, learnt),
+        knowledge=learnt,
+        answers=answers,
+        truth=study.truth,
+        importances=importances(fit_surrogate(space, as_trials(space, trials))),
         confirmation=confirmation,
         preflight=preflight_of(study, store),
         stopped=stopped(study, store, trials),
         spared=spared(study, store, trials),
         failures=_failures(study, store, trials),
+        cautions=_cautions(study, store),
     )
 
 
-def _favourite(scored: list[TrialRecord], surrogate: Surrogate) -> TrialRecord:
-    means, _ = surrogate.predict(unit_array(surrogate.space, [surrogate.space.values(t.theta) for t in scored]))
-    return scored[int(np.argmin(means))]
+def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialRecord | None, ...]:
+    scored = [trial for trial in trials if trial.prpv is not None]
+    expected = {trial.number: learnt.expected[learnt.space.values(trial.theta)] for trial in scored}
+    found: list[TrialRecord | None] = []
+    best: TrialRecord | None = None
+    for trial in trials:
+        if trial.number in expected and (best is None or expected[trial.number] < expected[best.number]):
+            best = trial
+        found.append(best)
+    return tuple(found)
 
 
-def _best(study: Study, store: Store, answer: TrialRecord, surrogate: Surrogate) -> Best:
-    mean, deviation = surrogate.predict(unit_array(surrogate.space, [surrogate.space.values(answer.theta)]))
+def _cautions(study: Study, store: Store) -> tuple[str, ...]:
+    left_out = f"the target has no scores of {', '.join(study.left_out)}: left out" if study.left_out else ""
+    return tuple(line for line in (left_out, noise_of(study, store).caution) if line)
+
+
+def _best(study: Study, store: Store, answer: TrialRecord, learnt: Knowledge) -> Best:
+    values = learnt.space.values(answer.theta)
+    _, deviation = learnt.scores([values])
     proxy = known_evaluation(study, store, answer).proxy
     assert proxy is not None
     assessment = assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
-    return Best(answer, float(mean[0]), float(deviation[0]), assessment)
+    return Best(answer, learnt.expected[values], float(deviation[0]), assessment)
 
 
 def known_evaluation(study: Study, store: Store, trial: TrialRecord) -> Evaluation:

@@ -1,15 +1,14 @@
-"""The loop of a study: propose, simulate, score, until the budget is spent or a rule says stop."""
+"""The loop of a study: propose a batch, simulate, score, until the budget is spent or a rule says stop."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from proxytune.errors import RunError, SettingsError
-from proxytune.search.proposer import Proposer, Trial
-from proxytune.space import Theta
+from proxytune.search.proposer import Proposer, Trial, batch_at, propose_batch
 from proxytune.study.composition import trial_of
-from proxytune.study.cutting import Reference, reference, run_or_cut
-from proxytune.study.evaluate import Evaluation, Spent, evaluation, known_outcomes, simulate
+from proxytune.study.cutting import Cut, Reference, reference, run_or_cut
+from proxytune.study.evaluate import Evaluation, Spent, evaluation, known_outcomes, run_missing
 from proxytune.study.history import episodes_of
 from proxytune.study.progress import Watcher
 from proxytune.study.stopping import stopped
@@ -20,8 +19,8 @@ from proxytune.study.study import Study, changes, facts
 def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) -> Spent:
     """Run a study to the end of its budget, or until a rule stops it, from wherever it was left.
 
-    The next θ is a function of the seed and the finished trials alone, and an episode that has been simulated is never
-    simulated again: a study stopped at any moment goes on as if it had not been.
+    The next batch is a function of the seed and the trials before it alone, and an episode that has been simulated is
+    never simulated again: a study stopped at any moment goes on as if it had not been.
 
     Raises:
         SettingsError: If what the finished trials depend on has changed.
@@ -31,38 +30,64 @@ def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) 
     """
     check_facts(study, store)
     spent = Spent()
-    trials = store.trials()
-    done = [trial for trial in trials if trial.state != "open"]
+    done = [trial for trial in store.trials() if trial.state != "open"]
     told = [trial_of(study, store, trial) for trial in done]
     while not stopped(study, store, done):
         _check_hope(study, done)
-        number = len(done) + 1
-        theta = trials[-1].theta if len(trials) == number else _propose(study, proposer, told)
-        store.save_trial(study.identity, TrialRecord(number, theta))
-        against = reference(study, store, done)
-        cost, ended = _evaluated(study, store, TrialRecord(number, theta), against, watcher)
+        batch = batch_at(len(done), study.settings.batch, study.settings.initial)
+        opened = _opened(study, store, proposer, told, batch)
+        against = reference(study, store, done[: batch.start])
+        cost, ended = _evaluated(study, store, opened, against, watcher)
         spent += cost
-        done.append(ended)
-        store.save_trial(study.identity, done[-1])
-        told.append(trial_of(study, store, done[-1]))
+        store.save_trial(study.identity, *ended)
+        done += ended
+        told += [trial_of(study, store, trial) for trial in ended]
         _tell_best(watcher, done)
     return spent
 
 
+def _opened(study: Study, store: Store, proposer: Proposer, told: Sequence[Trial], batch: range) -> list[TrialRecord]:
+    """What is left of a batch within the budget: open trials in the store, or else proposed, and in the store now.
+
+    Where the budget once cut the batch short, the rest of it is what it would have been.
+    """
+    settings = study.settings
+    last = min(batch.stop, settings.budget)
+    found = [trial for trial in store.trials() if len(told) < trial.number <= last]
+    if len(found) < last - len(told):
+        made = propose_batch(proposer, settings.space, told[: batch.start], settings.seed, last - batch.start)
+        thetas = enumerate(map(settings.space.theta, made), start=batch.start + 1)
+        found += [TrialRecord(number, theta) for number, theta in thetas if number > len(told) + len(found)]
+        store.save_trial(study.identity, *found)
+    return found
+
+
 def _evaluated(
-    study: Study, store: Store, trial: TrialRecord, against: Reference | None, watcher: Watcher
-) -> tuple[Spent, TrialRecord]:
-    """Simulate a trial to its end, or until it is cut off; what it cost and how it ended."""
-    what = f"trial {trial.number} of {study.settings.budget}"
+    study: Study, store: Store, trials: Sequence[TrialRecord], against: Reference | None, watcher: Watcher
+) -> tuple[Spent, list[TrialRecord]]:
+    """Simulate trials to their end, or until each is cut off; what it cost and how they ended."""
+    what = _told(trials, study.settings.budget)
     if against is None:
-        spent, cut = simulate(study, store, trial.theta, watcher, what), None
-    else:
-        spent, cut = run_or_cut(study, store, trial, against, watcher, what)
+        planned = [episode for trial in trials for episode in episodes_of(study.settings, trial)]
+        spent = run_missing(study, store, planned, watcher, what)
+        return spent, [_ended(study, store, trial, None) for trial in trials]
+    spent, cuts = run_or_cut(study, store, trials, against, watcher, what)
+    return spent, [_ended(study, store, trial, cut) for trial, cut in zip(trials, cuts, strict=True)]
+
+
+def _told(trials: Sequence[TrialRecord], budget: int) -> str:
+    """Which trials these are, in one phrase."""
+    first, last = trials[0].number, trials[-1].number
+    return f"trial {first} of {budget}" if first == last else f"trials {first} to {last} of {budget}"
+
+
+def _ended(study: Study, store: Store, trial: TrialRecord, cut: Cut | None) -> TrialRecord:
+    """A trial as its episodes, all or those up to the cut, leave it."""
     if cut is None:
-        return spent, record(trial.number, evaluation(study, store, trial.theta))
+        return record(trial.number, evaluation(study, store, trial.theta))
     ended = replace(trial, state="cut", decided=cut.decided, bound=cut.bound, estimate=cut.estimate)
     outcomes = known_outcomes(study, store, episodes_of(study.settings, ended)).values()
-    return spent, replace(ended, failed_episodes=sum(outcome.metrics is None for outcome in outcomes))
+    return replace(ended, failed_episodes=sum(outcome.metrics is None for outcome in outcomes))
 
 
 def check_facts(study: Study, store: Store) -> None:
@@ -103,11 +128,6 @@ def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsE
         f"{study.settings.path}: changed since the first trial: {', '.join(changes(before, facts(study)))}; "
         f"put it back, or move {store.path.name} away to start again"
     )
-
-
-def _propose(study: Study, proposer: Proposer, told: Sequence[Trial]) -> Theta:
-    space = study.settings.space
-    return space.theta(proposer.propose(space, told, study.settings.seed))
 
 
 def record(number: int, found: Evaluation | None) -> TrialRecord:

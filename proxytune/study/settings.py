@@ -17,8 +17,8 @@ FILE_NAME = "study.toml"
 FORMAT = 1
 OBJECTIVES = ("prpv", "plv")
 KEYS = (
-    "format", "name", "family", "proxy", "target", "objective", "metrics", "agents",
-    "starts", "budget", "initial", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
+    "format", "name", "family", "proxy", "target", "truth", "objective", "metrics", "agents",
+    "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
     "cut_off", "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
 
@@ -47,12 +47,14 @@ class StudySettings:
         family: Where the domain family comes from, as "module:factory".
         proxy: A model.toml whose effects the proxy has, if any.
         target: The score table of the target.
+        truth: A model.toml of what made the target, where that is known.
         objective: The measure that is made small.
         metrics: How agents are compared.
         agents: Names of the agents, at least two.
         starts: How many of the family's starting conditions, the first ones, each agent drives from.
         budget: How many trials.
         initial: How many of them come from the quasi-random design.
+        batch: How many trials are proposed together, and their episodes run together.
         engine: What proposes the others.
         seed: Seed of the episodes and of the search.
         jobs: How many processes run episodes.
@@ -71,12 +73,14 @@ class StudySettings:
     family: str
     proxy: Path | None
     target: Path
+    truth: Path | None
     objective: str
     metrics: tuple[Metric, ...]
     agents: tuple[str, ...]
     starts: int
     budget: int
     initial: int
+    batch: int
     engine: str
     seed: int
     jobs: int
@@ -116,12 +120,14 @@ def read_study_settings(path: Path) -> StudySettings:
         family=read.text("family", DEFAULT_FAMILY),
         proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
         target=path.parent / read.text("target"),
+        truth=path.parent / read.text("truth") if "truth" in read.values else None,
         objective=read.text("objective", "prpv", choices=OBJECTIVES),
         metrics=_metrics(read),
         agents=_agents(read),
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", low=1, high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
+        batch=read.whole("batch", 1, low=1, high=100_000),
         engine=read.text("engine", _default_engine(read), choices=STUDY_ENGINES),
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
@@ -193,6 +199,7 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "starts": settings.starts,
         "budget": settings.budget,
         "initial": settings.initial,
+        "batch": settings.batch,
         "engine": settings.engine,
         "seed": settings.seed,
         "jobs": settings.jobs,

@@ -146,23 +146,24 @@ class Store:
             connection.executemany("INSERT INTO facts VALUES (?, ?)", rows)
 
     def trials(self) -> list[TrialRecord]:
-        """Every trial, in order; the last may be open."""
+        """Every trial, in order; the last ones may be open."""
         rows = self._all(
             "SELECT number, theta, state, prpv, ppv, failed_episodes, failure, decided, bound, estimate"
             " FROM trials JOIN instances ON instances.id = trials.instance ORDER BY number"
         )
         return [_trial(*row) for row in rows]
 
-    def save_trial(self, identity: str, trial: TrialRecord) -> None:
-        """Write a trial, over what was known of it before."""
+    def save_trial(self, identity: str, *trials: TrialRecord) -> None:
+        """Write a trial, or several at once, over what was known of it before."""
         with self._transaction() as connection:
-            row = (trial.state, trial.prpv, trial.ppv, trial.failed_episodes, trial.failure)
-            cut = (json.dumps(trial.decided), trial.bound, trial.estimate)
-            instance = self._instance(connection, identity, theta_json(trial.theta))
-            connection.execute(
-                "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (trial.number, instance, *row, *cut),
-            )
+            for trial in trials:
+                row = (trial.state, trial.prpv, trial.ppv, trial.failed_episodes, trial.failure)
+                cut = (json.dumps(trial.decided), trial.bound, trial.estimate)
+                instance = self._instance(connection, identity, theta_json(trial.theta))
+                connection.execute(
+                    "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                    (trial.number, instance, *row, *cut),
+                )
 
     def save_outcome(self, identity: str, outcome: Outcome) -> None:
         """Write an episode, over an earlier failure of the same."""

@@ -3,20 +3,22 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from proxytune.domain import DomainFamily
+from proxytune.effects import read_model
 from proxytune.errors import InputError, ScoresError
 from proxytune.scores import ScoreTable, read_scores
 from proxytune.search.engines import WITH_OUTPUTS
 from proxytune.settings import nearest
+from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
 
-UNSAID = "gp"
-"""The engine of a study.db that names none."""
+UNSAID = {"batch": 1, "engine": "gp"}
+"""What a study.db that names none of these was run with."""
 
 
 @dataclass(frozen=True)
@@ -29,12 +31,16 @@ class Study:
         target: The target's scores of the study's agents, in the study's order: the metrics by which they are compared,
             then every other one that the family has too.
         identity: What determines the result of an episode in the proxy, apart from the episode.
+        truth: The θ that made the target, where study.toml names a model of it; nothing depends on it.
+        left_out: Agents of study.toml that the target has no scores of.
     """
 
     settings: StudySettings
     family: DomainFamily
     target: ScoreTable
     identity: str
+    truth: Theta | None = None
+    left_out: tuple[str, ...] = ()
 
 
 def open_study(path: Path) -> Study:
@@ -45,21 +51,42 @@ def open_study(path: Path) -> Study:
     """
     settings = read_study_settings(path)
     family = load_family(settings, settings.proxy)
-    return Study(settings, family, read_target(settings, family), family.identity)
+    known, left_out = _with_scores(settings)
+    return Study(known, family, read_target(known, family), family.identity, _truth(settings), left_out)
+
+
+def _with_scores(settings: StudySettings) -> tuple[StudySettings, tuple[str, ...]]:
+    """The study of those agents that the target has scores of, and the others.
+
+    Raises:
+        InputError: If fewer than two are left.
+    """
+    scored = read_scores(settings.target, [metric.name for metric in settings.metrics]).agents
+    there = tuple(agent for agent in settings.agents if agent in scored)
+    missing = tuple(agent for agent in settings.agents if agent not in scored)
+    if len(there) < 2:
+        hint = nearest(missing[0], scored) if len(missing) == 1 else "add them, or take them out of the study"
+        raise InputError(f"{settings.target}: has no scores of {', '.join(missing)}; {hint}")
+    return replace(settings, agents=there), missing
+
+
+def _truth(settings: StudySettings) -> Theta | None:
+    if settings.truth is None:
+        return None
+    if not settings.truth.is_file():
+        raise settings.error("truth", f"no such file: {settings.truth}; check the path, or take it out")
+    known = read_model(settings.truth).theta
+    return {name: known[name] for name in settings.space.names if name in known}
 
 
 def read_target(settings: StudySettings, family: DomainFamily) -> ScoreTable:
     """The target's scores of the study's agents.
 
     Raises:
-        InputError: If the table lacks an agent or a metric, or has a value that is not finite.
+        InputError: If the table lacks a metric, or has a value that is not finite.
     """
     compared = [metric.name for metric in settings.metrics]
     table = read_scores(settings.target, [*compared, *_others(settings, family, compared)])
-    missing = [agent for agent in settings.agents if agent not in table.agents]
-    if missing:
-        hint = nearest(missing[0], table.agents) if len(missing) == 1 else "add them, or take them out of the study"
-        raise InputError(f"{settings.target}: has no scores of {', '.join(missing)}; {hint}")
     chosen = table.arrange(agents=settings.agents)
     driven = [label for column, label in enumerate(chosen.episodes) if chosen.driven[:, column].any()]
     return chosen.arrange(agents=settings.agents, episodes=driven)
@@ -82,15 +109,17 @@ def facts(study: Study) -> dict[str, Any]:
     """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
 
     Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
-    identity covers it. The engine `gp` goes without saying, as it did when there was no other. An engine that learns
-    from every output depends on the whole of the target's table, and on the pre-flight's noise.
+    identity covers it. The engine `gp` goes without saying, as it did when there was no other, and so do batches of one
+    trial. An engine that learns from every output depends on the whole of the target's table, and on the pre-flight's
+    noise.
     """
     settings = study.settings
-    engine: dict[str, Any] = {} if settings.engine == UNSAID else {"engine": settings.engine}
+    named: dict[str, Any] = {"batch": settings.batch, "engine": settings.engine}
+    said = {key: value for key, value in named.items() if value != UNSAID[key]}
     compared = [metric.name for metric in settings.metrics]
     learns = settings.engine in WITH_OUTPUTS
     if learns:
-        engine["preflight"] = settings.preflight
+        said["preflight"] = settings.preflight
     return {
         "family": settings.family,
         "target": _table_digest(study.target if learns else study.target.select(compared)),
@@ -100,7 +129,7 @@ def facts(study: Study) -> dict[str, Any]:
         "starts": settings.starts,
         "initial": settings.initial,
         "seed": settings.seed,
-        **engine,
+        **said,
         "cut_off": settings.cut_off,
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
@@ -122,8 +151,7 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
 def _change(key: str, before: Any, after: Any) -> str:
     if key == "target":
         return "target (its contents)"
-    if key == "engine" and before is None:
-        before = UNSAID
+    before = UNSAID.get(key) if before is None else before
     shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
     return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
 

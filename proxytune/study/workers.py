@@ -11,7 +11,6 @@ from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import takewhile
 from typing import Any, TypeVar, cast
 
 from joblib import Parallel, delayed
@@ -25,7 +24,7 @@ Result = TypeVar("Result")
 
 @contextmanager
 def working(
-    work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int, over: Callable[[], bool] = lambda: False
+    work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int, skip: Callable[[Piece], bool] = lambda _: False
 ) -> Iterator[Iterator[Result]]:
     """Do pieces of work and give each result as soon as it is there, in no particular order.
 
@@ -36,12 +35,12 @@ def working(
         work: Does one piece; picklable.
         pieces: What to do, in the order in which to begin.
         jobs: How many processes; with one, everything is done in this process.
-        over: Once this is true no further piece begins; those under way are still finished.
+        skip: Whether a piece need not be done any more, asked when it is about to begin; those under way are finished.
 
     Raises:
         RunError: If a process dies.
     """
-    begun = takewhile(lambda _: not over(), pieces)
+    begun = (piece for piece in pieces if not skip(piece))
     results = _spread(work, begun, jobs) if min(jobs, len(pieces)) > 1 else _here(work, begun)
     try:
         yield _told(results)

@@ -75,6 +75,23 @@ def ordered(section: Section, *, model: Path | None) -> Ordered:
     return Ordered()
 
 
+def ordered_study(make, called="cutting", **changes):
+    """A study of eight agents whose order gets lost away from the best θ; `make` is make_study."""
+    folder = make(
+        called,
+        parameters={"first": "[0, 1]", "second": "[0, 1]"},
+        **{
+            "family": '"partly_dead:ordered"',
+            "agents": "[" + ", ".join(f'"agent{number}"' for number in range(8)) + "]",
+            "budget": "14",
+            "cut_off": "true",
+            **changes,
+        },
+    )
+    (folder / "target.csv").write_text(ORDERED)
+    return folder
+
+
 ORDERED = "agent,episode,distance,survival_time\n" + "".join(
     f"agent{number},{start},{number + 0.1 * start},{2 * number}\n" for number in range(8) for start in range(3)
 )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from proxytune.search.goal import Goal
 from proxytune.search.proposer import Trial
 from proxytune.space import Interval, Space
 
@@ -16,6 +17,17 @@ def steps(values):
 def whole(outcomes):
     """The score of an outcome that is the score itself."""
     return outcomes[..., 0]
+
+
+WHOLE = Goal((("agent", "score"),), np.zeros(1), np.zeros(1), whole)
+"""An outcome that is the score itself; the target's is 0."""
+
+
+def goal(compose, values, noise=0.0):
+    """The target of so many outputs, each one metric of an agent of its own."""
+    values = np.array(values, dtype=float)
+    names = tuple((f"agent{number}", "metric") for number in range(len(values)))
+    return Goal(names, values, np.full(len(values), noise), compose)
 
 
 def search(proposer, budget, seed, score=steps):

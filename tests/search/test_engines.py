@@ -3,7 +3,7 @@ import importlib.util
 
 import numpy as np
 import pytest
-from steps import SPACE, search, steps, whole
+from steps import SPACE, WHOLE, search, steps
 
 from proxytune.errors import InputError
 from proxytune.search import engines
@@ -17,7 +17,7 @@ HERE = [name for name in ENGINES if name not in WITHOUT]
 
 
 def made(engine, initial):
-    return make_proposer(engine, initial, whole)
+    return make_proposer(engine, initial, WHOLE)
 
 
 @pytest.mark.parametrize("engine", HERE)

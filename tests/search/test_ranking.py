@@ -18,7 +18,7 @@ def test_the_score_is_prpv_of_its_episodes_and_what_is_composed_of_its_outcome(s
     tables = {"proxy": OBJECTIVE.table(values, seed), "target": OBJECTIVE.target(seed)}
     assert score == prpv(**tables, metrics=METRICS).value == OBJECTIVE.score(values, seed)
     outcomes = np.array([OBJECTIVE.outcome(values, seed)] * 3).reshape(3, 1, -1)
-    assert np.array_equal(OBJECTIVE.compose(seed)(outcomes), np.full((3, 1), score))
+    assert np.array_equal(OBJECTIVE.goal(seed).compose(outcomes), np.full((3, 1), score))
 
 
 @settings(derandomize=True, max_examples=20, deadline=None)

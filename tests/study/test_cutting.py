@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from partly_dead import ORDERED
+from partly_dead import ordered_study
 from stopping import Stopping
 
 from proxytune.scores import Metric
@@ -27,33 +27,16 @@ BUDGET, ALL = 14, 8 * 3
 """Trials, and episodes of one that is not cut off."""
 
 
-def study_of(make, called="cutting", **changes):
-    """A study of eight agents whose order gets lost away from the best θ."""
-    folder = make(
-        called,
-        parameters={"first": "[0, 1]", "second": "[0, 1]"},
-        **{
-            "family": '"partly_dead:ordered"',
-            "agents": "[" + ", ".join(f'"agent{number}"' for number in range(8)) + "]",
-            "budget": str(BUDGET),
-            "cut_off": "true",
-            **changes,
-        },
-    )
-    (folder / "target.csv").write_text(ORDERED)
-    return folder
-
-
 @pytest.fixture
 def cutting(make_study):
     """Writes such a study."""
-    return lambda called="cutting", **changes: study_of(make_study, called, **changes)
+    return lambda called="cutting", **changes: ordered_study(make_study, called, **changes)
 
 
 @pytest.fixture(scope="module")
 def done_once(make_studies):
     """Such a study, run once."""
-    return run(study_of(make_studies))
+    return run(ordered_study(make_studies))
 
 
 @pytest.fixture

@@ -91,5 +91,15 @@ def test_leaving_early_drops_the_episodes_not_yet_begun(tmp_path):
         assert len(journal.read_text().splitlines()) < 20
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_whether_an_episode_is_left_out_is_asked_when_it_is_about_to_begin(jobs):
+    given = []
+    with running(Wobbly(), EPISODES * 5, jobs, lambda one: one.agent == "agent1" or len(given) >= 3) as outcomes:
+        for outcome in outcomes:
+            given.append(outcome.episode)
+    assert "agent1" not in {episode.agent for episode in given}
+    assert 3 <= len(given) <= 3 + 2 * jobs
+
+
 def test_no_episode_at_all_is_fine():
     assert run_all(Wobbly(), 2, []) == {}

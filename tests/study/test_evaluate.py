@@ -119,11 +119,11 @@ def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(mak
     study = open_study(make_study(jobs=str(jobs)))
     planned = plan(study.settings, THETA, 1)
     with Store.open(study.settings.folder) as store:
-        spent = run_missing(study, store, planned, Silent(), "", lambda known: len(known) >= 5)
+        spent = run_missing(study, store, planned, Silent(), "", lambda _, known: len(known) >= 5)
         known = known_outcomes(study, store, planned)
         assert spent.episodes == len(known)
         assert len(known) == 5 if jobs == 1 else len(known) >= 5
-        assert run_missing(study, store, planned, Silent(), "", lambda known: len(known) >= 5).episodes == 0
+        assert run_missing(study, store, planned, Silent(), "", lambda _, known: len(known) >= 5).episodes == 0
         assert run_missing(study, store, planned, Silent(), "").episodes == len(planned) - len(known)
 
 
@@ -134,9 +134,27 @@ def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp
     with Store.open(study.settings.folder) as store:
         simulate(study, store, {"trim": 0.0, "delay": 0.0}, Silent(), "")  # tells which episodes take longest
         journal.unlink()
-        run_missing(study, store, planned, Silent(), "", lambda known: False)
+        run_missing(study, store, planned, Silent(), "", lambda _, known: False)
     driven = [line.split()[0] for line in journal.read_text().splitlines()]
     assert driven == [episode.agent for episode in planned]
+
+
+def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_of_them(make_study, tmp_path):
+    journal = tmp_path / "journal"
+    study = open_study(make_study(domain={"journal": f'"{journal}"'}))
+    plans = [plan(study.settings, {"trim": trim, "delay": 0.1}, 1) for trim in (0.0, 0.1, 0.2)]
+    planned, short = [episode for one in plans for episode in one], plans[1][0].theta
+
+    def enough(instance, known):
+        return instance == short and sum(episode.theta == short for episode in known) >= 7
+
+    with Store.open(study.settings.folder) as store:
+        spent = run_missing(study, store, planned, Silent(), "", enough)
+        known = known_outcomes(study, store, planned)
+    assert spent.episodes == 18 + 7 + 18
+    assert [sum(episode in known for episode in one) for one in plans] == [18, 7, 18]
+    driven = [line.split()[0] for line in journal.read_text().splitlines()]
+    assert driven == sorted(driven), "agent after agent, each in all instances"
 
 
 def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
@@ -147,4 +165,4 @@ def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
         run_missing(study, store, planned, Silent(), "")
         stopping = replace(study, settings=replace(study.settings, stop_on_failure=True))
         with pytest.raises(EpisodeError, match="agent 'agent3'"):
-            run_missing(stopping, store, planned, Silent(), "", lambda known: len(known) == len(planned))
+            run_missing(stopping, store, planned, Silent(), "", lambda _, known: len(known) == len(planned))

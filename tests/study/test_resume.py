@@ -232,3 +232,30 @@ def test_pre_flight_cut_trials_and_confirmation_survive_being_stopped(make_study
     assert any(trial["prpv"] is None for trial in expected["trials"]), "something was cut off"
     for key in ("trials", "best", "preflight", "confirmation", "stopped"):
         assert found.get(key) == expected.get(key), key
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("engine", [name for name in ("gp", "outcomes") if name in STUDY_ENGINES])
+def test_a_study_killed_within_batches_gives_the_trials_of_one_that_was_not(make_study, launcher, engine, jobs, capsys):
+    """To the last bit, with trials cut off and the answer confirmed, by `kill -9` alone."""
+    phases = {"initial": "4", "budget": "12", "cut_off": "true", "confirm": "1"}
+    keys = {"engine": f'"{engine}"', "batch": "3", "seed": "6", **phases}
+    whole = make_study("whole", **keys)
+    assert main(["study", str(whole), "--json"]) == 0
+    expected = json.loads(capsys.readouterr().out)
+    folder = make_study("stopped", domain={"sleep": "0.01"}, jobs=jobs, **keys)
+    pending = []
+    for moment in np.sort(np.random.default_rng(int(jobs)).choice(np.arange(10, 150), 4, replace=False)).tolist():
+        process = Launched(launcher, folder)
+        wait_for(folder, process, moment)
+        stop(process, signal.SIGKILL)
+        pending.append(sum(trial[2] == "open" for trial in trials(folder)))
+    assert main(["study", str(folder), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert max(pending) == 3, "it was killed while a whole batch was open"
+    assert any(trial["prpv"] is None for trial in expected["trials"]), "something was cut off"
+    assert trials(folder) == trials(whole)
+    assert found["best"]["fresh"] is not None
+    for key in ("trials", "best", "stopped"):
+        assert found[key] == expected[key], key

@@ -10,21 +10,23 @@ def test_a_study_is_given_as_its_folder_or_its_file(make_study):
 
 
 def test_what_is_written_is_what_is_read(make_study):
-    settings = read_study_settings(make_study(jobs="2", on_failure='"stop"', proxy='"m.toml"'))
+    settings = read_study_settings(make_study(jobs="2", batch="9", on_failure='"stop"', proxy='"m.toml"'))
     assert (settings.name, settings.starts, settings.budget, settings.initial) == ("wobbly", 3, 7, 5)
     assert (settings.seed, settings.jobs, settings.stop_on_failure) == (1, 2, True)
     assert [str(metric) for metric in settings.metrics] == ["distance:max", "survival_time:max"]
     assert settings.target == settings.folder / "target.csv"
     assert settings.proxy == settings.folder / "m.toml"
+    assert as_document(settings)["batch"] == settings.batch == 9, "more than the budget is fine"
     assert as_document(settings)["on_failure"] == "stop"
     assert as_document(settings)["preflight"] is settings.preflight is False
     assert settings.stop == StopRules()
 
 
 def test_what_may_be_left_out_has_a_default(make_study):
-    left_out = dict.fromkeys(("name", "family", "initial", "seed", "jobs", "preflight", "confirm", "cut_off"))
+    left_out = dict.fromkeys(("name", "family", "initial", "batch", "seed", "jobs", "preflight", "confirm", "cut_off"))
     settings = read_study_settings(make_study("mine", **left_out))
     assert (settings.name, settings.family, settings.proxy) == ("mine", DEFAULT_FAMILY, None)
+    assert settings.batch == 1
     assert (settings.initial, settings.seed, settings.jobs, settings.stop_on_failure) == (8, 1, 1, False)
     assert (settings.engine, settings.preflight, settings.confirm, settings.cut_off) == ("gp", True, 1, True)
 
@@ -56,6 +58,8 @@ BAD = {
     "a fraction": ({"starts": "2.5"}, "starts: must be a whole number"),
     "no budget": ({"budget": "0"}, "budget: must be between 1 and"),
     "no start": ({"starts": "0"}, "starts: must be between 1 and"),
+    "no trial at all in a batch": ({"batch": "0"}, "batch: must be between 1 and"),
+    "half a trial more in a batch": ({"batch": "1.5"}, "batch: must be a whole number"),
     "no job": ({"jobs": "0"}, "jobs: must be between 1 and"),
     "a negative seed": ({"seed": "-1"}, "seed: must be between 0 and"),
     "one agent": ({"agents": '["agent0"]'}, "agents: comparing takes at least two agents, got 1"),

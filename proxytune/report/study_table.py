@@ -23,6 +23,8 @@ THETA, WORTH, TOLD, SEARCH = (
     "The search",
 )
 
+OF_THE_PROXY = "the proxy at the best θ against itself, same starts: what a perfect proxy would score"
+
 
 def worth_lines(result: StudyResult) -> list[str]:
     """PRPV, what it is to be held against, whether the model fits, PPV; one line each, then what to take with care."""
@@ -31,7 +33,7 @@ def worth_lines(result: StudyResult) -> list[str]:
     interval = "" if inner.low is None else f", interval {inner.low:.1f} to {inner.high:.1f}"
     lines = [
         *fresh_lines(result),
-        *floor_lines(result.floor),
+        *floor_lines(result.floor, "" if result.judged is found else OF_THE_PROXY),
         chance_line(result),
         misfit_line(result),
         f"PRPV {found.prpv.value} of at most {worst}{interval}, in the search's own episodes; lower is better",
@@ -55,11 +57,13 @@ def fresh_lines(result: StudyResult) -> list[str]:
     return [f"on fresh episodes PRPV {answer.assessment.prpv.value}{interval}: {luck}{compared}"]
 
 
-def floor_lines(floor: NoiseFloor) -> list[str]:
+def floor_lines(floor: NoiseFloor, meaning: str = "") -> list[str]:
     """What the noise floor is, by its kind; nothing without one."""
     if floor.value is None or floor.low is None or floor.high is None:
         return []
-    return [f"{floor.title} {short(floor.value)} ({short(floor.low)} to {short(floor.high)}): {floor.meaning}"]
+    return [
+        f"{floor.title} {short(floor.value)} ({short(floor.low)} to {short(floor.high)}): {meaning or floor.meaning}"
+    ]
 
 
 def chance_line(result: StudyResult) -> str:

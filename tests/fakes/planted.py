@@ -8,6 +8,7 @@ import numpy as np
 from proxytune.search.information import Information
 from proxytune.search.misfit import Misfit
 from proxytune.search.region import posterior_of
+from proxytune.study.confirmation import Candidate, Confirmation
 
 FITS, LACKS, UNTOLD = Misfit(1.0, 1.1, 0.4), Misfit(9.0, 1.1, 0.002), Misfit(1.0, None, None)
 AGENTS = (("agent4", 0.46), ("agent0", 0.3), ("agent1", 0.2), ("agent2", 0.04))
@@ -39,3 +40,15 @@ def planted(result, centre=(0.4, 2.0 / 3.0), deviation=(0.05, 0.02), correlation
     # They are cached properties, so what is in the dictionary is what they give.
     learnt.__dict__.update(found)
     return replace(result, knowledge=learnt)
+
+
+def confirmed(result, score=12, ends=(8.0, 20.0), **floor):
+    """The result, its answer confirmed by fresh episodes with this PRPV, interval and noise floor."""
+    own = result.best.assessment
+    inner = replace(own.prpv_interval, low=ends[0], high=ends[1])
+    noise = replace(own.noise_floor, **floor)
+    fresh = replace(own, prpv=replace(own.prpv, value=score), prpv_interval=inner, noise_floor=noise)
+    # What else a candidate has is of no matter to a report.
+    fields = dict.fromkeys(Candidate.__dataclass_fields__, ())
+    answer = Candidate(**{**fields, "trial": result.best.trial, "scores": (score,), "assessment": fresh})
+    return replace(result, confirmation=Confirmation(answer, (answer,), 18))

@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planted import confirmed
 
 from proxytune.report.convergence import convergence
-from proxytune.study.confirmation import Candidate, Confirmation
 from proxytune.study.result import result_of
 from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
@@ -14,16 +14,6 @@ from proxytune.study.study import open_study
 def result(finished):
     with Store.read(finished) as store:
         return result_of(open_study(finished), store)
-
-
-def confirmed(result, score=12, ends=(8.0, 20.0)):
-    """The result, its answer confirmed by fresh episodes with this PRPV and interval."""
-    own = result.best.assessment
-    inner = replace(own.prpv_interval, low=ends[0], high=ends[1])
-    fresh = replace(own, prpv=replace(own.prpv, value=score), prpv_interval=inner)
-    fields = dict.fromkeys(Candidate.__dataclass_fields__, ())
-    answer = Candidate(**{**fields, "trial": result.best.trial, "scores": (score,), "assessment": fresh})
-    return replace(result, confirmation=Confirmation(answer, (answer,), 18))
 
 
 def lines(figure):
@@ -41,11 +31,7 @@ def test_it_shows_every_trial_the_floor_by_its_kind_and_chance(result):
 
 
 def test_a_floor_of_the_same_starts_is_called_so_and_is_that_of_the_fresh_episodes(result):
-    told = confirmed(result)
-    answer = told.confirmation.answer
-    floor = replace(result.floor, kind="same starts", value=5.0, low=1.0, high=9.0)
-    judged = replace(answer, assessment=replace(answer.assessment, noise_floor=floor))
-    figure = convergence(replace(told, confirmation=replace(told.confirmation, answer=judged)))
+    figure = convergence(confirmed(result, kind="same starts", value=5.0, low=1.0, high=9.0))
     assert lines(figure)["noise floor 5.0"].get_ydata()[0] == 5.0
     (band,) = [patch for patch in figure.axes[0].patches if patch.get_height() == 8.0]
     assert band.get_y() == 1.0

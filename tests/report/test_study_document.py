@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import LACKS, TOLD, UNTOLD, planted
+from planted import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
 
 from proxytune.report.finding import finding_of
@@ -132,6 +132,12 @@ def test_halves_are_not_called_a_noise_floor(result):
     (line,) = floor_lines(replace(result.floor, kind="same starts", value=5.0, low=1.0, high=9.0))
     assert line == "noise floor 5 (1 to 9): target against itself, same starts"
     assert floor_lines(replace(result.floor, value=None)) == []
+
+
+def test_the_floor_of_a_confirmed_study_is_said_to_be_the_proxy_s_own(result):
+    assert not [line for line in worth_lines(result) if "the proxy at the best θ against itself" in line]
+    told = confirmed(result, kind="same starts")
+    assert [line for line in worth_lines(told) if "the proxy at the best θ against itself" in line]
 
 
 def test_it_is_said_whether_any_theta_explains_the_target(result):

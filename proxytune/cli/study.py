@@ -12,7 +12,8 @@ from proxytune.cli.study_folder import study_folder
 from proxytune.report.convergence import convergence
 from proxytune.report.importance_figure import importance_figure
 from proxytune.report.page import page
-from proxytune.report.search_figures import evaluations_figure, profiles_figure
+from proxytune.report.profiles_figure import profiles_figure
+from proxytune.report.search_figures import evaluations_figure
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import study_table
 from proxytune.report.writing import save, write_text

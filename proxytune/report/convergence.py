@@ -1,43 +1,46 @@
-"""The convergence figure: how PRPV fell over a study's trials."""
+"""The convergence figure: how the answer's PRPV fell over a study's trials."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from proxytune.report.style import BLUE, GREEN, ORANGE, VERMILLION, dress
+from proxytune.report.style import BLUE, COLUMN, GREEN, ORANGE, VERMILLION, dress, floor_name, legend_below
 from proxytune.study.result import StudyResult
 
 
 def convergence(result: StudyResult) -> Figure:
-    """Draw the observed PRPV of every trial and the lowest so far, with the target's noise floor and chance level.
+    """Draw every trial's PRPV, that of the answer so far, and at the end the answer's on fresh episodes.
 
-    Filled points were proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that
-    failed, triangles what PRPV of those cut off cannot be below; the ring is the best θ, which is the surrogate's and
-    need not be the lowest point.
+    The answer so far is the visited θ of lowest expected PRPV, which need not be the luckiest trial. Filled points were
+    proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that failed, triangles
+    what PRPV of those cut off cannot be below. The diamond with its 95 % interval, right of the last trial, is
+    the answer in episodes that the search has not seen.
     """
-    figure = Figure(figsize=(5.2, 3.2), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 2.9), layout="constrained")
     axes = figure.subplots()
-    _levels(axes, result)
     _trials(axes, result)
+    _answer(axes, result)
+    _fresh(axes, result)
+    _levels(axes, result)
     axes.set_xlabel("trial", fontsize=8)
-    axes.set_ylabel("PRPV [ordered pairs of agents]", fontsize=8)
+    axes.set_ylabel("PRPV [ordered pairs]", fontsize=8)
     axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     dress(axes)
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=7, frameon=False)
+    legend_below(figure, axes)
     return figure
 
 
 def _levels(axes: Axes, result: StudyResult) -> None:
     """What a proxy that knows nothing would get, and what no proxy can be told to beat."""
-    chance, floor = result.best.assessment.chance, result.best.assessment.noise_floor
+    chance, floor = result.judged.chance, result.floor
     axes.axhline(chance.mean, color="0.45", linewidth=1.0, linestyle=":", label=f"chance {chance.mean:.1f}")
     if floor.value is not None and floor.low is not None and floor.high is not None:
         axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
-        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=f"noise floor {floor.value:.1f}")
+        label = f"{floor_name(floor)} {floor.value:.1f}"
+        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=label)
 
 
 def _trials(axes: Axes, result: StudyResult) -> None:
@@ -51,16 +54,30 @@ def _trials(axes: Axes, result: StudyResult) -> None:
         axes.plot(failed, np.zeros(len(failed)), "x", color=VERMILLION, markersize=4, label="failed")
     if bounds:
         axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="cut off, at least")
-    numbers, scores = zip(*scored, strict=True)
-    lowest = np.minimum.accumulate(scores)
-    last = result.trials[-1].number
-    axes.step([*numbers, last], [*lowest, lowest[-1]], where="post", color=ORANGE, linewidth=1.5, label="lowest so far")
-    best = result.best
-    (ring,) = axes.plot(best.trial.number, best.assessment.prpv.value, "o", color=VERMILLION, label="best θ")
-    ring.set(fillstyle="none", markersize=9)
 
 
 def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) -> None:
     if points:
         numbers, scores = zip(*points, strict=True)
         axes.plot(numbers, scores, "o", color=BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)
+
+
+def _answer(axes: Axes, result: StudyResult) -> None:
+    """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's."""
+    pairs = zip(result.trials, result.answers, strict=True)
+    known = [(trial.number, answer.prpv) for trial, answer in pairs if answer is not None]
+    ends = [*known, (result.trials[-1].number + 1, result.best.trial.prpv)]
+    axes.step(*zip(*ends, strict=True), where="post", color=ORANGE, linewidth=1.5, label="answer so far")
+
+
+def _fresh(axes: Axes, result: StudyResult) -> None:
+    found = result.confirmation.answer.assessment if result.confirmation else None
+    if found is None:
+        return
+    score, inner = found.prpv.value, found.prpv_interval
+    reach = None if inner.low is None or inner.high is None else [[score - inner.low], [inner.high - score]]
+    place, label = result.trials[-1].number + 1, "answer, fresh episodes"
+    bars = np.maximum(0.0, reach) if reach else None
+    axes.errorbar(
+        [place], [score], yerr=bars, fmt="D", color=VERMILLION, markersize=5, capsize=2, zorder=4, label=label
+    )

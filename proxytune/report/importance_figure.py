@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from proxytune.report.style import BLUE, LIGHT_BLUE, dress, legend_below, plain
+from proxytune.report.style import BLUE, COLUMN, LIGHT_BLUE, dress, legend_below, plain
 from proxytune.study.result import StudyResult
 
 
@@ -14,7 +14,7 @@ def importance_figure(result: StudyResult) -> Figure:
     The whole bar is what it takes part in, alone or together with others; its dark part is what it does alone.
     """
     ordered = sorted(result.importances, key=lambda found: found.share)
-    figure = Figure(figsize=(4.6, 1.3 + 0.3 * len(ordered)), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 1.1 + 0.25 * len(ordered)), layout="constrained")
     axes = figure.subplots()
     places = np.arange(len(ordered))
     shares, alone = (np.array([getattr(found, name) for found in ordered]) for name in ("share", "alone"))

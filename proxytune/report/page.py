@@ -6,7 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-from proxytune.report.study_table import BEST_COLUMNS, best_theta, identity_lines, importance_line, usefulness_lines
+from proxytune.report.finding import finding_of
+from proxytune.report.search_lines import search_lines
+from proxytune.report.study_table import SEARCH, THETA, TOLD, WORTH, worth_lines
+from proxytune.report.theta_table import TOLD_BY, theta_columns, theta_lines, theta_rows, told_rows
+from proxytune.report.verdict import sentence
 from proxytune.study.result import StudyResult
 from proxytune.study.store import TrialRecord
 
@@ -21,16 +25,16 @@ body { font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: .15rem 1rem .15rem 0; border-bottom: 1px solid #ddd; }
 img { max-width: 100%; }
+.verdict { font-size: 1.2em; }
 .scroll { overflow-x: auto; }
 </style>
 </head>
 <body>
 <h1>$title</h1>
-<p>$summary</p>
-<h2>Best θ</h2>
-$best
-<ul>$usefulness</ul>
+<p class="verdict">$sentence</p>
+$groups
 $figures
+<p>$meaning</p>
 <h2>Trials</h2>
 <div class="scroll">$trials</div>
 <h2>Settings</h2>
@@ -49,24 +53,37 @@ def page(result: StudyResult, figures: Sequence[Path]) -> str:
     settings = result.study.settings
     return PAGE.substitute(
         title=html.escape(settings.name),
-        summary=html.escape(f"{len(result.trials)} of {settings.budget} trials. " + _meaning(result)),
-        best=_table(BEST_COLUMNS, best_theta(result)),
-        usefulness="".join(
-            f"<li>{html.escape(line)}</li>"
-            for line in [*identity_lines(result), *usefulness_lines(result), importance_line(result)]
-        ),
+        sentence=html.escape(sentence(finding_of(result))),
+        groups=_groups(result),
+        meaning=html.escape(_meaning(result)),
         figures="".join(_image(path) for path in figures),
         trials=_table(("trial", *settings.space.names, "PRPV", "PPV", "failed episodes"), _trials(result)),
         settings=_table(("key", "value"), _settings(result)),
     )
 
 
+def _groups(result: StudyResult) -> str:
+    """What the terminal shows below the sentence, under the same heads."""
+    return "".join((
+        _group(THETA, theta_lines(result), _table(theta_columns(result), theta_rows(result))),
+        _group(WORTH, worth_lines(result)),
+        _group(TOLD, [], _table(TOLD_BY, told_rows(result))),
+        _group(SEARCH, search_lines(result)),
+    ))  # fmt: skip
+
+
+def _group(title: str, lines: Sequence[str], table: str = "") -> str:
+    items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
+    shown = f'<div class="scroll">{table}</div>' if table else ""
+    return f"<h2>{html.escape(title)}</h2>{shown}" + (f"<ul>{items}</ul>" if items else "")
+
+
 def _meaning(result: StudyResult) -> str:
     agents = len(result.study.settings.agents)
     return (
         f"PRPV counts how unlike the target the proxy ranks the {agents} agents, over ordered pairs. "
-        "The best θ is the visited one with the lowest mean of the surrogate given all trials, and fresh episodes "
-        "where they were driven."
+        "The best θ is the visited one of lowest expected PRPV given all trials, and fresh episodes where they were "
+        "driven. The 95 % interval holds what agrees with every agent's every metric on the target."
     )
 
 

@@ -2,7 +2,10 @@
 
 from typing import Any
 
+from proxytune.report.finding import finding_of
+from proxytune.report.knowledge_document import intervals_document, knowledge_document
 from proxytune.report.score_document import document_of
+from proxytune.report.verdict import sentence
 from proxytune.search.importance import Importance
 from proxytune.study.confirmation import Confirmation
 from proxytune.study.preflight import Preflight
@@ -13,25 +16,14 @@ from proxytune.study.store import TrialRecord
 
 def study_document(result: StudyResult) -> dict[str, Any]:
     """A study's result as plain JSON; None where a figure is undefined."""
-    best, measures = result.best, document_of(result.best.assessment)
-    shared = ("noise_floor", "noise_floor_interval", "at_noise_floor", "chance", "chance_deviation", "notes")
     return {
         "name": result.study.settings.name,
-        "best": {
-            "index": best.trial.number,
-            "theta": dict(best.trial.theta),
-            "theta_interval": {profile.name: list(profile.interval) for profile in result.profiles},
-            "unidentified": list(result.unidentified),
-            "prpv": measures["prpv"],
-            "prpv_normalised": measures["prpv_normalised"],
-            "prpv_interval": measures["prpv_interval"],
-            "ppv": measures["ppv"],
-            "fresh": _fresh(result.confirmation),
-            "posterior_mean": best.posterior_mean,
-            "posterior_deviation": best.posterior_deviation,
-            "usefulness": measures,
-        },
-        **{key: measures[key] for key in shared},
+        "sentence": sentence(finding_of(result)),
+        "best": _best(result),
+        **_worth(result),
+        **knowledge_document(result.knowledge),
+        "truth": None if result.truth is None else dict(result.truth),
+        "cautions": list(result.cautions),
         "importance": {found.name: _importance(found) for found in result.importances},
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
@@ -40,6 +32,34 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         "failures": list(result.failures),
         "target": _target(result),
         "settings": dict(as_document(result.study.settings)),
+    }
+
+
+def _best(result: StudyResult) -> dict[str, Any]:
+    """The answer, what is known of it, and its measures in the trial's own episodes and in fresh ones."""
+    best, learnt, measures = result.best, result.knowledge, document_of(result.best.assessment)
+    shared = ("prpv", "prpv_normalised", "prpv_interval", "ppv")
+    return {
+        "index": best.trial.number,
+        "theta": dict(best.trial.theta),
+        "theta_interval": intervals_document(learnt.intervals),
+        "region_share": float(learnt.posterior.share),
+        "unidentified": list(learnt.unidentified),
+        **{key: measures[key] for key in shared},
+        "fresh": _fresh(result.confirmation),
+        "posterior_mean": best.posterior_mean,
+        "posterior_deviation": best.posterior_deviation,
+        "usefulness": measures,
+    }
+
+
+def _worth(result: StudyResult) -> dict[str, Any]:
+    """What PRPV of the answer is held against: of its fresh episodes where they were driven."""
+    measures = document_of(result.judged)
+    levels = ("noise_floor", "noise_floor_interval", "noise_floor_kind", "at_noise_floor", "chance", "chance_deviation")
+    return {
+        **{key: measures[key] for key in (*levels, "p_value", "notes")},
+        "cannot_be_told_from_perfect": bool(result.perfect),
     }
 
 

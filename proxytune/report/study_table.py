@@ -1,77 +1,46 @@
 """A study's result for people: on the terminal."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Group, RenderableType
+from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from proxytune.report.finding import finding_of
+from proxytune.report.numbers import probability, short
+from proxytune.report.search_lines import search_lines
+from proxytune.report.theta_table import TOLD_BY, theta_columns, theta_lines, theta_rows, told_rows
+from proxytune.report.verdict import sentence
 from proxytune.study.result import StudyResult
+from proxytune.usefulness import NoiseFloor
 
-BEST_COLUMNS = ("parameter", "best", "not worse", "searched")
+THETA, WORTH, TOLD, SEARCH = (
+    "What is known of θ",
+    "What the proxy is worth at the best θ",
+    "Who tells what of θ",
+    "The search",
+)
 
-
-def best_theta(result: StudyResult) -> list[tuple[str, str, str, str]]:
-    """Parameter, value with unit, the values not worse beyond noise, and the box searched, as texts."""
-    known = result.study.family.parameters
-    rows = []
-    for interval, profile in zip(result.study.settings.space.intervals, result.profiles, strict=True):
-        value = f"{result.best.trial.theta[interval.name]:.4g} {known[interval.name].unit}".strip()
-        low, high = profile.interval
-        not_worse = "unidentified" if profile.unidentified else f"{low:.3g} to {high:.3g}"
-        rows.append((interval.name, value, not_worse, f"[{interval.low:g}, {interval.high:g}]"))
-    return rows
+OF_THE_PROXY = "the proxy at the best θ against itself, same starts: what a perfect proxy would score"
 
 
-def identity_lines(result: StudyResult) -> list[str]:
-    """What the pre-flight found, which parameters PRPV does not see, what was cut off, and how the study ended."""
-    names = ", ".join(result.unidentified)
-    unseen = [f"unidentified: {names}; any value in the box is as good, beyond noise"] if names else []
-    ended = [f"stopped: {result.stopped}"] if result.stopped else []
-    return [*preflight_lines(result), *unseen, *cut_lines(result), *ended]
-
-
-def cut_lines(result: StudyResult) -> list[str]:
-    """How many trials were cut off and what that spared; nothing where none was."""
-    if not result.cut:
-        return []
-    episodes, seconds = result.spared
-    saved = f"{episodes} episodes saved, about {seconds:.3g} s of simulation"
-    return [f"cut off: {len(result.cut)} trials that could not be among the best; {saved}"]
-
-
-def preflight_lines(result: StudyResult) -> list[str]:
-    """Which parameters do nothing beyond noise, or that all do; nothing where there was no pre-flight."""
-    if result.preflight is None:
-        return []
-    return [*result.preflight.warnings] or ["pre-flight: every parameter changes the metrics beyond noise"]
-
-
-def importance_line(result: StudyResult) -> str:
-    """How much of PRPV's variance over the box each parameter takes part in, most first, with its interval."""
-    ordered = sorted(result.importances, key=lambda found: -found.share)
-    shares = [f"{found.name} {found.share:.0%} ({_ends(found.interval)})" for found in ordered]
-    return f"share in PRPV's variance over the box, alone or with others: {', '.join(shares)}"
-
-
-def _ends(interval: tuple[float, float]) -> str:
-    return f"{100 * interval[0]:.0f} to {100 * interval[1]:.0f}"
-
-
-def usefulness_lines(result: StudyResult) -> list[str]:
-    """PRPV with its interval, PPV, noise floor and chance, one line each, then what to take with care."""
+def worth_lines(result: StudyResult) -> list[str]:
+    """PRPV, what it is to be held against, whether the model fits, PPV; one line each, then what to take with care."""
     found = result.best.assessment
-    inner, floor = found.prpv_interval, found.noise_floor
+    inner, worst = found.prpv_interval, found.prpv.range[1]
     interval = "" if inner.low is None else f", interval {inner.low:.1f} to {inner.high:.1f}"
-    worst = found.prpv.range[1]
-    lines = [f"PRPV {found.prpv.value} of at most {worst}{interval}; lower is better", *fresh_lines(result)]
+    lines = [
+        *fresh_lines(result),
+        *floor_lines(result.floor, "" if result.judged is found else OF_THE_PROXY),
+        chance_line(result),
+        misfit_line(result),
+        f"PRPV {found.prpv.value} of at most {worst}{interval}, in the search's own episodes; lower is better",
+    ]
     if found.ppv.value is not None:
         lines.append(f"PPV {found.ppv.value:.3g}; lower is better")
-    if floor.value is not None:
-        lines.append(f"noise floor {floor.value:.1f} ({floor.low:.1f} to {floor.high:.1f}): the target against itself")
-    lines.append(f"chance {found.chance.mean:.1f} ± {found.chance.deviation:.1f}: a proxy that knows nothing")
-    return [*lines, *found.notes, *failure_lines(result)]
+    return [*lines, *result.judged.notes]
 
 
 def fresh_lines(result: StudyResult) -> list[str]:
@@ -88,32 +57,52 @@ def fresh_lines(result: StudyResult) -> list[str]:
     return [f"on fresh episodes PRPV {answer.assessment.prpv.value}{interval}: {luck}{compared}"]
 
 
-def failure_lines(result: StudyResult) -> list[str]:
-    """How many episodes and trials failed, and the first of them; nothing where none did."""
-    if not result.failed_episodes:
+def floor_lines(floor: NoiseFloor, meaning: str = "") -> list[str]:
+    """What the noise floor is, by its kind; nothing without one."""
+    if floor.value is None or floor.low is None or floor.high is None:
         return []
-    failed_trials = sum(trial.state == "failed" for trial in result.trials)
-    trials = f", and with them {failed_trials} of {len(result.trials)} trials" if failed_trials else ""
-    head = f"{result.failed_episodes} of {result.episodes} episodes failed{trials}; the first:"
-    return [head, *(f"  {line}" for line in result.failures)]
+    return [
+        f"{floor.title} {short(floor.value)} ({short(floor.low)} to {short(floor.high)}): {meaning or floor.meaning}"
+    ]
+
+
+def chance_line(result: StudyResult) -> str:
+    """What a proxy that knows nothing would score, and how often as low."""
+    found = result.judged.chance
+    known = f"as low with {probability(found.p_value)}"
+    return f"chance {found.mean:.1f} ± {found.deviation:.1f}: a proxy that knows nothing; {known}"
+
+
+def misfit_line(result: StudyResult) -> str:
+    """Whether any θ explains the target."""
+    found = result.knowledge.misfit
+    if found.p_value is None:
+        return "misfit: too few whole trials to tell whether any θ explains the target's scores"
+    means = "some θ may explain the target's scores" if found.fits else "no θ explains the target's scores"
+    return f"misfit: {means} ({probability(found.p_value)})"
 
 
 def study_table(result: StudyResult, spent: str, files: Mapping[str, Any]) -> RenderableType:
-    """The result of a study as `study` shows it."""
-    settings = result.study.settings
-    table = Table(box=None, pad_edge=False)
-    for column in BEST_COLUMNS:
-        table.add_column(column)
-    for row in best_theta(result):
-        table.add_row(*row)
-    head = (
-        f"{settings.name}: {len(result.trials)} of {settings.budget} trials; best is trial {result.best.trial.number}"
+    """The result of a study as `study` shows it: one sentence, the table of θ, and the rest in groups."""
+    paths = [f"{what}: {path}" for what, path in files.items()]
+    return Group(
+        Text(sentence(finding_of(result))),
+        *_group(THETA, theta_lines(result), _table(theta_columns(result), theta_rows(result))),
+        *_group(WORTH, worth_lines(result)),
+        *_group(TOLD, [], _table(TOLD_BY, told_rows(result))),
+        *_group(SEARCH, [*search_lines(result), spent, *paths]),
     )
-    lines = [
-        *identity_lines(result),
-        *usefulness_lines(result),
-        importance_line(result),
-        spent,
-        *(f"{what}: {path}" for what, path in files.items()),
-    ]
-    return Group(Text(head), table, *(Text(line) for line in lines))
+
+
+def _group(title: str, lines: Sequence[str], table: Table | None = None) -> list[RenderableType]:
+    shown = [] if table is None else [table]
+    return [Text(f"\n{title}", style="bold"), *shown, *(Text(line) for line in lines)]
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in head:
+        table.add_column(name)
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table

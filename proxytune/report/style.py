@@ -4,10 +4,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from proxytune.diagnosis.diagnosis import Diagnosis
+from proxytune.usefulness import NoiseFloor
 
 BLUE, LIGHT_BLUE, GREEN = "#0072B2", "#56B4E9", "#009E73"  # Okabe and Ito, safe for the colour-blind
 ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
 GREY, LIGHT_GREY = "0.55", "0.9"
+
+COLUMN = 85.0 / 25.4
+"""Width in inches of a figure that is to be read at 85 mm, one column of a paper."""
 
 BEFORE = "declared model"
 LONGEST = 45
@@ -26,6 +30,16 @@ def after(diagnosis: Diagnosis) -> str:
 def plain(name: str) -> str:
     """The name of an effect as words."""
     return name.replace("_", " ")
+
+
+def with_unit(name: str, unit: str) -> str:
+    """What an axis calls a parameter."""
+    return f"{plain(name)} [{unit}]" if unit else plain(name)
+
+
+def floor_name(floor: NoiseFloor) -> str:
+    """What a legend calls the noise floor; halves of the target are no noise floor, and are not called so."""
+    return "target's halves" if floor.kind == "halves" else floor.title
 
 
 def dress(axes: Axes) -> None:

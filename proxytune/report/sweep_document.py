@@ -18,7 +18,7 @@ MEASURES = (
     "prpv", "prpv_interval", "prpv_normalised", "expected_prpv", "ppv", "srcc", "kendall_tau", "mmrv", "intervals",
     "chance", "at_noise_floor",
 )  # fmt: skip
-LEVELS = ("noise_floor", "noise_floor_interval")
+LEVELS = ("noise_floor", "noise_floor_interval", "noise_floor_kind")
 NO_POD = "POD was left out: give --target-model MODEL.toml, the model of the target"
 OTHERS = ("kendall_tau", "mmrv")
 SHOWN = {"prpv": ".0f", "ppv": ".3g", "srcc": ".2f", "kendall_tau": ".2f", "mmrv": ".3g", "pod": ".3g"}

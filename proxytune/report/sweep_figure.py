@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.report.style import BLUE, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
+from proxytune.report.style import BLUE, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress, floor_name
 from proxytune.study.series import Series, series_of
 from proxytune.study.sweep import Curve, SweepPoint
 from proxytune.usefulness import Assessment
@@ -24,8 +24,8 @@ SIDE = 1 / 3
 def sweep_figure(curves: Sequence[Curve]) -> Figure:
     """Draw PRPV above PPV, one column per parameter, bootstrap intervals as bands; lower is better in both.
 
-    A dashed line with its band is the target's noise floor, a dotted one chance; a thin vertical line is where the
-    parameter itself is held when others are swept.
+    A dashed line with its band is the noise floor, or the target's halves where there is no better, a dotted one
+    chance; a thin vertical line is where the parameter itself is held when others are swept.
     """
     width, height = PANEL
     figure = Figure(figsize=(max(3.4, width * len(curves) + 0.4), 2 * height + 0.5), layout="constrained")
@@ -76,7 +76,7 @@ def panels_figure(curve: Curve) -> Figure:
 
 
 def bars_figure(curves: Sequence[Curve]) -> Figure:
-    """Draw PRPV at three values of each parameter, with its bootstrap interval and the target's noise floor.
+    """Draw PRPV at three values of each parameter, its bootstrap interval, and the noise floor by its kind.
 
     The values are where the parameter is held, and the grid points nearest to a third of its range below and above;
     the held one is darker.
@@ -195,11 +195,11 @@ def _ppv(axes: Axes, points: Sequence[tuple[float, Assessment]]) -> None:
 
 
 def _levels(axes: Axes, found: Sequence[Assessment]) -> None:
-    """The target's noise floor, and chance: its mean, since it varies a little with the proxy's own order."""
+    """The noise floor by its kind, and chance: its mean, since it varies a little with the proxy's own order."""
     floor = found[0].noise_floor
     if floor.value is not None and floor.low is not None and floor.high is not None:
         axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
-        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label="noise floor")
+        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=floor_name(floor))
     chance = float(np.mean([assessment.chance.mean for assessment in found]))
     axes.axhline(chance, color="0.45", linewidth=1.0, linestyle=":", label="chance")
 

@@ -10,8 +10,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from proxytune.search.composite import composed_scores
+from proxytune.search.output_model import fit_outputs
 from proxytune.search.surrogate import fit_surrogate, unit_array
-from proxytune.study.composition import compose_of, trial_of
+from proxytune.study.composition import goal_of, trial_of
 from proxytune.study.run import as_stored
 from proxytune.study.store import Store
 from proxytune.study.study import open_study
@@ -22,18 +23,18 @@ def main():
     with Store.read(opened.settings.folder) as store:
         study = as_stored(opened, store)
         trials = [trial_of(study, store, trial) for trial in store.trials() if trial.prpv is not None]
-    space, compose = study.settings.space, compose_of(study)
+        goal = goal_of(study, store)
+    space = study.settings.space
     unit = unit_array(space, [trial.values for trial in trials])
-    outcomes, actual = np.array([trial.outcome for trial in trials]), np.array([trial.score for trial in trials])
+    actual = np.array([trial.score for trial in trials])
     predicted = {"constant": [], "of the score": [], "of the metrics": []}
     for place in range(len(trials)):
         rest = np.arange(len(trials)) != place
-        surrogate = fit_surrogate(space, [trial for kept, trial in zip(rest, trials, strict=True) if kept])
+        others = [trial for kept, trial in zip(rest, trials, strict=True) if kept]
+        surrogate = fit_surrogate(space, others)
         predicted["constant"].append(actual[rest].mean())
         predicted["of the score"].append(surrogate.mean(unit[[place]])[0])
-        predicted["of the metrics"].append(
-            composed_scores(unit[rest], outcomes[rest], compose, 1)(unit[[place]]).mean()
-        )
+        predicted["of the metrics"].append(composed_scores(fit_outputs(space, others), goal, 1)(unit[[place]]).mean())
     print(f"{len(trials)} held-out trials of {study.settings.name}")
     for name, found in predicted.items():
         error = np.array(found) - actual

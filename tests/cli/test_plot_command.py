@@ -122,7 +122,8 @@ def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own
         if path.suffix == ".png":
             again = folder / "figures" / path.name
             assert str(again) in other["figures"]
-            assert again.read_bytes() != before[path], "the tolerance matters here"
+            # What the scores tell of θ is the same whatever counts as a tie; only the answer may be another.
+            assert path.stem == "profiles" or again.read_bytes() != before[path], "the tolerance matters here"
     assert other["settings"]["metrics"] == ["distance:max:20%", "survival_time:max"]
     assert [trial["theta"] for trial in other["trials"]] == [trial["theta"] for trial in own["trials"]]
     assert [trial["prpv"] for trial in other["trials"]] != [trial["prpv"] for trial in own["trials"]]

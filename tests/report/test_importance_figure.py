@@ -5,8 +5,8 @@ import pytest
 
 from proxytune.report.importance_figure import importance_figure
 from proxytune.report.page import page
+from proxytune.report.search_lines import importance_line
 from proxytune.report.study_document import study_document
-from proxytune.report.study_table import importance_line
 from proxytune.search.importance import Importance
 from proxytune.study.result import result_of
 from proxytune.study.store import Store

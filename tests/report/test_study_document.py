@@ -1,11 +1,18 @@
+import io
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from planted import LACKS, TOLD, UNTOLD, confirmed, planted
+from rich.console import Console
 
+from proxytune.report.finding import finding_of
 from proxytune.report.page import page
+from proxytune.report.search_lines import cut_lines, failure_lines, search_lines
 from proxytune.report.study_document import study_document
-from proxytune.report.study_table import best_theta, cut_lines, failure_lines, identity_lines, usefulness_lines
+from proxytune.report.study_table import floor_lines, misfit_line, study_table, worth_lines
+from proxytune.report.verdict import sentence
 from proxytune.search.engines import make_proposer
 from proxytune.space import Interval
 from proxytune.study.preflight import Movement, Preflight
@@ -29,7 +36,6 @@ def test_the_document_has_the_promised_keys_and_is_plain_json(result):
     assert document["best"]["prpv"] == best.trial.prpv
     assert document["best"]["prpv_interval"] == [best.assessment.prpv_interval.low, best.assessment.prpv_interval.high]
     assert document["best"]["ppv"] == best.trial.ppv
-    assert document["noise_floor"] == best.assessment.noise_floor.value
     assert [trial["index"] for trial in document["trials"]] == [1, 2, 3, 4, 5, 6, 7]
     assert {"index", "theta", "prpv", "ppv", "failed_episodes"} <= set(document["trials"][0])
     assert document["target"] == {
@@ -40,13 +46,113 @@ def test_the_document_has_the_promised_keys_and_is_plain_json(result):
     assert document["settings"]["parameters"] == {"delay": [0.0, 0.3], "trim": [-0.3, 0.3]}
 
 
-def test_people_see_the_same(result):
-    assert [row[0] for row in best_theta(result)] == ["delay", "trim"]
-    assert best_theta(result)[0][1].endswith(" s")
-    lines = usefulness_lines(result)
-    assert lines[0].startswith(f"PRPV {result.best.trial.prpv:g} of at most 30, interval ")
-    assert any(line.startswith("noise floor ") for line in lines)
+def of_plain_types(value):
+    """Whether JSON's own types are all there is: numpy's would print, and differ by version."""
+    if isinstance(value, dict):
+        return all(type(key) is str and of_plain_types(one) for key, one in value.items())
+    if isinstance(value, list):
+        return all(map(of_plain_types, value))
+    return type(value) in (str, int, float, bool, type(None))
+
+
+def test_every_value_is_of_json_s_own_types(result):
+    assert of_plain_types(study_document(result))
+    assert not of_plain_types({"share": np.float64(0.5)})
+
+
+def test_what_is_known_of_theta_is_in_the_document(result):
+    document = study_document(replace(planted(result, misfit=LACKS), truth={"trim": 0.1}, cautions=("few starts",)))
+    best = document["best"]
+    assert list(best["theta_interval"]) == ["delay", "trim"]
+    assert best["theta_interval"]["trim"] == pytest.approx([0.0765, 0.1235], abs=0.002)
+    assert best["region_share"] == pytest.approx(6 * np.pi * 0.05 * 0.02, rel=0.2)
+    assert best["unidentified"] == []
+    assert document["misfit"] == {"p_value": 0.002, "fits": False, "deviance": 9.0, "expected_deviance": 1.1}
+    assert document["as_good"] == {
+        "region_share": 0.0625,
+        "theta_interval": {"delay": [0.03, 0.21], "trim": [0.05, 0.15]},
+    }
+    assert document["information"]["trim"] == {
+        "agents": {"agent1": 1.0},
+        "metrics": {"distance": 0.75, "survival_time": 0.25},
+        "limit": "trials",
+    }
+    assert (document["truth"], document["cautions"]) == ({"trim": 0.1}, ["few starts"])
+    assert study_document(result)["truth"] is None
+    assert study_document(planted(result, misfit=UNTOLD))["misfit"]["fits"] is None
+
+
+def test_pairs_that_trade_are_in_the_document(result):
+    (trade,) = study_document(planted(result, (0.5, 0.5), (0.1, 0.1), correlation=-0.9))["trades"]
+    assert trade[:2] == ["delay", "trim"]
+    assert trade[2] == pytest.approx(-0.9, abs=0.05)
+    assert study_document(planted(result))["trades"] == []
+
+
+def test_the_document_tells_the_floor_s_kind_and_whether_the_proxy_is_as_good_as_perfect(result):
+    document = study_document(result)
+    floor = result.floor
+    assert (document["noise_floor_kind"], document["cannot_be_told_from_perfect"]) == ("halves", False)
+    assert (document["noise_floor"], document["noise_floor_interval"]) == (floor.value, [floor.low, floor.high])
+    assert document["chance"] == result.judged.chance.mean
+
+
+def shown(result):
+    console = Console(width=300, file=io.StringIO())
+    console.print(study_table(result, "nothing run", {"figure": "convergence.png"}))
+    return console.file.getvalue()
+
+
+def test_the_first_line_is_the_sentence_that_json_has_too_then_the_table(result):
+    first, *others = shown(result).splitlines()
+    assert first == sentence(finding_of(result)) == study_document(result)["sentence"]
+    titles = [line for line in others if line in ("What is known of θ", "Who tells what of θ", "The search")]
+    assert titles == ["What is known of θ", "Who tells what of θ", "The search"]
+    assert others[2].split()[:2] == ["parameter", "best"]
+    assert others[-1].rstrip() == "figure: convergence.png"
+
+
+def test_names_are_shown_as_they_are_and_not_taken_for_markup(result):
+    told = (replace(TOLD[0], agents=(("[red]agent", 1.0),)), TOLD[1])
+    assert "[red]agent 100 %" in shown(planted(result, information=told))
+
+
+def test_people_see_what_the_proxy_is_worth(result):
+    lines = worth_lines(result)
+    assert any(line.startswith(f"PRPV {result.best.trial.prpv:g} of at most 30, interval ") for line in lines)
+    assert any(line.startswith("chance ") for line in lines)
     assert failure_lines(result) == []
+    assert search_lines(result)[0].startswith("wobbly: 7 of 7 trials; best is trial ")
+
+
+def test_halves_are_not_called_a_noise_floor(result):
+    (line,) = floor_lines(result.floor)
+    assert line.startswith("halves ")
+    assert "upper bound" in line
+    (line,) = floor_lines(replace(result.floor, kind="same starts", value=5.0, low=1.0, high=9.0))
+    assert line == "noise floor 5 (1 to 9): target against itself, same starts"
+    assert floor_lines(replace(result.floor, value=None)) == []
+
+
+def test_the_floor_of_a_confirmed_study_is_said_to_be_the_proxy_s_own(result):
+    assert not [line for line in worth_lines(result) if "the proxy at the best θ against itself" in line]
+    told = confirmed(result, kind="same starts")
+    assert [line for line in worth_lines(told) if "the proxy at the best θ against itself" in line]
+
+
+def test_it_is_said_whether_any_theta_explains_the_target(result):
+    assert misfit_line(planted(result)) == "misfit: some θ may explain the target's scores (p = 0.4)"
+    lacking = planted(result, misfit=LACKS)
+    assert misfit_line(lacking) == "misfit: no θ explains the target's scores (p = 0.002)"
+    assert "too few" in misfit_line(planted(result, misfit=UNTOLD))
+
+
+def test_how_a_study_came_to_its_end_is_said_and_a_study_under_way_says_nothing(result):
+    assert study_document(result)["stopped"] == "the budget of 7 trials is spent"
+    assert "stopped: the budget of 7 trials is spent" in search_lines(result)
+    under_way = replace(result, stopped="")
+    assert study_document(under_way)["stopped"] is None
+    assert not [line for line in search_lines(under_way) if line.startswith("stopped")]
 
 
 def test_that_every_parameter_matters_is_said_too(result):
@@ -61,7 +167,7 @@ def test_that_every_parameter_matters_is_said_too(result):
         "noise": 0.5,
         "pairs": 12,
     }
-    assert identity_lines(flown)[0] == "pre-flight: every parameter changes the metrics beyond noise"
+    assert search_lines(flown)[1] == "pre-flight: every parameter changes the metrics beyond noise"
     assert flown.episodes == result.episodes + 144
 
 

@@ -47,6 +47,7 @@ def test_the_document_is_plain_json_with_a_point_per_value(swept):
     assert [point["value"] for point in document["points"]] == [-0.3, -0.1, 0.1, 0.3]
     assert document["points"][2]["prpv"] == 0
     assert document["noise_floor"] == swept.points[0].assessment.noise_floor.value
+    assert document["noise_floor_kind"] == "halves"
 
 
 def test_the_csv_says_the_same_and_reads_back(swept):
@@ -162,9 +163,17 @@ def legend(figure):
 
 def test_every_line_band_and_bar_is_explained_once_below_the_figure(with_pod, swept, make_study):
     both = [swept, curve(make_study(), "delay")]
-    lines = ["noise floor", "chance", "95 % interval", "held value"]
+    lines = ["target's halves", "chance", "95 % interval", "held value"]
     assert legend(panels_figure(with_pod)) == legend(sweep_figure(both)) == lines
     assert sorted(legend(bars_figure(both))) == sorted([*lines, "lower and higher value"])
+
+
+def test_only_a_level_of_the_same_starts_is_called_the_noise_floor(swept):
+    first = swept.points[0].assessment
+    known = replace(first, noise_floor=replace(first.noise_floor, kind="same starts"))
+    told = replace(swept, points=(replace(swept.points[0], assessment=known), *swept.points[1:]))
+    assert legend(sweep_figure([told]))[0] == "noise floor"
+    assert curve_document(told)["noise_floor_kind"] == "same starts"
 
 
 def test_nothing_of_a_figure_is_clipped(with_pod, make_study):

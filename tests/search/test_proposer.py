@@ -5,7 +5,7 @@ import importlib.util
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from steps import SPACE, search, steps, whole
+from steps import SPACE, WHOLE, search, steps
 
 from proxytune.search.design import design_point
 from proxytune.search.engines import ENGINES, AfterDesign, make_proposer
@@ -32,7 +32,7 @@ def test_the_design_makes_batches_of_its_own():
 
 @pytest.mark.parametrize("engine", HERE)
 def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger_one(engine):
-    proposer = make_proposer(engine, 3, whole)
+    proposer = make_proposer(engine, 3, WHOLE)
     finished = search(proposer, 6, seed=2)
     batch = propose_batch(proposer, SPACE, finished, 2, 4)
     assert len({*batch, *(trial.values for trial in finished)}) == 4 + 6
@@ -42,14 +42,14 @@ def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger
 
 @pytest.mark.parametrize("engine", HERE)
 def test_the_points_of_a_batch_differ_also_where_the_best_is_at_a_corner(engine):
-    proposer = make_proposer(engine, 3, whole)
+    proposer = make_proposer(engine, 3, WHOLE)
     finished = search(proposer, 8, seed=1, score=lambda values: -100 * values[0] - values[1])
     assert len(set(propose_batch(proposer, SPACE, finished, 1, 4))) == 4
 
 
 @pytest.mark.parametrize("engine", HERE)
 def test_a_batch_of_the_design_is_the_design_also_while_all_has_failed(engine):
-    proposer = make_proposer(engine, 6, whole)
+    proposer = make_proposer(engine, 6, WHOLE)
     assert propose_batch(proposer, SPACE, [], 4, 6) == tuple(design_point(SPACE, index, 4) for index in range(6))
     failed = [Trial(design_point(SPACE, index, 4), None) for index in range(6)]
     assert propose_batch(proposer, SPACE, failed, 4, 2) == tuple(design_point(SPACE, 6 + more, 4) for more in range(2))

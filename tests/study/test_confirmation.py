@@ -9,7 +9,8 @@ from proxytune.errors import EpisodeError
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import fresh_lines
 from proxytune.search.engines import make_proposer
-from proxytune.search.surrogate import fit_surrogate
+from proxytune.search.knowledge import learn
+from proxytune.study.composition import goal_of, trials_of
 from proxytune.study.confirmation import (
     CANDIDATES,
     candidates,
@@ -17,8 +18,7 @@ from proxytune.study.confirmation import (
     most_episodes,
     run_confirmation,
 )
-from proxytune.study.evaluate import plan
-from proxytune.study.history import as_trials
+from proxytune.study.evaluate import plan, table
 from proxytune.study.objective import FRESH
 from proxytune.study.progress import Silent
 from proxytune.study.result import result_of
@@ -26,6 +26,7 @@ from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
 from proxytune.study.store import Outcome, Store
 from proxytune.study.study import open_study
+from proxytune.usefulness import prpv
 
 ONE = 6 * 3
 """Episodes of one repetition of one θ."""
@@ -65,17 +66,19 @@ def test_a_second_time_nothing_is_simulated(finished):
     assert study_document(again) == study_document(found)
 
 
-def test_candidates_are_the_lowest_posterior_means_within_the_noise_and_few(finished):
+def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_likeliest_and_few(finished):
     study = opened(finished)
     with Store.read(finished) as store:
         trials = store.trials()
-    space = study.settings.space
-    surrogate = fit_surrogate(space, as_trials(space, trials))
-    means = dict(zip((t.values for t in surrogate.visited), surrogate.at_visited()[0], strict=True))
-    chosen = [space.values(trial.theta) for trial in candidates(study, trials)]
-    assert chosen[0] == surrogate.incumbent()[0]
-    near = [v for v in means if means[v] - min(means.values()) <= surrogate.noise_deviation]
-    assert chosen == sorted(near, key=means.__getitem__)[:CANDIDATES]
+        known = learn(study.settings.space, trials_of(study, store, trials), goal_of(study, store), 1)
+        chosen = [study.settings.space.values(trial.theta) for trial in candidates(study, store, trials)]
+    ranked = list(known.expected)
+    noise = known.fresh_scores(ranked[0]).std()
+    near = [values for values in ranked if known.expected[values] - known.expected[ranked[0]] <= noise]
+    assert chosen[0] == known.answer == ranked[0]
+    assert set(chosen) <= {*near, known.likeliest_of(ranked)}
+    assert known.likeliest_of(ranked) in chosen
+    assert len(chosen) == min(CANDIDATES, len({*near, known.likeliest_of(ranked)}))
 
 
 def plant(study, store, trial, shift):
@@ -92,7 +95,7 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
         trials = store.trials()
         # Scores that follow nothing make rivals of all.
         level = [replace(trial, prpv=float(8 + trial.number % 2)) for trial in trials]
-        lucky, *rivals = candidates(study, level)
+        lucky, *rivals = candidates(study, store, level)
         plant(study, store, lucky, -1.0)
         for rival in rivals:
             plant(study, store, rival, 1.0)
@@ -101,6 +104,17 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
     assert found.answer.trial != lucky
     assert found.answer.scores == (0,)
     assert found.candidates[0].optimism > 0
+
+
+def test_the_noise_floor_is_what_the_answer_s_own_trial_scores_against_its_fresh_episodes(finished):
+    _, found = confirmed(finished)
+    answer, study = found.confirmation.answer, found.study
+    with Store.read(finished) as store:
+        known = store.outcomes(study.identity, answer.trial.theta).values()
+    seeds = {episode.seed for episode in plan(study.settings, answer.trial.theta, study.settings.seed)}
+    own, fresh = ([o for o in known if (o.episode.seed in seeds) is mine] for mine in (True, False))
+    floor = prpv(proxy=table(fresh), target=table(own), metrics=study.settings.metrics).value
+    assert (found.floor.kind, found.floor.value) == ("same starts", floor)
 
 
 def test_trials_do_not_depend_on_it(finished, make_study):
@@ -173,7 +187,7 @@ def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished
 def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_score(finished):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(study, store.trials()):
+        for trial in candidates(study, store, store.trials()):
             for episode in plan(study.settings, trial.theta, study.settings.seed + FRESH):
                 if episode.agent == "agent3":
                     store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))

@@ -6,13 +6,14 @@ import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from partly_dead import ordered_study
 from stopping import Stopping
 
 from proxytune.scores import Metric
 from proxytune.search.engines import make_proposer
-from proxytune.study.composition import compose_of, trial_of
+from proxytune.study.composition import goal_of, trial_of
 from proxytune.study.cutting import reference, spared
 from proxytune.study.evaluate import evaluation, simulate
 from proxytune.study.history import as_trials, episodes_of
@@ -192,22 +193,23 @@ def test_a_trial_stands_on_the_episodes_of_its_decided_agents(done):
     assert len(episodes_of(found.study.settings, replace(trial, state="finished", decided=()))) == ALL
 
 
-def test_the_composite_engine_is_told_every_agent_s_metrics_so_nothing_is_cut_off(cutting):
-    folder = cutting(engine='"composite"', budget="7")
+def test_an_engine_that_learns_from_outputs_has_its_trials_cut_off_too(cutting):
+    folder = cutting(engine='"outcomes"')
     study = open_study(folder)
     with Store.open(folder) as store:
-        run_study(study, store, make_proposer("composite", 5, compose_of(study)), Silent())
-        assert {trial.state for trial in store.trials()} == {"finished"}
+        run_study(study, store, make_proposer("outcomes", 5, goal_of(study, store)), Silent())
+        assert "cut" in {trial.state for trial in store.trials()}
 
 
-def test_of_a_trial_that_was_cut_off_the_search_has_no_outcome_even_where_all_its_episodes_are_known(done):
+def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_even_where_all_episodes_are_known(done):
     _, trials, found = done
-    cut = next(trial for trial in trials if trial.state == "cut")
+    cut, study = next(trial for trial in trials if trial.state == "cut"), found.study
     with Store.open(found.study.settings.folder) as store:
         before = trial_of(found.study, store, cut)
         simulate(found.study, store, cut.theta, Silent(), "")
         assert trial_of(found.study, store, cut) == before
-    assert before.outcome is None
+    known = ~np.isnan(before.outcome).reshape(study.target.means.shape).any(axis=1)
+    assert {agent for agent, is_known in zip(study.target.agents, known, strict=True) if is_known} == set(cut.decided)
 
 
 def test_by_other_metrics_a_cut_trial_is_bounded_by_its_own_agents_and_by_its_own_it_keeps_its_bound(done):

@@ -1,12 +1,10 @@
 """A study of learning value looks where asked, finds the proxy that teaches, and goes on where it was left."""
 
-import numpy as np
 import pytest
 from taught import make_taught
 
 from proxytune.errors import RunError, SettingsError
 from proxytune.search.engines import make_proposer
-from proxytune.search.profile import Profile
 from proxytune.study.plv_study import distribution, run_plv_study, search_space
 from proxytune.study.progress import Silent
 from proxytune.study.settings import read_study_settings
@@ -15,17 +13,11 @@ from proxytune.study.teach import open_school
 BOX = {"trim": "[-0.3, 0.3]"}
 
 
-def run(folder, seen=()):
+def run(folder, left=None):
     settings = read_study_settings(folder)
     school = open_school(settings)
-    space = search_space(settings, school.settings.widths, seen)
+    space = search_space(settings, school.settings.widths, left or {})
     return run_plv_study(settings, school, make_proposer("gp", settings.initial), space, Silent())
-
-
-def profile(name, low, high):
-    values, flat = np.linspace(-0.3, 0.3, 31), np.zeros(31)
-    outside = np.where((values >= low - 1e-9) & (values <= high + 1e-9), 0.0, 9.0)
-    return Profile(name, values, outside, flat + 0.1, outside, outside, flat, flat, (low + high) / 2, 0.0)
 
 
 def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(make_study):
@@ -71,9 +63,9 @@ def test_a_distribution_is_cut_off_at_what_a_parameter_can_be(make_study):
 
 def test_it_searches_only_what_prpv_has_left(make_study):
     settings = read_study_settings(make_taught(make_study, parameters=BOX))
-    whole = search_space(settings, {}, ())
-    left = search_space(settings, {}, (profile("trim", 0.04, 0.16),))
-    pinned = search_space(settings, {}, (profile("trim", 0.1, 0.1),))
+    whole = search_space(settings, {}, {})
+    left = search_space(settings, {}, {"trim": (0.04, 0.16)})
+    pinned = search_space(settings, {}, {"trim": (0.1, 0.1)})
     assert (whole.intervals[0].low, whole.intervals[0].high) == (-0.3, 0.3)
     assert (left.intervals[0].low, left.intervals[0].high) == pytest.approx((0.04, 0.16))
     assert pinned.intervals[0].low < 0.1 < pinned.intervals[0].high
@@ -83,7 +75,7 @@ def test_it_searches_only_what_prpv_has_left(make_study):
 def test_a_width_without_its_parameter_is_one_line(make_study):
     settings = read_study_settings(make_taught(make_study, parameters=BOX))
     with pytest.raises(SettingsError, match=r"teaching\.width\.delay: is not among \[parameters\]"):
-        search_space(settings, {"delay": (0.0, 0.1)}, ())
+        search_space(settings, {"delay": (0.0, 0.1)}, {})
 
 
 def test_where_the_target_alone_is_not_learnt_there_is_no_plv_to_search_for(make_study):

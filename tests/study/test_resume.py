@@ -13,7 +13,7 @@ from processes import ENVIRONMENT, FAKES, episodes, finished_episodes, start, tr
 
 from proxytune.cli.main import main
 from proxytune.search.engines import STUDY_ENGINES, make_proposer
-from proxytune.study.composition import compose_of
+from proxytune.study.composition import goal_of
 from proxytune.study.progress import Silent
 from proxytune.study.run import run_study
 from proxytune.study.store import Store
@@ -60,8 +60,8 @@ def never_stopped(make_study, **changes):
     """The study run in this process, in one go: its trials and episodes."""
     folder = make_study("whole", **changes)
     study = open_study(folder)
-    proposer = make_proposer(study.settings.engine, study.settings.initial, compose_of(study))
     with Store.open(folder) as store:
+        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(study, store))
         run_study(study, store, proposer, Silent())
     return trials(folder), episodes(folder)
 

@@ -6,7 +6,7 @@ from stopping import Stopping
 
 from proxytune.errors import EpisodeError, RunError, SettingsError
 from proxytune.search.engines import make_proposer
-from proxytune.study.composition import compose_of
+from proxytune.study.composition import goal_of
 from proxytune.study.history import as_trials
 from proxytune.study.progress import Silent
 from proxytune.study.run import as_stored, check_facts, run_study
@@ -180,20 +180,20 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
     assert len(run(folder)[1]) == 7
 
 
-@pytest.mark.parametrize("engine", ["gp", "composite", "random", "sobol", "tpe"])
+@pytest.mark.parametrize("engine", ["outcomes", "gp", "composite", "random", "sobol", "tpe"])
 def test_with_every_engine_an_interrupted_study_goes_on_to_the_same_trials(make_study, engine):
     if engine == "tpe":
         pytest.importorskip("optuna")
     folders = [make_study(called, engine=f'"{engine}"') for called in ("whole", "stopped")]
     whole, stopped_one = (open_study(folder) for folder in folders)
     with Store.open(folders[0]) as store:
-        run_study(whole, store, make_proposer(engine, 5, compose_of(whole)), Silent())
+        run_study(whole, store, make_proposer(engine, 5, goal_of(whole, store)), Silent())
         expected = store.trials()
     for episodes in (30, 70):
         with Store.open(folders[1]) as store, pytest.raises(KeyboardInterrupt):
-            run_study(stopped_one, store, make_proposer(engine, 5, compose_of(whole)), Stopping(episodes))
+            run_study(stopped_one, store, make_proposer(engine, 5, goal_of(whole, store)), Stopping(episodes))
     with Store.open(folders[1]) as store:
-        run_study(stopped_one, store, make_proposer(engine, 5, compose_of(whole)), Silent())
+        run_study(stopped_one, store, make_proposer(engine, 5, goal_of(whole, store)), Silent())
         assert store.trials() == expected
     assert len(expected) == 7
 

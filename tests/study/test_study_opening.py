@@ -1,16 +1,14 @@
 import pytest
 
 from proxytune.errors import InputError
+from proxytune.study.result import result_of
+from proxytune.study.store import Store
 from proxytune.study.study import changes, facts, open_study
 
 BAD = {
-    "an agent is missing": (
-        lambda text: text.replace("agent4", "agent9"),
-        "target.csv: has no scores of agent4; did you",
-    ),
-    "several are": (
-        lambda text: "\n".join(line for line in text.splitlines() if not line.startswith(("agent4", "agent5"))),
-        "target.csv: has no scores of agent4, agent5; add them, or take them out of the study",
+    "all agents but one are missing": (
+        lambda text: "\n".join(line for line in text.splitlines() if line.startswith(("agent,", "agent4"))),
+        "target.csv: has no scores of agent0, agent1, agent2, agent3, agent5; add them, or take them out of the study",
     ),
     "a value is NaN": (lambda text: text.replace("agent2,1,", "agent2,1,nan,#"), "line"),
     "a metric is missing": (lambda text: text.replace("survival_time", "survival"), "no column 'survival_time'"),
@@ -66,3 +64,24 @@ def test_the_order_of_agents_and_lines_is_no_fact(make_study):
     other = facts(open_study(make_study(agents=agents, metrics=metrics)))
     assert one == other
     assert changes(one, other) == []
+
+
+def test_agents_that_the_target_lacks_are_left_out_and_named(finished):
+    target = finished / "target.csv"
+    kept = [line for line in target.read_text().splitlines() if not line.startswith(("agent4", "agent5"))]
+    target.write_text("\n".join(kept) + "\n")
+    study = open_study(finished)
+    assert study.settings.agents == study.target.agents == ("agent0", "agent1", "agent2", "agent3")
+    with Store.read(finished) as store:
+        cautions = result_of(study, store).cautions
+    assert "the target has no scores of agent4, agent5: left out" in cautions
+
+
+def test_the_truth_is_read_but_nothing_depends_on_it(make_study):
+    plain = open_study(make_study())
+    (make_study() / "truth.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n')
+    told = open_study(make_study(truth='"truth.toml"'))
+    assert (plain.truth, told.truth) == (None, {"trim": 0.1})
+    assert facts(plain) == facts(told)
+    with pytest.raises(InputError, match="truth: no such file"):
+        open_study(make_study(truth='"untruth.toml"'))

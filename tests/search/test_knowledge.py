@@ -1,0 +1,93 @@
+"""What is known of θ after a search: the truth is inside, who tells what is told, and nothing depends on order."""
+
+import numpy as np
+import pytest
+from steps import SPACE, goal
+
+from proxytune.search.design import design_point, from_unit, to_unit
+from proxytune.search.knowledge import learn
+from proxytune.search.proposer import Trial
+
+SENSITIVE = np.array([[3.0, 0.0], [0.0, 3.0], [2.0, 2.0], [1.0, -2.0]])
+"""What an agent's output makes of each parameter: the first sees the delay alone, the second the trim alone."""
+
+
+def outputs(values, seed=0):
+    return np.sin(SENSITIVE @ to_unit(SPACE, values)) + np.random.default_rng(seed).normal(0.0, 0.02, 4)
+
+
+def truth_of(seed):
+    return from_unit(SPACE, np.random.default_rng(seed).uniform(0.2, 0.5, 2))
+
+
+def known(seed, count=14, lost=()):
+    target = outputs(truth_of(seed), 1000 + seed)
+    target[list(lost)] = np.nan
+
+    def compose(found):
+        return np.abs(found - outputs(truth_of(seed), 1000 + seed)).sum(axis=-1)
+
+    points = [design_point(SPACE, index, seed) for index in range(count)]
+    told = [outputs(values, 50 * seed + row) for row, values in enumerate(points)]
+    trials = [Trial(v, float(compose(o)), tuple(o.tolist())) for v, o in zip(points, told, strict=True)]
+    return learn(SPACE, trials, goal(compose, target, 2 * 0.02**2), seed)
+
+
+def test_the_region_holds_the_truth_and_is_small():
+    found = [known(seed) for seed in range(20)]
+    assert sum(one.holds(truth_of(seed)) for seed, one in enumerate(found)) >= 18
+    assert np.median([one.posterior.share for one in found]) < 0.08
+    for one in found:
+        assert {name: low < high for name, (low, high) in one.intervals.items()} == {"delay": True, "trim": True}
+
+
+def test_the_answer_is_the_visited_theta_of_lowest_expected_score():
+    one = known(3)
+    visited = [trial.values for trial in one.trials]
+    assert one.answer in visited
+    composed, _ = one.scores(visited)
+    halves = {t.values: (t.score + c) / 2 for t, c in zip(one.trials, composed, strict=True)}
+    assert one.expected == pytest.approx(halves)
+    assert one.answer == min(halves, key=halves.__getitem__)
+
+
+def test_what_cannot_be_told_from_the_answer_is_round_it_and_not_everything():
+    one = known(3)
+    share, ends = one.as_good
+    assert 0.0 < share < 0.5
+    for name, value in zip(SPACE.names, one.answer, strict=True):
+        assert ends[name][0] <= value <= ends[name][1]
+
+
+def test_who_is_sensitive_to_a_parameter_tells_of_it():
+    delay, trim = known(3).information
+    assert dict(delay.agents)["agent0"] > 0.3
+    assert dict(delay.agents)["agent1"] < 0.02
+    assert dict(trim.agents)["agent1"] > 0.3
+    for one in (delay, trim):
+        assert sum(share for _, share in one.agents) == pytest.approx(1.0)
+
+
+def test_a_parameter_of_which_no_output_tells_is_unidentified():
+    assert known(3, lost=(1, 2, 3)).unidentified == ("trim",)
+    assert known(3).unidentified == ()
+
+
+def test_few_trials_limit_what_is_told_and_with_many_it_is_noise():
+    assert {one.limit for one in known(3, count=5).information} == {"trials"}
+    assert {one.limit for one in known(3, count=48).information} == {"starts"}
+
+
+def test_the_order_of_trials_changes_nothing():
+    one = known(5)
+    other = learn(SPACE, one.trials[::-1], one.goal, one.seed)
+    assert other.intervals == one.intervals
+    assert other.misfit == one.misfit
+    assert other.as_good == one.as_good
+
+
+def test_fresh_scores_spread_round_what_is_expected():
+    one = known(5)
+    drawn = one.fresh_scores(one.answer)
+    assert drawn.std() > 0.0
+    assert np.percentile(drawn, 2.5) < one.expected[one.answer] < np.percentile(drawn, 97.5)

@@ -23,8 +23,12 @@ LOOKS = {
     "qlognei": ("0.15", MIXED),
 }
 """Colour and line: those a reader looks for first are solid; no two of one line have colours that could be confused."""
-WIDE, APART = (3.35, 3.0), 0.058
-"""Size [inch], which is 85 mm wide, and how far labels are apart at least, as a share of the height."""
+WIDE, PANEL, APART = (3.35, 3.0), (0.13, 0.14, 0.67, 0.83), 0.05
+"""Size [inch], which is 85 mm wide; what of it the panel takes, leaving room for names; how far these are apart at
+least, as a share of the panel's height."""
+
+BEYOND = 0.8
+"""So much of an evaluation is drawn after the last, so that one sees where it ended."""
 
 
 def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure:
@@ -33,16 +37,17 @@ def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure
     The first engine has its 95 % band. Up to the vertical line all engines share the design; below the dashed line a θ
     cannot be told from the optimum.
     """
-    figure = Figure(figsize=WIDE, layout="constrained")
-    axes = figure.subplots()
+    figure = Figure(figsize=WIDE)
+    axes = figure.add_axes(PANEL)
     key = engines[0][0].key
     for number, runs in enumerate(engines):
         _curve(axes, runs, banded=number == 0)
     axes.axvline(key.initial + 0.5, color="0.6", linewidth=0.8)
     axes.axhline(tolerance, color="0.3", linewidth=0.8, linestyle="--", label="noise floor")
+    axes.annotate("noise floor", (1.2, tolerance), (0, 2), textcoords="offset points", fontsize=6, color="0.3")
     axes.set_xlabel("evaluations", fontsize=8)
     axes.set_ylabel("lowest regret so far [ordered pairs]", fontsize=8)
-    axes.set_xlim(1, key.budget)
+    axes.set_xlim(1, key.budget + BEYOND)
     axes.set_ylim(*_range(engines, tolerance))
     dress(axes)
     _name(axes, [runs[0].key.engine for runs in engines], [float(median_curve(runs)[0][-1]) for runs in engines])
@@ -52,7 +57,8 @@ def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure
 def _curve(axes: Axes, runs: Sequence[Run], *, banded: bool) -> None:
     colour, line = LOOKS[runs[0].key.engine]
     middle, low, high = median_curve(runs)
-    places = np.arange(1, len(middle) + 1)
+    places = np.append(np.arange(1, len(middle) + 1), len(middle) + BEYOND)
+    middle, low, high = (np.append(curve, curve[-1]) for curve in (middle, low, high))
     if banded:
         axes.fill_between(places, low, high, step="post", color=colour, alpha=0.15, linewidth=0)
     label = f"{runs[0].key.engine} ({len(runs)} seeds)"

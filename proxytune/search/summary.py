@@ -113,7 +113,8 @@ def median_curve(runs: Sequence[Run]) -> tuple[Array, Array, Array]:
     """Median over runs of the lowest regret so far, after each evaluation, and the ends of its interval."""
     curves = np.array([run.judgement.best_regrets for run in runs])
     rows = _resampled(len(curves))
-    ends = np.array([np.percentile(np.median(column[rows], axis=1), LEVELS) for column in curves.T])
+    with np.errstate(invalid="ignore"):  # infinite while all have failed
+        ends = np.array([np.percentile(np.median(column[rows], axis=1), LEVELS) for column in curves.T])
     return np.median(curves, axis=0), ends[:, 0], ends[:, 1]
 
 

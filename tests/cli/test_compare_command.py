@@ -5,6 +5,7 @@ import pytest
 from proxytune.cli.compare import _engines, read_runs
 from proxytune.cli.main import main, parser
 from proxytune.search import engines
+from proxytune.search.judgement import judging_code
 
 FEW = ("--engines", "random,sobol", "--seeds", "2", "--budget", "7", "--initial", "5")
 
@@ -20,13 +21,15 @@ def document(tmp_path, capsys):
 
 
 def test_it_prints_one_document_with_every_engine_and_draws_the_figure(document, tmp_path):
-    assert [row["engine"] for row in document["engines"]] == ["gp", "random", "sobol"]
-    assert (document["objective"], document["budget"], document["default"]) == ("analytic", 7, "gp")
+    assert [row["engine"] for row in document["engines"]] == ["random", "sobol"]
+    assert (document["objective"], document["budget"], document["default"]) == ("analytic", 7, "random")
     assert {row["seeds"] for row in document["engines"]} == {2}
     for row in document["engines"]:
         assert row["regret"]["low"] <= row["regret"]["value"] <= row["regret"]["high"]
         assert 0 < row["error"]["value"] < 1
-    assert [row["saved"] is None for row in document["engines"]] == [True, False, False]
+    assert [row["saved"] is None for row in document["engines"]] == [True, False]
+    assert [row["ratio"] is None for row in document["engines"]] == [True, False]
+    assert [row["region"] for row in document["engines"]] == [None, None], "a formula has no parts"
     assert (tmp_path / "out" / "compare.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "out" / "compare.json").read_text())["engines"] == document["engines"]
 
@@ -34,25 +37,35 @@ def test_it_prints_one_document_with_every_engine_and_draws_the_figure(document,
 def test_finished_runs_are_kept_and_a_line_cut_off_is_run_again(document, tmp_path, capsys):
     path = tmp_path / "out" / "runs.jsonl"
     lines = path.read_text().splitlines()
-    assert len(lines) == len(read_runs(path)) == 6
+    assert len(lines) == len(read_runs(path)) == 4
     kept = lines[0].replace('"error": ', '"error": 1000')
-    path.write_text("\n".join([kept, *lines[1:5], lines[5][:40]]))
+    path.write_text("\n".join([kept, *lines[1:3], lines[3][:40]]))
     assert compare("analytic", *FEW, "--output", tmp_path / "out", "--json") == 0
     again = json.loads(capsys.readouterr().out)
-    assert len(read_runs(path)) == 6
-    assert len(path.read_text().splitlines()) == 7
+    assert len(read_runs(path)) == 4
+    assert len(path.read_text().splitlines()) == 5
     assert max(row["error"]["high"] for row in again["engines"]) > 100, "the first line was not run again"
+
+
+def test_runs_that_other_code_has_judged_are_judged_again_and_not_run_again(document, tmp_path, capsys, monkeypatch):
+    path = tmp_path / "out" / "runs.jsonl"
+    fresh = read_runs(path)
+    path.write_text(path.read_text().replace(f'"code": "{judging_code()}"', '"code": "old"'))
+    monkeypatch.setattr("proxytune.cli.compare.run_engine", None)
+    assert compare("analytic", *FEW, "--output", tmp_path / "out", "--json") == 0
+    assert read_runs(path) == fresh
+    assert json.loads(capsys.readouterr().out)["engines"] == document["engines"]
 
 
 def test_another_budget_is_another_run(document, tmp_path, capsys):
     assert compare("analytic", *FEW, "--budget", "8", "--output", tmp_path / "out") == 0
-    assert len(read_runs(tmp_path / "out" / "runs.jsonl")) == 12
+    assert len(read_runs(tmp_path / "out" / "runs.jsonl")) == 8
 
 
 def test_people_see_a_verdict_per_rival(tmp_path, capsys):
     assert compare("analytic", *FEW, "--output", tmp_path / "out") == 0
     out = " ".join(capsys.readouterr().out.split())
-    assert "gp reaches the noise floor" in out
+    assert "random reaches the noise floor" in out
     assert "than sobol" in out
     assert ">7" in out
 
@@ -60,7 +73,7 @@ def test_people_see_a_verdict_per_rival(tmp_path, capsys):
 def test_a_study_is_compared_on_its_own_episodes_which_are_simulated_once(make_study, tmp_path, capsys):
     journal = tmp_path / "journal"
     folder = make_study(domain={"journal": f'"{journal}"'})
-    arguments = ("compare", str(folder), "--engines", "sobol", "--seeds", "2", "--output", str(tmp_path / "out"))
+    arguments = ("compare", str(folder), "--engines", "gp,sobol", "--seeds", "2", "--output", str(tmp_path / "out"))
     assert main([*arguments, "--json"]) == 0
     out, told = capsys.readouterr()
     document = json.loads(out)
@@ -75,15 +88,71 @@ def test_a_study_is_compared_on_its_own_episodes_which_are_simulated_once(make_s
     assert journal.read_text().splitlines() == episodes
 
 
+def truths(folder, output, *more):
+    few = ("--truths", "--engines", "outcomes,sobol", "--seeds", "2", "--output", output)
+    return ("compare", *map(str, (folder, *few, *more)), "--json")
+
+
+def test_with_truths_it_tells_what_is_known_of_them_and_simulates_nothing_twice(make_study, tmp_path, capsys):
+    folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
+    assert main([*truths(folder, tmp_path / "out")]) == 0
+    document = json.loads(capsys.readouterr().out)
+    for row in document["engines"]:
+        assert row["seeds"] == 2
+        assert 0 <= row["region"]["covered"] <= 2
+        assert set(row["region"]["intervals_covered"]) == {"delay", "trim"}
+        assert 0.0 < row["region"]["share"]["value"] < 1.0
+        assert row["error"]["value"] < 1.0
+    episodes = (tmp_path / "journal").read_text().splitlines()
+    (tmp_path / "out" / "runs.jsonl").unlink()
+    assert main([*truths(folder, tmp_path / "out")]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert (tmp_path / "journal").read_text().splitlines() == episodes
+    timed = [{**row, "seconds": 0.0} for row in document["engines"]]
+    assert [{**row, "seconds": 0.0} for row in again["engines"]] == timed
+
+
+def test_targets_with_what_the_proxy_lacks_are_other_runs(make_study, tmp_path, capsys):
+    folder, lacks = make_study(parameters={"trim": "[-0.3, 0.3]"}), tmp_path / "lacks.toml"
+    lacks.write_text("delay = 0.25\n")
+    assert main([*truths(folder, tmp_path / "out")]) == 0
+    assert main([*truths(folder, tmp_path / "out", "--lacks", lacks, "--lacks", lacks)]) == 0
+    capsys.readouterr()
+    runs = read_runs(tmp_path / "out" / "runs.jsonl")
+    assert len(runs) == 8
+    assert len({key.objective for key in runs}) == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (("ranking", "--truths"), "--truths: 'ranking' has a truth for every seed; leave it out"),
+        (("analytic", "--lacks", "x.toml"), "--lacks: a study's target is what was measured; add --truths"),
+    ],
+)
+def test_truths_of_what_has_them_and_effects_without_truths_are_refused(tmp_path, capsys, options, expected):
+    assert compare(*options, "--output", tmp_path / "out") == 2
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_model_that_is_not_there_is_told_before_anything_runs(make_study, tmp_path, capsys):
+    assert main([*truths(make_study(), tmp_path / "out", "--lacks", tmp_path / "nowhere.toml")]) == 2
+    assert "no such file" in capsys.readouterr().err
+
+
 def test_an_engine_that_models_metrics_is_compared_where_there_are_metrics(tmp_path, capsys):
-    few = ("--engines", "composite", "--seeds", "2", "--budget", "7", "--initial", "5")
+    few = ("--engines", "gp,composite", "--seeds", "2", "--budget", "7", "--initial", "5")
     assert compare("ranking", *few, "--output", tmp_path / "out", "--json") == 0
-    assert [row["engine"] for row in json.loads(capsys.readouterr().out)["engines"]] == ["gp", "composite"]
+    rows = json.loads(capsys.readouterr().out)["engines"]
+    assert [row["engine"] for row in rows] == ["gp", "composite"]
+    assert [set(row["region"]["intervals_covered"]) for row in rows] == [{"blur", "camera_pitch", "delay", "trim"}] * 2
 
 
 BAD = {
     "an engine of metrics where there are none": (("--engines", "composite"), "'composite' models what a score is"),
     "an unknown engine": (("--engines", "gp,tpr"), "--engines: unknown engine 'tpr'"),
+    "no engine": (("--engines", ","), "--engines: names none; give some of outcomes"),
     "one seed": (("--seeds", "1"), "--seeds 1: give at least 2"),
     "no budget": (("--budget", "0"), "--budget 0: give at least 2"),
     "a budget of the design": (("--budget", "10"), "--budget 10: is spent on the design of 10; raise it"),
@@ -111,8 +180,14 @@ def test_tpe_without_optuna_is_told_before_anything_runs(tmp_path, capsys, monke
 def test_without_optuna_the_other_engines_are_compared_unless_named(monkeypatch):
     monkeypatch.setattr(engines, "find_spec", lambda name: None)
     assert _engines(parser().parse_args(["compare", "analytic"])) == ["gp", "random", "sobol"]
-    assert _engines(parser().parse_args(["compare", "ranking"])) == ["gp", "composite", "random", "sobol"]
-    assert _engines(parser().parse_args(["compare", "quickstart"])) == ["gp", "composite", "random", "sobol"]
+    assert _engines(parser().parse_args(["compare", "ranking"])) == ["outcomes", "composite", "gp", "random", "sobol"]
+    assert _engines(parser().parse_args(["compare", "quickstart"])) == [
+        "outcomes",
+        "composite",
+        "gp",
+        "random",
+        "sobol",
+    ]
 
 
 def test_a_place_that_cannot_be_written_is_one_line_and_exit_1(tmp_path, capsys):

@@ -1,12 +1,24 @@
-from proxytune.report.compare_document import compare_document, compare_lines, verdict
-from proxytune.report.compare_figure import compare_figure
+import io
+
+import numpy as np
+from rich.console import Console
+
+from proxytune.report.compare_document import compare_document, compare_lines, compare_tables, verdict
+from proxytune.report.compare_figure import LOOKS, compare_figure, spread
 from proxytune.search.comparison import Run, RunKey
+from proxytune.search.engines import ENGINES
+from proxytune.search.judgement import Judgement, Reading
 from proxytune.search.summary import Estimate, summarise
 
 
-def runs(engine, *curves):
+def runs(engine, *curves, reading=None):
     return [
-        Run(RunKey("o", engine, seed, len(curve), 2, ""), tuple(curve), (0.0,), curve[-1], 0.1, 0.5)
+        Run(
+            RunKey("o", engine, seed, len(curve), 2, ""),
+            ((0.0,),) * len(curve),
+            0.5,
+            Judgement(tuple(curve), (0.0,), curve[-1] + 5.0, curve[-1], 0.1, reading, ""),
+        )
         for seed, curve in enumerate(curves)
     ]
 
@@ -18,10 +30,61 @@ SOBOL = runs("sobol", [9.0, 8.0, 8.0], [8.0, 8.0, 9.0])
 def test_every_engine_has_its_median_and_the_floor_is_drawn():
     (axes,) = compare_figure([GP, SOBOL], 1.0).axes
     drawn = {line.get_label(): line for line in axes.get_lines()}
-    assert list(drawn["gp (2 seeds)"].get_ydata()) == [8.5, 3.5, 0.0]
-    assert list(drawn["sobol (2 seeds)"].get_ydata()) == [8.5, 8.0, 8.0]
+    assert list(drawn["gp (2 seeds)"].get_ydata()) == [8.5, 3.5, 0.0, 0.0]
+    assert list(drawn["sobol (2 seeds)"].get_ydata()) == [8.5, 8.0, 8.0, 8.0]
     assert list(drawn["noise floor"].get_ydata()) == [1.0, 1.0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("evaluations", "lowest regret so far [ordered pairs]")
+
+
+def test_every_engine_is_named_at_the_end_of_its_line_and_no_two_names_overlap():
+    together = [runs(engine, [9.0, 5.0 + number % 3, 3.0]) for number, engine in enumerate(ENGINES)]
+    figure = compare_figure(together, 1.0)
+    figure.canvas.draw()
+    names = [text for text in figure.axes[0].texts if text.get_text() in ENGINES]
+    boxes = [text.get_window_extent() for text in names]
+    assert [text.get_text() for text in names] == list(ENGINES)
+    assert not any(one.overlaps(other) for row, one in enumerate(boxes) for other in boxes[:row])
+    assert max(box.x1 for box in boxes) <= figure.bbox.x1
+    assert figure.get_figwidth() * 25.4 <= 86.0
+
+
+def test_every_engine_has_a_look_of_its_own():
+    assert set(LOOKS) == set(ENGINES)
+    assert len({(colour, str(line)) for colour, line in LOOKS.values()}) == len(ENGINES)
+
+
+def test_places_are_moved_as_little_as_it_takes_and_keep_their_order():
+    assert spread([0.9, 0.1], 0.1) == [0.9, 0.1]
+    np.testing.assert_allclose(spread([0.5, 0.5, 0.9], 0.1), [0.45, 0.55, 0.9])
+    found = spread([0.0, 0.01, 0.0], 0.1)
+    assert min(found) == 0.0
+    assert sorted(found) == [found[0], found[2], found[1]]
+
+
+def test_a_run_that_only_failed_at_first_is_drawn_from_where_it_has_a_regret():
+    failed = runs("gp", [None, 4.0, 1.0], [None, 5.0, 2.0])
+    (axes,) = compare_figure([failed], 1.0).axes
+    assert axes.get_ylim()[1] < 6.0
+
+
+def test_the_tables_tell_how_good_how_soon_and_what_is_known():
+    reading = Reading(0.02, True, {"delay": True, "trim": False}, 0.4, True)
+    engines = [runs("outcomes", [9.0, 4.0], [8.0, 0.0], reading=reading), runs("gp", [9.0, 8.0], [8.0, 7.0])]
+    text = io.StringIO()
+    console = Console(file=text, width=160)
+    for table in compare_tables("truths", [summarise(group, engines[0], 1.0) for group in engines], 2):
+        console.print(table)
+    told = text.getvalue()
+    for expected in (
+        "7.0 (5.0 to 9.0)",
+        "5.5 (4.0 to 7.0)",
+        "2 of 2",
+        "2.0% (2.0% to 2.0%)",
+        "delay 2",
+        "trim 0",
+        "0 of 2",
+    ):
+        assert expected in told
 
 
 def test_a_verdict_needs_an_interval_clear_of_zero():
@@ -37,7 +100,7 @@ def test_the_document_names_the_default_and_gives_every_engine_a_verdict():
     document = compare_document("analytic", summaries, 3, 1.0)
     assert document["default"] == "gp"
     assert [row["verdict"] for row in document["engines"]] == [
-        "is the default",
+        "is the one that the others are compared with",
         "reaches the noise floor in fewer evaluations",
     ]
     assert document["engines"][1]["saved"] == {"value": 1.0, "low": 1.0, "high": 1.0}

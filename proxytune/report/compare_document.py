@@ -21,52 +21,47 @@ def compare_document(name: str, summaries: Sequence[EngineSummary], budget: int,
 
 
 def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -> list[Table]:
-    """The comparison for the terminal, the first engine first: how good and how soon, then what is known of θ."""
-    first = summaries[0].engine
-    title = f"{name}, {budget} evaluations, {summaries[0].seeds} seeds; less, share and saved are to {first}"
-    columns = (
-        "fresh score\nof the answer",
-        "less",
-        "reached",
-        "evaluations\nto it",
-        "share",
-        "saved",
-        "s per\nproposal",
+    """The comparison for the terminal, the first engine first: how good, how soon, and what is known of θ."""
+    first = summaries[0]
+    good = _table(
+        f"{name}: the answer after {budget} evaluations, {first.seeds} seeds",
+        ("fresh score", f"less {first.engine}'s", "θ error", "s per\nproposal"),
+        [
+            (one.engine, told(one.score, ".1f"), told(one.score_difference, ".1f"), told(one.error, ".2f"), _time(one))
+            for one in summaries
+        ],
     )
-    rows = [
-        (
-            one.engine,
-            told(one.score, ".1f"),
-            told(one.score_difference, ".1f"),
-            f"{one.reached}",
-            needed(one.evaluations, budget),
-            told(one.ratio, ".2f"),
-            told(one.saved, ".1f"),
-            f"{one.seconds:.2g}",
-        )
-        for one in summaries
-    ]
-    known = [_known(one) for one in summaries if one.error or one.region]
-    of_truth = _table(
-        "what is known of θ", ("θ error", "region\nholds it", "its share", "intervals hold", "misfit"), known
+    soon = _table(
+        "evaluations to the noise floor",
+        ("reached", "median", f"{first.engine}'s share", f"saved by {first.engine}"),
+        [
+            (one.engine, _of(one.reached, one.seeds), needed(one.evaluations, budget), *_paired(one))
+            for one in summaries
+        ],
     )
-    return [_table(title, columns, rows), *([of_truth] if known else [])]
+    known = [(one.engine, *_region(one.region, one.seeds)) for one in summaries if one.region]
+    of_truth = _table("the truth", ("region\nholds it", "its share", "intervals hold it", "misfit"), known)
+    return [good, soon, *([of_truth] if known else [])]
 
 
-def _known(one: EngineSummary) -> tuple[str, ...]:
-    return (one.engine, told(one.error, ".2f"), *_region(one.region, one.seeds))
+def _time(one: EngineSummary) -> str:
+    return f"{one.seconds:.2g}"
+
+
+def _paired(one: EngineSummary) -> tuple[str, str]:
+    return told(one.ratio, ".2f"), told(one.saved, ".1f")
+
+
+def _of(count: int | None, seeds: int) -> str:
+    return "" if count is None else f"{count} of {seeds}"
 
 
 def _region(region: Region | None, seeds: int) -> tuple[str, ...]:
     if region is None:
         return ("", "", "", "")
     by_parameter = (region.intervals_covered or {}).items()
-    return (
-        "" if region.covered is None else f"{region.covered} of {seeds}",
-        told(region.share, ".1%"),
-        "\n".join(f"{name} {count}" for name, count in by_parameter),
-        f"{region.misfits} of {seeds}",
-    )
+    held = "\n".join(f"{name} {count}" for name, count in by_parameter)
+    return _of(region.covered, seeds), told(region.share, ".1%"), held, _of(region.misfits, seeds)
 
 
 def _table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:

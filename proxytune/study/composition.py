@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable
 
 import numpy as np
 
+from proxytune.errors import RunError
 from proxytune.scores import Array
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Compose, Trial, Values
@@ -19,9 +20,15 @@ def trial_of(study: Study, store: Store, done: TrialRecord) -> Trial:
     """A finished trial as the search sees it; of one that was cut off, the outputs of the agents driven until then.
 
     Of these the store may happen to have more: other processes had begun them.
+
+    Raises:
+        RunError: If the store lacks episodes of it.
     """
-    outcomes = known_outcomes(study, store, episodes_of(study.settings, done)).values()
-    return Trial(study.settings.space.values(done.theta), done.score, outputs_of(study, outcomes))
+    planned = episodes_of(study.settings, done)
+    known = known_outcomes(study, store, planned)
+    if len(known) < len(planned):
+        raise RunError(f"{store.path}: lacks episodes of trial {done.number}; move it away and run the study again")
+    return Trial(study.settings.space.values(done.theta), done.score, outputs_of(study, known.values()))
 
 
 def trials_of(study: Study, store: Store, done: Iterable[TrialRecord]) -> list[Trial]:

@@ -141,9 +141,11 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
     """Which facts differ, each as one phrase for the user."""
     keys = [key for key in {**after, **before} if before.get(key) != after.get(key)]
     # Other agents or metrics make it another part of the target's table, and what the family is told makes it another.
-    target = {"target"} if {"agents", "metrics"} & set(keys) else set()
+    # Another engine may learn from another part of it, and from the pre-flight.
+    implied = {"target"} if {"agents", "metrics", "engine"} & set(keys) else set()
+    implied |= {"preflight"} if "engine" in keys else set()
     told = any(key == "family" or key.startswith("domain.") for key in keys)
-    named = [key for key in keys if key not in target | {"identity"}]
+    named = [key for key in keys if key not in implied | {"identity"}]
     other = ["the domain family (its code, its robot or the proxy's model)"] if "identity" in keys and not told else []
     return [*(_change(key, before.get(key), after.get(key)) for key in named), *other]
 

@@ -10,6 +10,7 @@ from proxytune.report.study_document import study_document
 from proxytune.report.study_table import fresh_lines
 from proxytune.search.engines import make_proposer
 from proxytune.search.knowledge import learn
+from proxytune.study import confirmation
 from proxytune.study.composition import goal_of, trials_of
 from proxytune.study.confirmation import (
     CANDIDATES,
@@ -89,18 +90,17 @@ def plant(study, store, trial, shift):
         store.save_outcome(study.identity, Outcome(episode, metrics, "", 0.0))
 
 
-def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_confirm(finished):
+def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_confirm(finished, monkeypatch):
     study = opened(finished)
     with Store.open(finished) as store:
         trials = store.trials()
-        # Scores that follow nothing make rivals of all.
-        level = [replace(trial, prpv=float(8 + trial.number % 2)) for trial in trials]
-        lucky, *rivals = candidates(study, store, level)
+        chosen = sorted(trials, key=lambda trial: trial.prpv)[:CANDIDATES]
+        monkeypatch.setattr(confirmation, "candidates", lambda *_: chosen)
+        lucky, *rivals = chosen
         plant(study, store, lucky, -1.0)
         for rival in rivals:
             plant(study, store, rival, 1.0)
-        found = confirmation_of(study, store, level)
-    assert len(found.candidates) == CANDIDATES
+        found = confirmation_of(study, store, trials)
     assert found.answer.trial != lucky
     assert found.answer.scores == (0,)
     assert found.candidates[0].optimism > 0

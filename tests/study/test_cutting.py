@@ -207,7 +207,7 @@ def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_e
     with Store.open(found.study.settings.folder) as store:
         before = trial_of(found.study, store, cut)
         simulate(found.study, store, cut.theta, Silent(), "")
-        assert trial_of(found.study, store, cut) == before
+        assert np.array_equal(trial_of(found.study, store, cut).outcome, before.outcome, equal_nan=True)
     known = ~np.isnan(before.outcome).reshape(study.target.means.shape).any(axis=1)
     assert {agent for agent, is_known in zip(study.target.agents, known, strict=True) if is_known} == set(cut.decided)
 

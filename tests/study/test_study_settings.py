@@ -28,7 +28,11 @@ def test_what_may_be_left_out_has_a_default(make_study):
     assert (settings.name, settings.family, settings.proxy) == ("mine", DEFAULT_FAMILY, None)
     assert settings.batch == 1
     assert (settings.initial, settings.seed, settings.jobs, settings.stop_on_failure) == (8, 1, 1, False)
-    assert (settings.engine, settings.preflight, settings.confirm, settings.cut_off) == ("gp", True, 1, True)
+    assert (settings.engine, settings.preflight, settings.confirm, settings.cut_off) == ("outcomes", True, 1, True)
+
+
+def test_of_learning_value_nothing_is_known_but_the_score_so_its_default_engine_is_that_of_scores(make_study):
+    assert read_study_settings(make_study("plv", objective='"plv"')).engine == "gp"
 
 
 def test_rules_to_stop_are_read_each_on_its_own(make_study):

@@ -12,11 +12,13 @@ from pathlib import Path
 
 import pytest
 
+from proxytune.cli.compare_objective import STAND_INS
 from proxytune.cli.main import COMMANDS, main, parser
 from proxytune.driving.agents import AGENTS
 from proxytune.driving.robot import UNITS
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE
+from proxytune.search.engines import ENGINES, STUDY_ENGINES
 from proxytune.study.settings import KEYS
 from proxytune.study.teaching import KEYS as TEACHING_KEYS
 
@@ -51,6 +53,25 @@ def test_every_option_is_in_the_readme(command, option):
     row = next(line for line in README.splitlines() if line.startswith(f"| `{command}"))
     assert f"`{option}" in row or option == "--json"
     assert "`--json`" in README
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_engine_that_can_be_compared_is_in_the_readme(engine):
+    row = next(line for line in README.splitlines() if line.startswith("| `compare"))
+    assert re.search(rf"\b{engine}\b", row)
+
+
+@pytest.mark.parametrize("engine", STUDY_ENGINES)
+def test_every_engine_of_a_study_is_documented(engine):
+    row = next(line for line in STUDIES.splitlines() if line.startswith("| `engine`"))
+    assert f'`"{engine}"`' in row
+
+
+@pytest.mark.parametrize("name", STAND_INS)
+def test_every_stand_in_is_in_the_readme_and_told_with_what_came_out(name):
+    row = next(line for line in README.splitlines() if line.startswith("| `compare"))
+    assert f"`{name}`" in row
+    assert f"compare {name} " in (ROOT / "studies" / "compare.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("key", [*KEYS, "robot", "plant", "camera", "map", "seconds", "position_noise_m", "effects"])

@@ -23,6 +23,7 @@ MADE_FROM = {
     "duckiebot": "twin.toml",
     "closing_the_loop": "twin.toml",
     "teacher": "twin.toml",
+    "truths": "truth.toml",
 }
 
 
@@ -65,6 +66,15 @@ def test_targets_hold_every_agent_and_start_of_their_study(name):
     table = pd.read_csv(STUDIES / name / "target.csv")
     assert not table.isna().any().any()
     assert (table.groupby("agent").size() == table["episode"].nunique()).all()
+
+
+@pytest.mark.parametrize("path", sorted((STUDIES / "truths").glob("lacks_*.toml")), ids=lambda path: path.stem)
+def test_what_truths_lack_is_an_effect_of_its_own_beyond_the_box(path):
+    settings = read_study_settings(STUDIES / "truths")
+    held = dict(load_family(settings, path).effects)
+    assert path.stem.removeprefix("lacks_") in " ".join(held)
+    assert not set(held) & set(settings.space.names), "a truth would be written over it"
+    assert held != dict(load_family(settings, None).effects)
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -
         f"{name}: the answer after {budget} evaluations, {first.seeds} seeds",
         ("fresh score", f"less {first.engine}'s", "θ error", "s per\nproposal"),
         [
-            (one.engine, told(one.score, ".1f"), told(one.score_difference, ".1f"), told(one.error, ".2f"), _time(one))
+            (one.engine, told(one.score, ".1f"), told(one.regret_difference, ".1f"), told(one.error, ".2f"), _time(one))
             for one in summaries
         ],
     )

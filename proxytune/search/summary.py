@@ -48,7 +48,7 @@ class EngineSummary:
         engine: Its name.
         seeds: How many runs.
         score: Mean score of the answers, free of the noise that the engine has seen; None if all failed.
-        score_difference: How much higher that is on average.
+        regret_difference: How much higher that is on average; the regret is higher by as much.
         regret: Median regret of the answer.
         reached: In how many runs a visited point was within the noise floor, or no worse than the truth.
         evaluations: Median number of evaluations to get there; a run that did not counts as one more than the budget.
@@ -62,7 +62,7 @@ class EngineSummary:
     engine: str
     seeds: int
     score: Estimate | None
-    score_difference: Estimate | None
+    regret_difference: Estimate | None
     regret: Estimate
     reached: int
     evaluations: Estimate
@@ -84,7 +84,7 @@ def summarise(runs: Sequence[Run], first: Sequence[Run], tolerance: float) -> En
         engine=runs[0].key.engine,
         seeds=len(runs),
         score=estimate(np.array(scores), np.mean) if scores else None,
-        score_difference=estimate(regrets - _regrets(first), np.mean) if other else None,
+        regret_difference=estimate(regrets - _regrets(first), np.mean) if other else None,
         regret=estimate(regrets, np.median),
         reached=sum(run.judgement.evaluations_to(tolerance) is not None for run in runs),
         evaluations=estimate(needed, np.median),

@@ -58,7 +58,7 @@ def test_the_saving_is_paired_by_seed_and_a_run_beyond_the_budget_counts_as_one_
     assert found.saved.value == 1.5
     assert (found.saved.low, found.saved.high) == (1.0, 2.0)
     assert found.evaluations.value == 3.5
-    assert found.score_difference.value == 5.5
+    assert found.regret_difference.value == 5.5
     assert found.score.value == 10.5
     assert found.ratio.value == 2.0 / 3.5
     assert (found.ratio.low, found.ratio.high) == (0.5, 2.0 / 3.0)
@@ -68,7 +68,7 @@ def test_the_default_is_not_compared_with_itself():
     default = [made("gp", seed, [9.0, 0.0]) for seed in (1, 2)]
     found = summarise(default, default, 4.0)
     assert found.saved is None
-    assert found.score_difference is None
+    assert found.regret_difference is None
     assert found.ratio is None
 
 

@@ -97,7 +97,8 @@ def more_of(found: Finding) -> str:
 
 
 def _more_trials(found: Finding) -> str:
-    return f"raise budget from {found.budget} to {2 * found.budget}"
+    more = f"raise budget from {found.budget} to {2 * found.budget}"
+    return "loosen the rule under [stop] that ended the search" if found.ruled else more
 
 
 def _more_starts(found: Finding) -> str:

@@ -34,6 +34,7 @@ FOUND = Finding(
     informed=Information("blur", (("daredevil", 0.6), ("wary", 0.4)), (("distance", 1.0),), "starts"),
     left=0,
     budget=24,
+    ruled=False,
     starts=4,
     most_starts=10,
     confirm=1,
@@ -72,6 +73,15 @@ def test_a_score_above_the_floor_is_not_called_found():
 def test_the_next_step_is_what_keeps_more_from_being_told(limit, inside, step):
     found = replace(ABOVE, inside=inside, informed=replace(FOUND.informed, limit=limit))
     assert sentence(found).endswith(f" Next: {step}, to come closer to it.")
+
+
+def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help(finished):
+    found = replace(ABOVE, inside=False, ruled=True)
+    assert sentence(found).endswith("Next: loosen the rule under [stop] that ended the search, to come closer to it.")
+    with Store.read(finished) as store:
+        result = result_of(open_study(finished), store)
+    assert finding_of(result).ruled is False
+    assert finding_of(replace(result, trials=result.trials[:3])).ruled is True
 
 
 def test_no_more_starts_are_asked_for_than_there_are():

@@ -98,7 +98,9 @@ def finding_of(result: StudyResult) -> Finding:
         perfect=bool(result.perfect),
         misfit=learnt.misfit.p_value,
         fits=learnt.misfit.fits,
-        informed=next((found for found in learnt.information if found.name == least), None),
+        informed=next(
+            (found for found in learnt.information if found.name == least and sum(dict(found.agents).values())), None
+        ),
         left=0 if result.stopped else settings.budget - len(result.trials),
         budget=max(settings.budget, len(result.trials)),
         ruled=bool(result.stopped) and len(result.trials) < settings.budget,

@@ -103,6 +103,7 @@ def test_what_chance_explains_is_not_found_and_told_with_its_probability():
         " Next: raise budget from 24 to 48, or add agents that differ more in their scores."
     )
     assert "diagnose LOG" in sentence(replace(BY_CHANCE, fits=False))
+    assert "confirm" not in sentence(replace(BY_CHANCE, fresh=False, confirm=0))
 
 
 def test_without_fresh_episodes_luck_is_named_and_they_are_the_next_step():

@@ -98,9 +98,7 @@ def finding_of(result: StudyResult) -> Finding:
         perfect=bool(result.perfect),
         misfit=learnt.misfit.p_value,
         fits=learnt.misfit.fits,
-        informed=next(
-            (found for found in learnt.information if found.name == least and sum(dict(found.agents).values())), None
-        ),
+        informed=next((one for one in learnt.information if one.name == least and _tells(one)), None),
         left=0 if result.stopped else settings.budget - len(result.trials),
         budget=max(settings.budget, len(result.trials)),
         ruled=bool(result.stopped) and len(result.trials) < settings.budget,
@@ -109,6 +107,10 @@ def finding_of(result: StudyResult) -> Finding:
         confirm=settings.confirm,
         declared=declared_of(settings.space.names),
     )
+
+
+def _tells(found: Information) -> bool:
+    return any(share > 0.0 for _, share in found.agents)
 
 
 def known_parameters(result: StudyResult) -> tuple[Known, ...]:

@@ -165,4 +165,6 @@ def test_a_study_s_finding_holds_what_the_study_knows(finished):
     assert (found.least.name, found.informed.name) == ("delay", "delay")
     assert (found.fits, found.misfit, found.fresh, found.left) == (False, 0.002, False, 0)
     assert (found.budget, found.starts, found.most_starts, found.confirm) == (7, 3, 5, 0)
+    silent = replace(TOLD[0], agents=(("agent0", 0.0),))
+    assert finding_of(planted(result, deviation=(3.0, 0.01), information=(silent, TOLD[1]))).informed is None
     assert finding_of(replace(result, stopped="", trials=result.trials[:3])).left == 4

@@ -29,7 +29,7 @@ PRIOR_TRIALS = 4.0
 """The kernel's own variance of an output counts as so many trials beside those left out."""
 
 MOST_FOR_KERNEL = 128
-"""At most so many trials, spread over the box, tell the kernel: its few numbers need no more, and time is their cube."""
+"""At most so many trials, spread over the box, tell the kernel: its few numbers need no more; time is their cube."""
 
 FEWEST = 3
 """Trials that must know an output for it to be modelled."""

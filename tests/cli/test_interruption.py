@@ -16,7 +16,7 @@ from proxytune.cli.main import main
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
-from confirmations import planted_log, write_log
+from planted import planted_log, write_log
 
 SLOWLY = {"sleep": "0.03"}
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import LACKS, TOLD, UNTOLD, confirmed, planted
+from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
 
 from proxytune.report.finding import finding_of

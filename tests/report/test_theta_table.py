@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 import pytest
-from planted import TOLD, planted
+from confirmations import TOLD, planted
 
 from proxytune.report.theta_table import theta_columns, theta_lines, theta_rows, told_rows
 from proxytune.study.result import result_of

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import LACKS, TOLD, planted
+from confirmations import LACKS, TOLD, planted
 
 from proxytune.report.finding import Finding, Known, declared_of, finding_of
 from proxytune.report.verdict import sentence

@@ -49,7 +49,8 @@ class Finding:
         fits: Whether some θ explains the target's scores; None where that cannot be told.
         informed: What the scores tell of the least known parameter; None where nothing is known of that.
         left: Trials that are still to be run; 0 where the search has ended.
-        budget: Trials that the study may take.
+        budget: Trials that the study may take, or has taken where that was more.
+        ruled: Whether a rule ended the search before its budget.
         starts: From how many starts each agent drives.
         most_starts: From how many it can.
         confirm: How often the study drives its best θ again.
@@ -69,6 +70,7 @@ class Finding:
     informed: Information | None
     left: int
     budget: int
+    ruled: bool
     starts: int
     most_starts: int
     confirm: int
@@ -96,14 +98,19 @@ def finding_of(result: StudyResult) -> Finding:
         perfect=bool(result.perfect),
         misfit=learnt.misfit.p_value,
         fits=learnt.misfit.fits,
-        informed=next((found for found in learnt.information if found.name == least), None),
+        informed=next((one for one in learnt.information if one.name == least and _tells(one)), None),
         left=0 if result.stopped else settings.budget - len(result.trials),
-        budget=settings.budget,
+        budget=max(settings.budget, len(result.trials)),
+        ruled=bool(result.stopped) and len(result.trials) < settings.budget,
         starts=settings.starts,
         most_starts=result.study.family.starts,
         confirm=settings.confirm,
         declared=declared_of(settings.space.names),
     )
+
+
+def _tells(found: Information) -> bool:
+    return any(share > 0.0 for _, share in found.agents)
 
 
 def known_parameters(result: StudyResult) -> tuple[Known, ...]:

@@ -67,7 +67,7 @@ def _groups(result: StudyResult) -> str:
     return "".join((
         _group(THETA, theta_lines(result), _table(theta_columns(result), theta_rows(result))),
         _group(WORTH, worth_lines(result)),
-        _group(TOLD, [], _table(TOLD_BY, told_rows(result))),
+        _group(TOLD, [], _table(TOLD_BY, told)) if (told := told_rows(result)) else "",
         _group(SEARCH, search_lines(result)),
     ))  # fmt: skip
 

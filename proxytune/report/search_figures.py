@@ -109,6 +109,7 @@ def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
     edges = [np.linspace(low[side], high[side], cells + 1) for side in (0, 1)]
     counts, _, _ = np.histogram2d(inside[:, 0], inside[:, 1], bins=edges)
     smooth = np.pad(gaussian_filter(np.minimum(counts, 1.0), SMOOTH, mode="nearest"), 1, mode="edge")
+    smooth /= smooth.max()
     across, up = (
         intervals[place].low
         + (intervals[place].high - intervals[place].low) * np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]])

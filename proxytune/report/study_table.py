@@ -89,7 +89,7 @@ def study_table(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Re
         Text(sentence(finding_of(result))),
         *_group(THETA, theta_lines(result), _table(theta_columns(result), theta_rows(result))),
         *_group(WORTH, worth_lines(result)),
-        *_group(TOLD, [], _table(TOLD_BY, told_rows(result))),
+        *(_group(TOLD, [], _table(TOLD_BY, told)) if (told := told_rows(result)) else []),
         *_group(SEARCH, [*search_lines(result), spent, *paths]),
     )
 

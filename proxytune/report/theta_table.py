@@ -86,8 +86,8 @@ def _cautions(result: StudyResult) -> list[str]:
 
 
 def told_rows(result: StudyResult) -> list[Row]:
-    """Per parameter, the agents and the metrics that tell most of it, and what would tell more."""
-    return [_told(found) for found in result.knowledge.information]
+    """Per parameter of which anything is told, the agents and metrics that tell most, and what would tell more."""
+    return [_told(found) for found in result.knowledge.information if _most(found.agents)]
 
 
 def _told(found: Information) -> Row:

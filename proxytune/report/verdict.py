@@ -77,10 +77,10 @@ def _next(found: Finding) -> str:
     if found.fits is False:
         declared = f" --declared {','.join(found.declared)}" if found.declared else ""
         return f"log drives of the target (a model's: `record`) and run `python -m proxytune diagnose LOG{declared}`"
-    if not found.fresh:
-        return f"{'' if found.confirm else 'set confirm = 1 and '}run the study again, to drive the best θ afresh"
     if found.chance.explains:
         return f"{_more_trials(found)}, or add agents that differ more in their scores"
+    if not found.fresh:
+        return f"{'' if found.confirm else 'set confirm = 1 and '}run the study again, to drive the best θ afresh"
     if found.perfect:
         return f"use the proxy at this θ; to know {plain(found.least.name)} better, {more_of(found)}"
     # Where no trial has come into the region yet, starts are not what is missing.
@@ -97,7 +97,8 @@ def more_of(found: Finding) -> str:
 
 
 def _more_trials(found: Finding) -> str:
-    return f"raise budget from {found.budget} to {2 * found.budget}"
+    more = f"raise budget from {found.budget} to {2 * found.budget}"
+    return "loosen the rule under [stop] that ended the search" if found.ruled else more
 
 
 def _more_starts(found: Finding) -> str:

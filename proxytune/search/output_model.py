@@ -28,6 +28,9 @@ Rows = NDArray[np.intp]
 PRIOR_TRIALS = 4.0
 """The kernel's own variance of an output counts as so many trials beside those left out."""
 
+MOST_FOR_KERNEL = 128
+"""At most so many trials, spread over the box, tell the kernel: its few numbers need no more; time is their cube."""
+
 FEWEST = 3
 """Trials that must know an output for it to be modelled."""
 
@@ -177,11 +180,12 @@ def _fitted_kernel(visited: Array, outputs: Array) -> Kernel:
     chosen = standardised[:, spread > 0.0]
     if not chosen.size:
         return prior_kernel(visited.shape[1])
+    rows = np.unique(np.linspace(0, len(chosen) - 1, MOST_FOR_KERNEL).round().astype(int))
     model = GaussianProcessRegressor(prior_kernel(visited.shape[1]), optimizer=most_probable)
     with warnings.catch_warnings():
         # A hyperparameter at its bound is an answer, not a failure.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        model.fit(visited[whole], (chosen - chosen.mean(axis=0)) / chosen.std(axis=0))
+        model.fit(visited[whole][rows], ((chosen - chosen.mean(axis=0)) / chosen.std(axis=0))[rows])
     return model.kernel_
 
 

@@ -14,6 +14,7 @@ from proxytune.scores import Array
 from proxytune.study.preflight import placement_pairs
 from proxytune.study.store import Store
 from proxytune.study.study import Study
+from proxytune.usefulness.repeats import start_of
 
 PRIOR_PAIRS = 2
 """An agent's own pairs are few, so the median over the agents counts as so many more."""
@@ -55,7 +56,7 @@ def noise_of(study: Study, store: Store) -> Noise:
 
 def shares_starts(study: Study) -> bool:
     """Whether the target was driven from the study's own starts, each as often, by every agent."""
-    starts = [label.rpartition("/")[0] or label for label in study.target.episodes]
+    starts = [start_of(label) for label in study.target.episodes]
     wanted = {str(start) for start in range(study.settings.starts)}
     each = {start: starts.count(start) for start in starts}
     return study.target.complete and set(each) == wanted and len(set(each.values())) == 1

@@ -167,8 +167,7 @@ def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialR
 
 
 def _cautions(study: Study, store: Store) -> tuple[str, ...]:
-    left_out = f"the target has no scores of {', '.join(study.left_out)}: left out" if study.left_out else ""
-    return tuple(line for line in (left_out, noise_of(study, store).caution) if line)
+    return tuple(line for line in (*study.cautions, noise_of(study, store).caution) if line)
 
 
 def _best(study: Study, store: Store, answer: TrialRecord, learnt: Knowledge) -> Best:

@@ -16,6 +16,7 @@ from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
+from proxytune.usefulness.repeats import start_of, starts_of
 
 UNSAID = {"batch": 1, "engine": "gp"}
 """What a study.db that names none of these was run with."""
@@ -32,7 +33,7 @@ class Study:
             then every other one that the family has too.
         identity: What determines the result of an episode in the proxy, apart from the episode.
         truth: The θ that made the target, where study.toml names a model of it; nothing depends on it.
-        left_out: Agents of study.toml that the target has no scores of.
+        cautions: What of study.toml or of the target's table is left out, in one line each.
     """
 
     settings: StudySettings
@@ -40,7 +41,7 @@ class Study:
     target: ScoreTable
     identity: str
     truth: Theta | None = None
-    left_out: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
 
 
 def open_study(path: Path) -> Study:
@@ -51,12 +52,14 @@ def open_study(path: Path) -> Study:
     """
     settings = read_study_settings(path)
     family = load_family(settings, settings.proxy)
-    known, left_out = _with_scores(settings)
-    return Study(known, family, read_target(known, family), family.identity, _truth(settings), left_out)
+    known = _with_scores(settings)
+    absent = [agent for agent in settings.agents if agent not in known.agents]
+    cautions = (f"the target has no scores of {', '.join(absent)}: left out",) if absent else ()
+    return Study(known, family, read_target(known, family), family.identity, _truth(settings), cautions)
 
 
-def _with_scores(settings: StudySettings) -> tuple[StudySettings, tuple[str, ...]]:
-    """The study of those agents that the target has scores of, and the others.
+def _with_scores(settings: StudySettings) -> StudySettings:
+    """The study of those agents that the target has scores of.
 
     Raises:
         InputError: If fewer than two are left.
@@ -67,7 +70,7 @@ def _with_scores(settings: StudySettings) -> tuple[StudySettings, tuple[str, ...
     if len(there) < 2:
         hint = nearest(missing[0], scored) if len(missing) == 1 else "add them, or take them out of the study"
         raise InputError(f"{settings.target}: has no scores of {', '.join(missing)}; {hint}")
-    return replace(settings, agents=there), missing
+    return replace(settings, agents=there)
 
 
 def _truth(settings: StudySettings) -> Theta | None:
@@ -80,7 +83,7 @@ def _truth(settings: StudySettings) -> Theta | None:
 
 
 def read_target(settings: StudySettings, family: DomainFamily) -> ScoreTable:
-    """The target's scores of the study's agents.
+    """The target's scores of the study's agents, from the study's own starts where it has all of these.
 
     Raises:
         InputError: If the table lacks a metric, or has a value that is not finite.
@@ -89,7 +92,9 @@ def read_target(settings: StudySettings, family: DomainFamily) -> ScoreTable:
     table = read_scores(settings.target, [*compared, *_others(settings, family, compared)])
     chosen = table.arrange(agents=settings.agents)
     driven = [label for column, label in enumerate(chosen.episodes) if chosen.driven[:, column].any()]
-    return chosen.arrange(agents=settings.agents, episodes=driven)
+    wanted = {str(start) for start in range(settings.starts)}
+    own = [label for label in driven if start_of(label) in wanted]
+    return chosen.arrange(agents=settings.agents, episodes=own if set(starts_of(own)) == wanted else driven)
 
 
 def _others(settings: StudySettings, family: DomainFamily, compared: Sequence[str]) -> list[str]:

@@ -9,15 +9,20 @@ import numpy as np
 import pytest
 
 from proxytune.domain import make_episode
-from proxytune.search.analytic import Analytic
-from proxytune.search.design import design_point
+from proxytune.scores import Metric
+from proxytune.search.analytic import BOX, Analytic
+from proxytune.search.design import design_point, to_unit
 from proxytune.search.engines import make_proposer
+from proxytune.search.goal import Goal
+from proxytune.search.knowledge import learn
 from proxytune.search.proposer import Trial
 from proxytune.study.evaluate import episode_seed
 from proxytune.study.store import Outcome, Store, TrialRecord
+from proxytune.usefulness.prpv import prpv_of_means
 
-COUNTS = (25, 100, 200)
-REPEATS = 5
+COUNTS = (25, 100, 400)
+REPEATS = 4
+AGENTS_MODELLED, METRICS_MODELLED = 12, 7
 TRIALS, AGENTS, STARTS = 200, 10, 10
 METRICS = ("distance", "survival_time", "time_out_of_lane", "deviation")
 
@@ -28,23 +33,60 @@ def trials_of(objective, count):
     return [Trial(values, objective.score(values, 1)) for values in points]
 
 
-@pytest.mark.parametrize("engine", ["gp", "skopt"])
-def test_a_proposal_at_25_100_and_200_trials(engine, capsys):
-    """Processor time, on one thread; the middle one of five proposals with different seeds."""
-    objective, proposer, line = Analytic(), make_proposer(engine, 10), []
-    for count in COUNTS:
-        trials, seconds = trials_of(objective, count), []
-        for seed in range(REPEATS):
-            begun = time.process_time()
-            proposer.propose(objective.space, trials, seed)
-            seconds.append(time.process_time() - begun)
-        line.append(f"{count} trials {1000 * statistics.median(seconds):.0f} ms")
+def agents():
+    """Twelve agents with seven metrics each, smooth in θ and a little rough; and the target, one θ of theirs."""
+    generator, shape = np.random.default_rng(1), (AGENTS_MODELLED * METRICS_MODELLED, 4)
+    slopes = generator.normal(0.0, 2.0, shape)
+
+    def outputs(values, seed):
+        return np.sin(slopes @ to_unit(BOX, values)) + np.random.default_rng(seed).normal(0.0, 0.05, shape[0])
+
+    names = tuple((f"agent{row // METRICS_MODELLED}", f"metric{row % METRICS_MODELLED}") for row in range(shape[0]))
+    target = outputs((0.03, 20.0, 0.1, 0.05), 0)
+    compared = (Metric("distance"), Metric("survival_time"))
+
+    def ranked(found):
+        return found.reshape(*found.shape[:-1], AGENTS_MODELLED, METRICS_MODELLED)[..., : len(compared)]
+
+    goal = Goal(names, target, np.full(shape[0], 0.005), lambda o: prpv_of_means(ranked(o), ranked(target), compared))
+    return outputs, goal
+
+
+def trials_with_outputs(count):
+    outputs, goal = agents()
+    points = [design_point(BOX, number, 1) for number in range(count)]
+    told = [outputs(values, row + 1) for row, values in enumerate(points)]
+    return [Trial(v, float(goal.compose(o)), tuple(o.tolist())) for v, o in zip(points, told, strict=True)]
+
+
+@pytest.mark.parametrize("engine", ["outcomes", "composite", "gp", "skopt"])
+@pytest.mark.parametrize("count", COUNTS)
+def test_a_proposal_at_25_100_and_400_trials(engine, count, capsys):
+    """Processor time, on one thread: the mean of four proposals, two of them draws where the engine takes turns."""
+    proposer = make_proposer(engine, 10, agents()[1])
+    trials, seconds = trials_with_outputs(count + 1), []
+    for seed in range(REPEATS):
+        begun = time.process_time()
+        proposer.propose(BOX, trials[: count + seed % 2], seed)
+        seconds.append(time.process_time() - begun)
     with capsys.disabled():
-        print(f"\n{engine}: processor time of a proposal at {', '.join(line)}")
+        print(f"\n{engine}: processor time of a proposal at {count} trials {1000 * statistics.mean(seconds):.0f} ms")
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_what_is_known_of_theta_at_25_100_and_400_trials(count, capsys):
+    """Region, misfit, what PRPV cannot tell apart and who tells what: once, when a study is summed up."""
+    trials, goal = trials_with_outputs(count), agents()[1]
+    begun = time.process_time()
+    found = learn(BOX, trials, goal)
+    share, fits, as_good = found.posterior.share, found.misfit.fits, found.as_good[0]
+    seconds = time.process_time() - begun
+    with capsys.disabled():
+        print(f"\n{count} trials summed up in {seconds:.1f} s: region {share:.2g}, fits {fits}, as good {as_good:.2g}")
 
 
 @pytest.mark.parametrize("engine", ["gp", "skopt"])
-def test_memory_of_a_proposal_at_200_trials(engine, capsys):
+def test_memory_of_a_proposal_at_400_trials(engine, capsys):
     """The peak of what Python and numpy allocate; and of the whole process so far, its libraries included."""
     objective, proposer = Analytic(), make_proposer(engine, 10)
     trials = trials_of(objective, COUNTS[-1])
@@ -55,7 +97,7 @@ def test_memory_of_a_proposal_at_200_trials(engine, capsys):
     process = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     with capsys.disabled():
         print(
-            f"\n{engine}: a proposal at 200 trials takes {peak / 2**20:.1f} MiB; the process {process:.0f} MiB at most"
+            f"\n{engine}: a proposal at 400 trials takes {peak / 2**20:.1f} MiB; the process {process:.0f} MiB at most"
         )
 
 

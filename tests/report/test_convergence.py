@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import confirmed
+from confirmations import confirmed
 
 from proxytune.report.convergence import convergence
 from proxytune.study.result import result_of

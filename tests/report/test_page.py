@@ -3,7 +3,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from planted import TOLD, planted
+from confirmations import TOLD, planted
 
 from proxytune.report.convergence import convergence
 from proxytune.report.finding import finding_of

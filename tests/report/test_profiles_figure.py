@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import planted
+from confirmations import planted
 
 from proxytune.report.profiles_figure import density_of, profiles_figure
 from proxytune.study.result import result_of

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import LACKS, TOLD, UNTOLD, confirmed, planted
+from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
 
 from proxytune.report.finding import finding_of
@@ -15,7 +15,8 @@ from proxytune.report.study_table import floor_lines, misfit_line, study_table, 
 from proxytune.report.verdict import sentence
 from proxytune.search.engines import make_proposer
 from proxytune.space import Interval
-from proxytune.study.preflight import Movement, Preflight
+from proxytune.study.movement import Movement
+from proxytune.study.preflight import Preflight
 from proxytune.study.progress import Silent
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study

@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 import pytest
-from planted import planted
+from confirmations import TOLD, planted
 
 from proxytune.report.theta_table import theta_columns, theta_lines, theta_rows, told_rows
 from proxytune.study.result import result_of
@@ -66,3 +66,8 @@ def test_per_parameter_those_that_tell_most_are_named_with_what_would_tell_more(
         ("delay", "agent4 46 %, agent0 30 %, agent1 20 %", "speed 100 %", "more starts"),
         ("trim", "agent1 100 %", "distance 75 %, survival_time 25 %", "more trials"),
     ]
+
+
+def test_a_parameter_of_which_nothing_is_told_has_no_row(result):
+    silent = replace(TOLD[0], agents=(("agent0", 0.0), ("agent1", 0.0)))
+    assert [row[0] for row in told_rows(planted(result, information=(silent, TOLD[1])))] == ["trim"]

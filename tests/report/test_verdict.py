@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import LACKS, TOLD, planted
+from confirmations import LACKS, TOLD, planted
 
 from proxytune.report.finding import Finding, Known, declared_of, finding_of
 from proxytune.report.verdict import sentence
@@ -34,6 +34,7 @@ FOUND = Finding(
     informed=Information("blur", (("daredevil", 0.6), ("wary", 0.4)), (("distance", 1.0),), "starts"),
     left=0,
     budget=24,
+    ruled=False,
     starts=4,
     most_starts=10,
     confirm=1,
@@ -74,6 +75,15 @@ def test_the_next_step_is_what_keeps_more_from_being_told(limit, inside, step):
     assert sentence(found).endswith(f" Next: {step}, to come closer to it.")
 
 
+def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help(finished):
+    found = replace(ABOVE, inside=False, ruled=True)
+    assert sentence(found).endswith("Next: loosen the rule under [stop] that ended the search, to come closer to it.")
+    with Store.read(finished) as store:
+        result = result_of(open_study(finished), store)
+    assert finding_of(result).ruled is False
+    assert finding_of(replace(result, trials=result.trials[:3])).ruled is True
+
+
 def test_no_more_starts_are_asked_for_than_there_are():
     assert "raise starts from 4 to 5 " in sentence(replace(ABOVE, most_starts=5))
     assert "add agents or metrics: all 4 starts are driven" in sentence(replace(ABOVE, most_starts=4))
@@ -93,6 +103,7 @@ def test_what_chance_explains_is_not_found_and_told_with_its_probability():
         " Next: raise budget from 24 to 48, or add agents that differ more in their scores."
     )
     assert "diagnose LOG" in sentence(replace(BY_CHANCE, fits=False))
+    assert "confirm" not in sentence(replace(BY_CHANCE, fresh=False, confirm=0))
 
 
 def test_without_fresh_episodes_luck_is_named_and_they_are_the_next_step():
@@ -154,4 +165,6 @@ def test_a_study_s_finding_holds_what_the_study_knows(finished):
     assert (found.least.name, found.informed.name) == ("delay", "delay")
     assert (found.fits, found.misfit, found.fresh, found.left) == (False, 0.002, False, 0)
     assert (found.budget, found.starts, found.most_starts, found.confirm) == (7, 3, 5, 0)
+    silent = replace(TOLD[0], agents=(("agent0", 0.0),))
+    assert finding_of(planted(result, deviation=(3.0, 0.01), information=(silent, TOLD[1]))).informed is None
     assert finding_of(replace(result, stopped="", trials=result.trials[:3])).left == 4

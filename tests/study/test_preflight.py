@@ -9,7 +9,8 @@ from stopping import Stopping
 from proxytune.errors import EpisodeError
 from proxytune.search.engines import make_proposer
 from proxytune.space import Interval
-from proxytune.study.preflight import LEVEL, LOOKS, PAIRS, judge, most_episodes, preflight_of, run_preflight
+from proxytune.study.movement import LEVEL, LOOKS, judge
+from proxytune.study.preflight import PAIRS, most_episodes, preflight_of, run_preflight
 from proxytune.study.progress import Silent
 from proxytune.study.run import run_study
 from proxytune.study.store import Store

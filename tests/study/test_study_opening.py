@@ -96,3 +96,12 @@ def test_the_truth_is_read_but_nothing_depends_on_it(make_study):
     assert facts(plain) == facts(told)
     with pytest.raises(InputError, match="truth: no such file"):
         open_study(make_study(truth='"untruth.toml"'))
+
+
+def test_of_a_target_with_more_starts_the_study_s_own_are_compared(make_study):
+    """So that both sides drive from the same starts; where it lacks one of them, all its episodes count."""
+    whole = open_study(make_study())
+    fewer = open_study(make_study(starts="2"))
+    assert (whole.target.episodes, fewer.target.episodes) == (("0", "1", "2"), ("0", "1"))
+    assert fewer.target.means.tolist() == whole.target.values[:, :2].mean(axis=1).tolist()
+    assert open_study(make_study(starts="5")).target.episodes == ("0", "1", "2")

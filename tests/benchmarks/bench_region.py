@@ -1,8 +1,8 @@
 """Does the 95 % region hold the truth? `python tests/benchmarks/bench_region.py OUTPUT [--truths 40] [--trials 24]`.
 
 The trials are a quasi-random design of studies/truths, shared by all truths, so each truth costs one evaluation: its
-target, measured under other placement noise. Nothing is searched. Then the same for targets with an effect that the proxy
-lacks, in turn those of the study's folder. Episodes are kept in OUTPUT/study.db, so it may be stopped and run again.
+target, measured under other placement noise. Nothing is searched. Then the same for targets with an effect that the
+proxy lacks, in turn those of the study's folder. Episodes are kept in OUTPUT/study.db, so it may be stopped and run on.
 """
 
 import argparse

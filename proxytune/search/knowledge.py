@@ -10,6 +10,7 @@ from proxytune.search.composite import composed_scores, fresh_scores
 from proxytune.search.design import from_unit, to_unit
 from proxytune.search.goal import Goal
 from proxytune.search.information import Information, information_of
+from proxytune.search.left_out import LeftOut, leave_out
 from proxytune.search.likelihood import Likelihood
 from proxytune.search.misfit import Misfit, misfit_of
 from proxytune.search.output_model import OutputModel, fit_outputs
@@ -52,9 +53,21 @@ class Knowledge:
         return Likelihood(self.model, self.goal)
 
     @cached_property
+    def left_out(self) -> LeftOut:
+        """What the trials say of each other."""
+        return leave_out(self.model, self.trials, self.goal, self.seed)
+
+    def log(self, points: Array) -> Array:
+        """Log density of θ at points (n, parameters) of the unit cube, up to a constant.
+
+        Wider than the likelihood where its regions do not hold as many left-out trials as they should.
+        """
+        return self.likelihood.log(points) / self.left_out.widening
+
+    @cached_property
     def posterior(self) -> Posterior:
         """θ given the target's outputs, over the unit cube."""
-        return posterior_of(self.likelihood.log, len(self.space.intervals), REPORTED)
+        return posterior_of(self.log, len(self.space.intervals), REPORTED)
 
     @property
     def intervals(self) -> Mapping[str, Ends]:
@@ -76,7 +89,7 @@ class Knowledge:
 
     def holds(self, values: Values) -> bool:
         """Whether a θ of the box is in the 95 % region."""
-        return bool(self.likelihood.log(to_unit(self.space, values)[None])[0] >= self.posterior.threshold)
+        return bool(self.log(to_unit(self.space, values)[None])[0] >= self.posterior.threshold)
 
     def scores(self, points: Sequence[Values]) -> tuple[Array, Array]:
         """Mean and standard deviation of what PRPV is expected to be at points of the box, rough and noise left out."""
@@ -129,7 +142,7 @@ class Knowledge:
     @cached_property
     def misfit(self) -> Misfit:
         """Whether any θ explains the target."""
-        return misfit_of(self.model, self.trials, self.goal, self.seed)
+        return misfit_of(self.likelihood, self.posterior, self.left_out)
 
     @cached_property
     def information(self) -> tuple[Information, ...]:

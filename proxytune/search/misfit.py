@@ -1,28 +1,17 @@
-"""Can the proxy be like the target at all? The target's distance from the model, held against that of left-out trials.
+"""Can the proxy be like the target at all? How far the target is from the model, against trials left out."""
 
-At its best θ the target is so far from what the trials predict: the mean deviance T of its outputs. The trials are from
-the proxy itself, so each of them, left out and given the noise of a target, tells how large T is when a proxy fits.
-Their spread makes the threshold; nothing is assumed of how outputs are correlated.
-"""
-
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import t as student
 
-from proxytune.search.goal import Goal
-from proxytune.search.likelihood import Likelihood, deviance
-from proxytune.search.output_model import OutputModel, fit_outputs
-from proxytune.search.proposer import Trial
-from proxytune.search.region import posterior_of
-from proxytune.search.surrogate import Array
+from proxytune.search.left_out import LeftOut, least_deviance
+from proxytune.search.likelihood import Likelihood
+from proxytune.search.region import Posterior
 
 LEVEL = 0.05
-MOST = 24
-"""So many trials at most are left out, spread evenly over the search."""
-FEWEST = 6
-POINTS = 512
+LEAST = 1e-12
+"""A deviance of which the logarithm can be taken."""
 
 
 @dataclass(frozen=True)
@@ -45,43 +34,22 @@ class Misfit:
         return None if self.p_value is None else self.p_value >= LEVEL
 
 
-def misfit_of(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int) -> Misfit:
-    """Hold the target's deviance against that of trials left out, a function of the trials and the seed alone.
+def misfit_of(likelihood: Likelihood, posterior: Posterior, left_out: LeftOut) -> Misfit:
+    """Hold the target's deviance at its most probable θ against that of trials left out.
+
+    The logarithms of these are taken for normal, so the p-value is Student's for one more of them.
 
     Args:
-        model: Fitted to the trials.
-        trials: Finished trials.
-        goal: The target.
-        seed: Seeds the noise that is given to trials left out.
+        likelihood: Of the target.
+        posterior: Its θ.
+        left_out: What left-out trials say.
     """
-    found = _least_deviance(model, goal)
-    known = sorted((trial for trial in trials if trial.outcome is not None), key=lambda trial: trial.values)
-    whole = [row for row, trial in enumerate(known) if not np.isnan(trial.outcome or ()).any()]
-    if len(whole) < FEWEST or found is None:
-        return Misfit(found, None, None)
-    chosen = [whole[place] for place in np.unique(np.linspace(0, len(whole) - 1, MOST).round().astype(int))]
-    normal = np.random.default_rng(seed).standard_normal((len(known), len(goal.values)))
-    ours = np.log([_left_out(model, known, goal, row, normal[row]) or np.nan for row in chosen])
-    ours = ours[~np.isnan(ours)]
-    if len(ours) < FEWEST:
-        return Misfit(found, None, None)
-    spread = max(float(ours.std(ddof=1)), 1e-9) * np.sqrt(1.0 + 1.0 / len(ours))
-    away = (np.log(found) - ours.mean()) / spread
-    return Misfit(found, float(np.exp(ours.mean())), float(student.sf(away, len(ours) - 1)))
-
-
-def _left_out(model: OutputModel, known: Sequence[Trial], goal: Goal, row: int, normal: Array) -> float | None:
-    """The least deviance of one trial as a target, given the others and the kernel of them all."""
-    others = fit_outputs(model.space, [*known[:row], *known[row + 1 :]], model.kernel)
-    values = np.array(known[row].outcome) + normal * np.sqrt(goal.noise)
-    # The target may lack outputs, and then these tell nothing here either.
-    return _least_deviance(others, replace(goal, values=np.where(np.isnan(goal.values), np.nan, values)))
-
-
-def _least_deviance(model: OutputModel, goal: Goal) -> float | None:
-    likelihood = Likelihood(model, goal)
     if not likelihood.columns.size:
-        return None
-    mode = posterior_of(likelihood.log, len(model.space.intervals), POINTS).mode
-    distance, _ = likelihood.standardised(mode[None])
-    return float(deviance(distance).mean()) + 1e-12
+        return Misfit(None, None, None)
+    found = least_deviance(likelihood, posterior)
+    if not left_out.enough:
+        return Misfit(found, None, None)
+    ours = np.log(left_out.deviances + LEAST)
+    spread = max(float(ours.std(ddof=1)), 1e-9) * np.sqrt(1.0 + 1.0 / len(ours))
+    away = (np.log(found + LEAST) - ours.mean()) / spread
+    return Misfit(found, float(np.exp(ours.mean())), float(student.sf(away, len(ours) - 1)))

@@ -5,8 +5,7 @@ import pytest
 from steps import SPACE, goal, whole
 
 from proxytune.search.design import design_point, from_unit, to_unit
-from proxytune.search.misfit import misfit_of
-from proxytune.search.output_model import fit_outputs
+from proxytune.search.knowledge import learn
 from proxytune.search.proposer import Trial
 
 AGENTS = np.random.default_rng(0).uniform(1.0, 4.0, (12, 2))
@@ -28,7 +27,7 @@ def p_value(seed, shift):
     values = from_unit(SPACE, np.random.default_rng(seed).uniform(0.2, 0.8, 2))
     target = outputs(values, 10_000 + seed) + shift * np.resize([1.0, -1.0, 0.0], 12)
     told = trials(seed)
-    return misfit_of(fit_outputs(SPACE, told), told, goal(whole, target, SPREAD**2), seed).p_value
+    return learn(SPACE, told, goal(whole, target, SPREAD**2), seed).misfit.p_value
 
 
 def test_targets_that_the_proxy_can_make_are_seldom_said_to_be_beyond_it():
@@ -44,17 +43,16 @@ def test_targets_beyond_it_are_found():
 def test_the_same_trials_in_any_order_give_the_same_verdict():
     told = trials(1)
     target = goal(whole, outputs((0.1, 0.1), 5), SPREAD**2)
-    model = fit_outputs(SPACE, told)
-    assert misfit_of(model, told, target, 1) == misfit_of(model, told[::-1], target, 1)
+    assert learn(SPACE, told, target, 1).misfit == learn(SPACE, told[::-1], target, 1).misfit
 
 
 @pytest.mark.parametrize("count", [4, 5])
 def test_with_too_few_trials_nothing_is_said(count):
     told = trials(1, count)
-    found = misfit_of(fit_outputs(SPACE, told), told, goal(whole, outputs((0.1, 0.1), 5)), 1)
+    found = learn(SPACE, told, goal(whole, outputs((0.1, 0.1), 5))).misfit
     assert (found.p_value, found.fits) == (None, None)
 
 
 def test_where_no_output_changes_nothing_is_said():
     told = [Trial(design_point(SPACE, index, 1), 1.0, (7.0,)) for index in range(8)]
-    assert misfit_of(fit_outputs(SPACE, told), told, goal(whole, (3.0,)), 1).fits is None
+    assert learn(SPACE, told, goal(whole, (3.0,))).misfit.fits is None

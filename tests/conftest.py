@@ -20,6 +20,7 @@ STUDY = {
     "starts": "3",
     "budget": "7",
     "initial": "5",
+    "engine": '"gp"',
     "seed": "1",
     "jobs": "1",
     "preflight": "false",

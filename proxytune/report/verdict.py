@@ -67,6 +67,8 @@ def _worth(found: Finding) -> str:
     perfect = f"where a perfect proxy scores {short(level.value)} ({short(level.low)} to {short(level.high)})"
     if found.perfect:
         return f"{score}, {perfect}: this proxy cannot be told from a perfect one."
+    if found.prpv <= level.high and not found.inside:
+        return f"{score}, {perfect}: as good by PRPV, but other scores of its agents are not the target's."
     return f"{score}, {perfect}: better than chance, not yet as good as can be."
 
 

@@ -96,9 +96,14 @@ class StudyResult:
 
     @property
     def perfect(self) -> bool:
-        """Whether it has been shown that the proxy cannot be told from a perfect one."""
-        fresh = self.confirmation is not None and self.confirmation.answer.assessment is not None
-        return fresh and bool(self.judged.at_noise_floor) and self.knowledge.misfit.fits is not False
+        """Whether it has been shown that the proxy cannot be told from a perfect one.
+
+        By PRPV in fresh episodes, and by every other output: where the answer lies outside the 95 % region, these tell.
+        """
+        if self.confirmation is None or self.confirmation.answer.assessment is None:
+            return False
+        inside = self.knowledge.holds(self.knowledge.space.values(self.best.trial.theta))
+        return bool(self.judged.at_noise_floor) and self.knowledge.misfit.fits is not False and inside
 
     @property
     def failed_episodes(self) -> int:

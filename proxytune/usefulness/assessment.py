@@ -17,7 +17,7 @@ from proxytune.usefulness.resampling import PrpvInterval, bootstrap_prpv
 FEW_EPISODES = 5
 PAIRED = "the same label counts as the same start, which leaves few resamples; treat them as unpaired if it is not"
 ONE_START = "an agent has all its episodes from one start: intervals do not say what other starts would give"
-PERFECT = "PRPV is within the noise floor, by the same starts: this proxy cannot be told from a perfect one"
+PERFECT = "PRPV is within the noise floor, by the same starts: by PRPV this proxy cannot be told from a perfect one"
 HALVES = (
     "PRPV is no higher than what halves of the target's episodes score against each other, but these are other starts "
     "and half the episodes: that does not show that the proxy is perfect; measure the target at least twice from each "

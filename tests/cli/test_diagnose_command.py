@@ -140,7 +140,8 @@ def test_a_study_takes_the_model_as_its_proxy(printed, home):
     shipped = Path(__file__).parents[2] / "studies" / "known_answer"
     study = home / "study"
     study.mkdir()
-    shutil.copy(shipped / "target.csv", study)
+    for name in ("target.csv", "truth.toml"):
+        shutil.copy(shipped / name, study)
     shutil.copy(home / "out" / "model.toml", study)
     text = (shipped / "study.toml").read_text(encoding="utf-8")
     (study / "study.toml").write_text(text, encoding="utf-8")

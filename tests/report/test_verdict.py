@@ -168,3 +168,11 @@ def test_a_study_s_finding_holds_what_the_study_knows(finished):
     silent = replace(TOLD[0], agents=(("agent0", 0.0),))
     assert finding_of(planted(result, deviation=(3.0, 0.01), information=(silent, TOLD[1]))).informed is None
     assert finding_of(replace(result, stopped="", trials=result.trials[:3])).left == 4
+
+
+def test_a_score_at_the_floor_of_a_theta_that_other_scores_exclude_is_not_called_perfect():
+    text = sentence(replace(FOUND, perfect=False, inside=False))
+    assert text.startswith("θ is narrowed down to 0.16 % of the box: ")
+    assert "scores 5 (1 to 9): as good by PRPV, but other scores of its agents are not the target's." in text
+    assert "perfect one" not in text
+    assert text.endswith("Next: raise budget from 24 to 48, to come closer to it.")

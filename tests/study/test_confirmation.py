@@ -10,6 +10,7 @@ from proxytune.report.study_document import study_document
 from proxytune.report.study_table import fresh_lines
 from proxytune.search.engines import make_proposer
 from proxytune.search.knowledge import learn
+from proxytune.search.misfit import Misfit
 from proxytune.study import confirmation
 from proxytune.study.composition import goal_of, trials_of
 from proxytune.study.confirmation import (
@@ -225,3 +226,21 @@ def test_the_document_has_the_answer_and_every_candidate(finished):
     assert (fresh["prpv"], fresh["prpv_interval"]) == (answer.scores[0], [inner.low, inner.high])
     assert fresh["optimism"] == answer.optimism
     assert [one["index"] for one in fresh["candidates"]] == [c.trial.number for c in found.confirmation.candidates]
+
+
+@pytest.mark.parametrize(
+    ("inside", "fits", "perfect"), [(True, True, True), (False, True, False), (True, False, False)]
+)
+def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_target(
+    finished, monkeypatch, inside, fits, perfect
+):
+    study = opened(finished)
+    with Store.open(finished) as store:
+        for trial in candidates(study, store, store.trials()):
+            plant(study, store, trial, 1.0)
+        found = result_of(study, store)
+    monkeypatch.setattr(type(found.knowledge), "holds", lambda *_: inside)
+    monkeypatch.setattr(type(found.knowledge), "misfit", Misfit(1.0, 1.0, 0.5 if fits else 0.01))
+    assert found.judged.prpv.value == 0
+    assert found.perfect is (perfect and bool(found.judged.at_noise_floor))
+    assert found.judged.at_noise_floor is True

@@ -103,7 +103,7 @@ EDITS = {
     "a tolerance": ({"metrics": '["distance:max:5%", "survival_time:max"]'}, "metrics"),
     "the agents": ({"agents": '["agent0", "agent1"]'}, "agents"),
     "the batch": ({"batch": "2"}, "batch (was 1)"),
-    "the engine": ({"engine": '"sobol"'}, 'engine (was "outcomes");'),
+    "the engine": ({"engine": '"sobol"'}, 'engine (was "gp");'),
     "cutting off": ({"cut_off": "true"}, "cut_off (was false)"),
     "the domain": ({"domain": {"version": '"2"'}}, "domain.version (was nothing)"),
 }

@@ -45,7 +45,7 @@ def test_agents_of_the_target_that_are_not_in_the_study_do_not_count(make_study)
 
 def test_the_engine_is_a_fact_but_that_of_before_there_was_a_choice_goes_without_saying(make_study):
     """Trials of then stay valid."""
-    before, other = facts(open_study(make_study(engine='"gp"'))), facts(open_study(make_study()))
+    before, other = facts(open_study(make_study())), facts(open_study(make_study(engine=None)))
     assert "engine" not in before
     assert changes(before, other) == ['engine (was "gp")']
     assert changes(other, before) == ['engine (was "outcomes")']
@@ -54,13 +54,14 @@ def test_the_engine_is_a_fact_but_that_of_before_there_was_a_choice_goes_without
 def test_what_the_search_learns_from_is_a_fact(make_study):
     """Of an engine that learns from outputs these are the whole table and the pre-flight's noise."""
     target = make_study() / "target.csv"
-    alone = {"metrics": '["survival_time:max"]'}
+    alone = {"metrics": '["survival_time:max"]', "engine": '"outcomes"'}
     plain = facts(open_study(make_study(**alone)))
     assert changes(plain, facts(open_study(make_study(preflight="true", **alone)))) == ["preflight (was false)"]
-    score = facts(open_study(make_study(engine='"gp"', **alone)))
+    by_score = {**alone, "engine": '"gp"'}
+    score = facts(open_study(make_study(**by_score)))
     target.write_text(target.read_text().replace("agent2,1,", "agent2,1,9"))
     assert changes(plain, facts(open_study(make_study(**alone)))) == ["target (its contents)"]
-    assert facts(open_study(make_study(engine='"gp"', **alone))) == score
+    assert facts(open_study(make_study(**by_score))) == score
 
 
 def test_rules_to_stop_are_no_facts(make_study):

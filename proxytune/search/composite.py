@@ -101,7 +101,7 @@ def composed_scores(model: OutputModel, goal: Goal, seed: int) -> Callable[[Arra
 
     def scores(points: Array) -> Array:
         mean, variance = _every_output(model, goal, points)
-        return np.stack([goal.compose(_at_most(model, mean + np.sqrt(variance) * row)) for row in normal])
+        return np.stack([goal.compose(mean + np.sqrt(variance) * row) for row in normal])
 
     return scores
 
@@ -111,15 +111,7 @@ def fresh_scores(model: OutputModel, goal: Goal, point: Array, seed: int) -> Arr
     mean, variance = _every_output(model, goal, point[None])
     deviation = np.sqrt(variance + np.nan_to_num(model.rough) + goal.noise / 2.0)
     drawn = mean + deviation * np.random.default_rng(seed).standard_normal((FRESH_DRAWS, model.outputs))
-    return goal.compose(_at_most(model, drawn))
-
-
-def _at_most(model: OutputModel, drawn: Array) -> Array:
-    """Outputs (…, outputs) that come to their bound where they are beyond it, or as near as they are rough.
-
-    Agents that survive the whole episode tie with each other, which a smooth function alone would never show.
-    """
-    return np.where(drawn > model.bound - np.sqrt(np.nan_to_num(model.rough)), model.bound, drawn)
+    return goal.compose(drawn)
 
 
 def _every_output(model: OutputModel, goal: Goal, points: Array) -> tuple[Array, Array]:

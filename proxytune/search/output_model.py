@@ -77,7 +77,6 @@ class OutputModel:
         kernel: Covariance of a standardised output over the unit cube: its smooth course, and noise round that.
         groups: The outputs, by where they are known.
         constant: What each output is on average over the trials that know it, shape (outputs,); NaN where none does.
-        bound: What no trial's output exceeds though several come to it, shape (outputs,); infinite where there is none.
         visited: All trials that know any output, in the unit cube, shape (trials, parameters).
     """
 
@@ -85,7 +84,6 @@ class OutputModel:
     kernel: Kernel
     groups: tuple[OutputGroup, ...]
     constant: Array
-    bound: Array
     visited: Array
 
     @property
@@ -160,7 +158,7 @@ def fit_outputs(space: Space, trials: Sequence[Trial], kernel: Kernel | None = N
     seen = ~np.isnan(outputs)
     with np.errstate(invalid="ignore"):
         constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)
-    return OutputModel(space, kernel, groups, constant, _bounds(outputs), visited)
+    return OutputModel(space, kernel, groups, constant, visited)
 
 
 @cache
@@ -199,12 +197,6 @@ def _worth_modelling(outputs: Array) -> Rows:
         changes = np.nanmax(filled, axis=0) - np.nanmin(filled, axis=0)
         largest = np.nanmax(np.abs(filled), axis=0)
     return np.flatnonzero(often & (np.nan_to_num(changes) > 1e-9 * np.nan_to_num(largest)))
-
-
-def _bounds(outputs: Array) -> Array:
-    """The largest value of each output where at least two trials have it."""
-    highest = np.max(np.where(np.isnan(outputs), -np.inf, outputs), axis=0)
-    return np.where(np.sum(outputs == highest, axis=0) >= 2, highest, np.inf)
 
 
 def _groups(kernel: Kernel, visited: Array, outputs: Array) -> tuple[OutputGroup, ...]:

@@ -72,13 +72,6 @@ def test_the_order_of_trials_changes_no_bit():
         assert np.array_equal(one, other, equal_nan=True)
 
 
-def test_an_output_has_a_bound_where_several_trials_come_to_it():
-    model = fit_outputs(SPACE, trials(16))
-    assert model.bound[4] == 20.0
-    assert model.bound[3] == 60.0
-    assert np.isinf(model.bound[:3]).all()
-
-
 def test_without_an_outcome_it_says_so():
     with pytest.raises(RunError, match="no trial has an outcome"):
         fit_outputs(SPACE, [Trial((0.1, 0.1), 3.0)])

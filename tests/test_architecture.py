@@ -23,6 +23,9 @@ ROOMS = {
     "pybullet": {"driving/bullet"},
     "skopt": {"search"},
     "optuna": {"search"},
+    "torch": {"search"},
+    "botorch": {"search"},
+    "gpytorch": {"search"},
     "sqlite3": {"study"},
     "argparse": {"cli"},
 }

@@ -147,7 +147,7 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
     keys = [key for key in {**after, **before} if before.get(key) != after.get(key)]
     # Other agents or metrics make it another part of the target's table, and what the family is told makes it another.
     # Another engine may learn from another part of it, and from the pre-flight.
-    implied = {"target"} if {"agents", "metrics", "engine"} & set(keys) else set()
+    implied = {"target"} if {"agents", "metrics", "engine", "starts"} & set(keys) else set()
     implied |= {"preflight"} if "engine" in keys else set()
     told = any(key == "family" or key.startswith("domain.") for key in keys)
     named = [key for key in keys if key not in implied | {"identity"}]

@@ -171,7 +171,7 @@ def drawn(folder):
 
 
 @slow
-@pytest.mark.parametrize(("limit", "name"), [(35_000, "figures/convergence.png"), (120_000, "report.html")])
+@pytest.mark.parametrize(("limit", "name"), [(33_500, "figures/convergence.png"), (120_000, "report.html")])
 def test_figures_and_report_on_a_full_disk_are_told_and_the_old_ones_stay(finished, capsys, limit, name):
     """The study is finished, its database needs no more room than it has."""
     assert main(["study", str(finished), "--json"]) == 0

@@ -67,7 +67,7 @@ def leave_out(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int
     whole = [row for row, trial in enumerate(known) if not np.isnan(trial.outcome or ()).any()]
     normal = np.random.default_rng(seed).standard_normal((len(known), len(goal.values)))
     places = np.unique(np.linspace(0, max(0, len(whole) - 1), MOST).round().astype(int)).tolist()
-    rows = [whole[place] for place in places if whole]
+    rows = [whole[place] for place in places] if len(whole) >= FEWEST else []
     found = [_one(model, known, goal, row, normal[row]) for row in rows]
     told = [one for one in found if one is not None]
     return LeftOut(np.array([one[0] for one in told]), np.array([one[1] for one in told]).reshape(-1, len(WIDENINGS)))

@@ -57,6 +57,10 @@ def test_few_of_them_widen_nothing():
     assert few.widening == 1.0
 
 
+def test_a_single_trial_is_not_left_out():
+    assert left_out(trials(1)).widening == 1.0
+
+
 def test_trials_that_lack_outputs_are_not_left_out_but_are_learnt_from():
     told = trials(12)
     cut = [

@@ -85,3 +85,12 @@ def test_episodes_that_have_gone_missing_are_told(finished):
     study = open_study(finished)
     with Store.read(finished) as store, pytest.raises(RunError, match="lacks episodes of trial"):
         result_of(replace(study, identity="another"), store)
+
+
+def test_a_study_can_be_summed_up_from_its_first_trial_on(make_study):
+    for budget in ("1", "2"):
+        found = run(make_study(budget=budget, initial="1"))
+        assert len(found.trials) == int(budget)
+        assert found.knowledge.misfit.fits is None
+        assert 0.0 < found.knowledge.posterior.share <= 1.0
+        assert found.knowledge.as_good[0] >= 0.0

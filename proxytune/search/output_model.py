@@ -191,11 +191,10 @@ def _worth_modelling(outputs: Array) -> Rows:
     """The outputs that are known often enough, and change by more than rounding."""
     seen = ~np.isnan(outputs)
     often = seen.sum(axis=0) >= FEWEST
-    filled = np.where(seen, outputs, np.nan)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # outputs that no trial knows
-        changes = np.nanmax(filled, axis=0) - np.nanmin(filled, axis=0)
-        largest = np.nanmax(np.abs(filled), axis=0)
+        changes = np.nanmax(outputs, axis=0) - np.nanmin(outputs, axis=0)
+        largest = np.nanmax(np.abs(outputs), axis=0)
     return np.flatnonzero(often & (np.nan_to_num(changes) > 1e-9 * np.nan_to_num(largest)))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from proxytune.errors import RunError
 from proxytune.scores import Array
 from proxytune.search.goal import Goal
+from proxytune.search.knowledge import Knowledge, learn
 from proxytune.search.proposer import Compose, Trial, Values
 from proxytune.study.evaluate import known_outcomes
 from proxytune.study.history import episodes_of
@@ -34,6 +35,16 @@ def trial_of(study: Study, store: Store, done: TrialRecord) -> Trial:
 def trials_of(study: Study, store: Store, done: Iterable[TrialRecord]) -> list[Trial]:
     """Finished trials as the search sees them."""
     return [trial_of(study, store, trial) for trial in done]
+
+
+def knowledge_of(study: Study, store: Store, done: Iterable[TrialRecord]) -> Knowledge:
+    """What finished trials say of θ.
+
+    Raises:
+        RunError: If no trial has an outcome, or the store lacks episodes of one.
+    """
+    trials = trials_of(study, store, done)
+    return learn(study.settings.space, trials, goal_of(study, store), study.settings.seed)
 
 
 def outputs_of(study: Study, outcomes: Collection[Outcome]) -> Values | None:

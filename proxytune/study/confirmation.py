@@ -15,8 +15,7 @@ import numpy as np
 
 from proxytune.domain import Episode
 from proxytune.scores import ScoreTable
-from proxytune.search.knowledge import learn
-from proxytune.study.composition import goal_of, trials_of
+from proxytune.study.composition import knowledge_of
 from proxytune.study.evaluate import Spent, known_outcomes, plan, run_missing, score, table
 from proxytune.study.objective import FRESH
 from proxytune.study.progress import Watcher
@@ -108,7 +107,7 @@ def candidates(study: Study, store: Store, trials: Sequence[TrialRecord]) -> lis
     space = study.settings.space
     # Of a trial that was cut off it is certain that it is none of the best.
     scored = {space.values(trial.theta): trial for trial in trials if trial.prpv is not None}
-    known = learn(space, trials_of(study, store, trials), goal_of(study, store), study.settings.seed)
+    known = knowledge_of(study, store, trials)
     expected = {values: mean for values, mean in known.expected.items() if values in scored}
     best = min(expected, key=expected.__getitem__)
     noise = float(known.fresh_scores(best).std())
@@ -166,7 +165,6 @@ def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]
 def _answer(study: Study, store: Store, trials: Sequence[TrialRecord], known: Sequence[Candidate]) -> Candidate:
     """Each candidate has as many fresh episodes, so what fresh noise does to all of them alike favours none."""
     values = study.settings.space.values
-    trials_told = trials_of(study, store, trials)
-    expected = learn(study.settings.space, trials_told, goal_of(study, store), study.settings.seed).expected
+    expected = knowledge_of(study, store, trials).expected
     scores = [[expected[values(one.trial.theta)], *(s for s in one.scores if s is not None)] for one in known]
     return known[int(np.argmin([np.mean(each) for each in scores]))]

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from proxytune.errors import RunError
 from proxytune.search.importance import Importance, importances
-from proxytune.search.knowledge import Knowledge, learn
+from proxytune.search.knowledge import Knowledge
 from proxytune.search.surrogate import fit_surrogate
 from proxytune.space import Theta
-from proxytune.study.composition import goal_of, trials_of
+from proxytune.study.composition import knowledge_of
 from proxytune.study.confirmation import Confirmation, confirmation_of
 from proxytune.study.cutting import spared
 from proxytune.study.evaluate import Evaluation, evaluation, known_outcomes, told
@@ -137,7 +137,7 @@ def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | N
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
         raise RunError(f"{store.path}: {reason}")
     space = study.settings.space
-    learnt = learn(space, trials_of(study, store, trials), goal_of(study, store), study.settings.seed)
+    learnt = knowledge_of(study, store, trials)
     confirmation = confirmation_of(study, store, trials)
     answers = _answers(trials, learnt)
     answer = confirmation.answer.trial if confirmation else answers[-1]

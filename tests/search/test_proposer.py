@@ -1,18 +1,16 @@
 """Several points proposed together, while none of them is finished."""
 
-import importlib.util
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from steps import SPACE, WHOLE, search, steps
 
 from proxytune.search.design import design_point
-from proxytune.search.engines import ENGINES, AfterDesign, make_proposer
+from proxytune.search.engines import ENGINES, AfterDesign, make_proposer, why_not
 from proxytune.search.gaussian_process import GaussianProcess
 from proxytune.search.proposer import Trial, batch_at, propose_batch, with_failures_as_worst
 
-HERE = [name for name in ENGINES if name != "tpe" or importlib.util.find_spec("optuna")]
+HERE = [name for name in ENGINES if not why_not(name, composed=True)]
 
 
 @given(st.integers(0, 200), st.integers(1, 20), st.integers(1, 30))

@@ -10,7 +10,7 @@ Theta = Mapping[str, float]
 """A point of the domain family: parameter name to value, in the parameter's unit."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Parameter:
     """One tunable figure of an effect.
 

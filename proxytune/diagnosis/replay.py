@@ -8,17 +8,20 @@ import numpy as np
 from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
 from proxytune.driving.drivetrain import Drivetrain, drivetrain
 from proxytune.driving.planar import integrate
-from proxytune.effects import PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.effects import CATALOGUE, PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.effects.trace import Draws
 from proxytune.space import Theta
 
-RANDOM_EFFECTS = ("delay_jitter", "dropped_commands")
-"""Effects that draw; to first order they make commands late by their mean lateness."""
+RANDOM_EFFECTS: Mapping[str, Draws] = {
+    name: effect.trace.draws for name, effect in CATALOGUE.items() if effect.trace and effect.trace.draws
+}
+"""Effects that draw, each of one parameter; to first order they make commands late by their mean lateness."""
 
 
 def lateness(theta: Theta, rate_hz: float) -> float:
     """How late random effects make commands on average [s], at this many commands per second."""
-    lost = theta.get("dropped_commands", 0.0)
-    return theta.get("delay_jitter", 0.0) / 2.0 + lost / (1.0 - lost) / rate_hz
+    drawn = ((draws, theta.get(name, 0.0)) for name, draws in RANDOM_EFFECTS.items())
+    return sum((draws.lateness(value, rate_hz).mean_s for draws, value in drawn if value > 0.0), 0.0)
 
 
 def expected(theta: Theta, rate_hz: float) -> dict[str, float]:

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from proxytune.effects.effect import Setting, Signal, Stage
-from proxytune.effects.wheels import SLIGHT_IMBALANCE, per_wheel
+from proxytune.effects.trace import Cue, Form, Trace, WheelCurve
+from proxytune.effects.wheels import SLIGHT_IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
 
 
@@ -23,15 +24,16 @@ class DriverMap:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "offset",
-            "duty",
-            0.0,
-            0.4,
-            0.0,
-            (0.02, 0.04, 0.08, 0.15, 0.3),
-            "Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01",
+            name="offset",
+            unit="duty",
+            low=0.0,
+            high=0.4,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01",
         ),
     )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -52,15 +54,16 @@ class Trim:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "trim",
-            "",
-            -0.5,
-            0.5,
-            0.0,
-            (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
-            "31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3",
+            name="trim",
+            unit="",
+            low=-0.5,
+            high=0.5,
+            neutral=0.0,
+            probes=(-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
+            source="31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3",
         ),
     )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -79,8 +82,21 @@ class WheelGain:
     name: ClassVar[str] = "wheel_gain"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(side, "", 0.3, 1.7, 1.0, (0.7, 0.85, 0.95, 1.05, 1.15, 1.3), "31 calibrated Duckiebots: 1.01 ± 0.14")
+        Parameter(
+            name=side,
+            unit="",
+            low=0.3,
+            high=1.7,
+            neutral=1.0,
+            probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
+            source="31 calibrated Duckiebots: 1.01 ± 0.14",
+        )
         for side in ("left", "right")
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND,),
+        shown=WheelCurve.STEADY,
+        forms=(Form((("left", "right"),)), Form((("left",),), "left wheel"), Form((("right",),), "right wheel")),
     )
 
     def begin(self, setting: Setting) -> None:
@@ -115,15 +131,18 @@ class MotorLag:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "time_constant",
-            "s",
-            0.0,
-            1.0,
-            "motor_time_constant",
-            (0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-            "gym-duckietown's dynamics fit: 0.20 s",
+            name="time_constant",
+            unit="s",
+            low=0.0,
+            high=1.0,
+            neutral="motor_time_constant",
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+            source="gym-duckietown's dynamics fit: 0.20 s",
         ),
         SLIGHT_IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP, forms=wheel_forms("time_constant")
     )
 
     def begin(self, setting: Setting) -> Spin:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
 
 Signal = NDArray[Any]
@@ -61,12 +62,13 @@ class Setting:
 class Effect(Protocol):
     """A frozen bundle of parameter values with a pure filter.
 
-    Cutting a signal into chunks never changes the result.
+    Cutting a signal into chunks never changes the result. An effect that measured motion cannot show has no trace.
     """
 
     name: ClassVar[str]
     stage: ClassVar[Stage]
     parameters: ClassVar[tuple[Parameter, ...]]
+    trace: ClassVar[Trace | None]
 
     def begin(self, setting: Setting) -> Memory:
         """The memory before the first sample."""

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.effects.effect import Setting, Signal, Stage
-from proxytune.effects.wheels import IMBALANCE, per_wheel
+from proxytune.effects.trace import Cue, Trace, WheelCurve
+from proxytune.effects.wheels import IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
 
 
@@ -22,15 +23,18 @@ class DeadBand:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "width",
-            "duty",
-            0.0,
-            0.5,
-            0.0,
-            (0.02, 0.04, 0.08, 0.15, 0.3),
-            "friction of small gear motors: 0.05 to 0.2 of full duty",
+            name="width",
+            unit="duty",
+            low=0.0,
+            high=0.5,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="friction of small gear motors: 0.05 to 0.2 of full duty",
         ),
         IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("width")
     )
 
     def begin(self, setting: Setting) -> Signal:
@@ -63,15 +67,18 @@ class Stiction:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "breakaway",
-            "duty",
-            0.0,
-            0.6,
-            0.0,
-            (0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
-            "small gear motors start at 0.1 to 0.3 of full duty",
+            name="breakaway",
+            unit="duty",
+            low=0.0,
+            high=0.6,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
+            source="small gear motors start at 0.1 to 0.3 of full duty",
         ),
         IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL), shown=WheelCurve.STEADY, forms=wheel_forms("breakaway"), stepwise=True
     )
 
     def begin(self, setting: Setting) -> Grip:
@@ -118,15 +125,18 @@ class Backlash:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "gap",
-            "rad",
-            0.0,
-            1.5,
-            0.0,
-            (0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
-            "plastic gearboxes: some degrees, worn ones some tens",
+            name="gap",
+            unit="rad",
+            low=0.0,
+            high=1.5,
+            neutral=0.0,
+            probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
+            source="plastic gearboxes: some degrees, worn ones some tens",
         ),
         IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.REVERSAL, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL, forms=wheel_forms("gap")
     )
 
     def begin(self, setting: Setting) -> Play:

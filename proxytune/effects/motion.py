@@ -6,6 +6,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.effects.trace import TURN, Cue, Means, Panel, Trace
 from proxytune.space import Parameter
 
 
@@ -22,14 +23,17 @@ class YawScrub:
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "baseline",
-            "m",
-            0.03,
-            3.0,
-            "effective_baseline",
-            (0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
-            "wheel distance on hard tyres to a few times it with scrub: 0.16 m instead of 0.10 m on a Duckiebot",
+            name="baseline",
+            unit="m",
+            low=0.03,
+            high=3.0,
+            neutral="effective_baseline",
+            probes=(0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
+            source="wheel distance on hard tyres to a few times it with scrub: 0.16 m instead of 0.10 m on a Duckiebot",
         ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
     )
 
     def begin(self, setting: Setting) -> float:
@@ -50,14 +54,18 @@ class TurnSlip:
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "loss",
-            "s/rad",
-            0.0,
-            1.5,
-            0.0,
-            (0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-            "tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half",
+            name="loss",
+            unit="s/rad",
+            low=0.0,
+            high=1.5,
+            neutral=0.0,
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+            source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half",
         ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
+        shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),)),
     )
 
     def begin(self, setting: Setting) -> None:
@@ -78,14 +86,18 @@ class LateralSlip:
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "slip",
-            "s",
-            -0.5,
-            0.5,
-            0.0,
-            (-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
-            "slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks the same",
+            name="slip",
+            unit="s",
+            low=-0.5,
+            high=0.5,
+            neutral=0.0,
+            probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
+            source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks the same",
         ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE,),
+        shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),)),
     )
 
     def begin(self, setting: Setting) -> None:
@@ -119,15 +131,18 @@ class FloorSlope:
     stage: ClassVar[Stage] = Stage.MOTION
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
         Parameter(
-            axis,
-            "m/s",
-            -0.3,
-            0.3,
-            0.0,
-            (-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
-            "speed that a small robot loses on a floor some degrees from level",
+            name=axis,
+            unit="m/s",
+            low=-0.3,
+            high=0.3,
+            neutral=0.0,
+            probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
+            source="speed that a small robot loses on a floor some degrees from level",
         )
         for axis in ("x", "y")
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.HEADING,), shown=Means(Cue.HEADING, (Panel("heading", "heading [deg]", "forward"),))
     )
 
     def begin(self, setting: Setting) -> Bearing:

@@ -6,7 +6,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from proxytune.effects.effect import Setting, Signal, Stage
-from proxytune.effects.wheels import IMBALANCE, per_wheel
+from proxytune.effects.trace import Cue, Form, Means, Panel, Trace, WheelCurve
+from proxytune.effects.wheels import IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
 
 SMALLEST_LIMIT = 0.05
@@ -23,15 +24,18 @@ class Saturation:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "limit",
-            "duty",
-            0.1,
-            1.0,
-            1.0,
-            (0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
-            "drivers that cap the duty, batteries run down: 0.5 to 1",
+            name="limit",
+            unit="duty",
+            low=0.1,
+            high=1.0,
+            neutral=1.0,
+            probes=(0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
+            source="drivers that cap the duty, batteries run down: 0.5 to 1",
         ),
         IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("limit")
     )
 
     def begin(self, setting: Setting) -> Signal:
@@ -63,22 +67,34 @@ class BatterySag:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "load",
-            "",
-            0.0,
-            0.8,
-            0.0,
-            (0.03, 0.06, 0.12, 0.25, 0.5),
-            "inner resistance of small batteries: some hundredths at full load, old ones some tenths",
+            name="load",
+            unit="",
+            low=0.0,
+            high=0.8,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.12, 0.25, 0.5),
+            source="inner resistance of small batteries: some hundredths at full load, old ones some tenths",
         ),
         Parameter(
-            "fade",
-            "1/min",
-            0.0,
-            1.0,
-            0.0,
-            (0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
-            "a battery that lasts minutes to an hour at full duty",
+            name="fade",
+            unit="1/min",
+            low=0.0,
+            high=1.0,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+            source="a battery that lasts minutes to an hour at full duty",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.USE, Cue.TIME),
+        shown=WheelCurve.STEADY,
+        forms=(
+            Form((("load",),), "load"),
+            Form(
+                (("fade",),),
+                "fade",
+                shown=Means(Cue.USE, (Panel("", "use so far [s at full duty]", "forward", share=True),)),
+            ),
         ),
     )
 

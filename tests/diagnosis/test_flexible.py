@@ -14,27 +14,14 @@ sys.path.append(str(Path(__file__).parent))
 import hidden
 from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives
 
+from proxytune.diagnosis.candidates import MOTION_EFFECTS
 from proxytune.diagnosis.drives import gather
 from proxytune.diagnosis.flexible import curves
 from proxytune.diagnosis.search import LEAST_GAIN
 from proxytune.diagnosis.signals import hats, signal_groups, wheel_angles
-from proxytune.effects import CATALOGUE
+from proxytune.effects import CATALOGUE, Cue
 
 SHORT = {"episodes": 3, "seconds": 30.0}
-NAMES = {
-    "wheel command",
-    "difference of the wheel commands",
-    "command transients",
-    "distance since reversal",
-    "time in the episode",
-    "cumulated use",
-    "turn rate",
-    "heading",
-    "position",
-    "left wheel angle",
-    "right wheel angle",
-    "direction of travel",
-}
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
@@ -66,11 +53,12 @@ def clean():
 
 def test_every_signal_has_motion_on_every_tick_and_effects_of_the_catalogue(clean):
     groups = signal_groups(clean)
-    assert {group.name for group in groups} == NAMES
+    assert {group.name for group in groups} == set(Cue)
+    assert {name for group in groups for name in group.effects} == set(MOTION_EFFECTS)
     for group in groups:
         assert group.twists.shape[:3] == (*clean.drives.duties.shape[:2], 3)
         assert np.isfinite(group.twists).all()
-        assert set(group.effects) <= set(CATALOGUE)
+        assert all(group.name in CATALOGUE[name].trace.cues for name in group.effects)
         assert group.signal.shape == clean.drives.duties.shape[:2]
 
 

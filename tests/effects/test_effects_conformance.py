@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from proxytune.driving.robot import read_robot
 from proxytune.effects import CATALOGUE, CHANNELS, PARAMETERS, Setting, Stage, effects_from, theta_names
+from proxytune.space import Parameter
 
 ROBOT = read_robot("duckiebot")
 RATE_HZ = 60.0
@@ -151,7 +152,7 @@ def test_only_effects_that_draw_depend_on_the_seed(name):
     effect = at(name, theta_names(CATALOGUE[name])[0], CATALOGUE[name].parameters[0].probes[-1])
     signal = a_signal(effect.stage, 4)
     differ = not np.array_equal(run(effect, signal, seed=7), run(effect, signal, seed=8))
-    assert differ == (name in ("delay_jitter", "dropped_commands"))
+    assert differ == bool(CATALOGUE[name].trace.draws)
 
 
 @pytest.mark.parametrize("name", FLAT)
@@ -187,3 +188,38 @@ def test_every_parameter_has_bounds_around_its_neutral_value_and_a_source(name):
         assert parameter.source
         assert len(parameter.probes) >= 4
         assert all(parameter.low <= probe <= parameter.high for probe in parameter.probes)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_an_effect_leaves_a_trace_in_motion_unless_it_bends_pictures_alone(name):
+    assert (CATALOGUE[name].trace is None) == (name not in FLAT)
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_the_forms_of_an_effect_name_its_own_parameters_and_no_form_twice(name):
+    known = {parameter.name for parameter in CATALOGUE[name].parameters}
+    forms = CATALOGUE[name].trace.forms
+    assert len({form.name for form in forms}) == len(forms)
+    for form in forms:
+        free = {parameter for coordinate in form.free for parameter in coordinate}
+        assert free <= known
+        assert set(form.fixed) <= known - free
+        assert set(form.moved) <= free
+    assert CATALOGUE[name].trace.cues
+
+
+@pytest.mark.parametrize("name", [name for name in FLAT if CATALOGUE[name].trace.draws])
+def test_an_effect_that_draws_tells_how_late_commands_are_about_their_mean(name):
+    (parameter,) = CATALOGUE[name].parameters
+    draws = CATALOGUE[name].trace.draws
+    assert parameter.low < draws.sizes[0] < draws.sizes[1] <= parameter.high
+    late = draws.lateness(draws.sizes[0] * 5.0, 20.0)
+    weights = np.exp(late.log_weights)
+    assert late.mean_s > 0.0
+    assert weights.sum() == pytest.approx(1.0, abs=1e-3)
+    assert weights @ late.commands == pytest.approx(0.0, abs=1e-3)
+
+
+def test_parameters_are_given_by_keyword():
+    with pytest.raises(TypeError, match="positional"):
+        Parameter("trim", "", -0.5, 0.5, 0.0)

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.signal import lfilter
 
-from proxytune.diagnosis.drives import Drives, Floats, relative
+from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit
 from proxytune.diagnosis.replay import arrived_commands, wheel_speeds
 from proxytune.effects import CATALOGUE, Cue
@@ -193,7 +193,7 @@ def _heading(motion: _Motion) -> SignalGroup:
 
 
 def _position(motion: _Motion) -> SignalGroup:
-    places = _places(motion.drives)
+    places = motion.drives.places
     columns = np.concatenate([_patches(places[..., axis]) for axis in range(2)], axis=-1)
     forward, yaw = columns * motion.forward[..., None], columns * motion.yaw[..., None]
     twists = _twists(forward, yaw=np.concatenate((yaw, columns * np.abs(motion.forward)[..., None]), axis=-1))
@@ -208,7 +208,7 @@ def _patches(signal: Floats) -> Floats:
 
 
 def _wheel_angle(motion: _Motion, side: int, name: Cue) -> SignalGroup:
-    angle = wheel_angles(motion.drives)[..., side]
+    angle = motion.drives.angles[..., side]
     speed = (motion.left, motion.right)[side]
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1) * speed[..., None]
     own: Mapping[int, Floats] = {side: waves}
@@ -221,30 +221,3 @@ def _direction(motion: _Motion) -> SignalGroup:
         back * motion.forward[..., None], yaw=np.concatenate((back * motion.yaw[..., None], back), axis=-1)
     )
     return SignalGroup(Cue.DIRECTION, np.sign(motion.forward), "", twists)
-
-
-def _places(drives: Drives) -> Floats:
-    """Measured position at each tick (E, T, 2), interpolated."""
-    return _interpolated(drives, drives.poses[:, 0, :2])
-
-
-def wheel_angles(drives: Drives) -> Floats:
-    """How far each wheel has turned by the measured motion (E, T, 2) [rad], left and right."""
-    figures = drives.robot.figures
-    moved = relative(drives.poses[:, 0], drives.poses[:, 1])
-    turn = moved[:, 2] * figures["effective_baseline"] / 2.0
-    wheels = np.stack((moved[:, 0] - turn, moved[:, 0] + turn), axis=1) / figures["wheel_radius"]
-    total = np.cumsum(wheels, axis=0) - wheels
-    return _interpolated(drives, total)
-
-
-def _interpolated(drives: Drives, values: Floats) -> Floats:
-    """Values at the beginnings of the increments (N, channels) at every tick (E, T, channels)."""
-    length = drives.duties.shape[1]
-    out = np.zeros((len(drives.duties), length, values.shape[1]))
-    for episode in range(len(out)):
-        own = drives.episode == episode
-        if own.any():
-            for channel in range(values.shape[1]):
-                out[episode, :, channel] = np.interp(np.arange(length), drives.first[own], values[own, channel])
-    return out

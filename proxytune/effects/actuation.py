@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.effects.lag import Lag, follow, lag_of
 from proxytune.effects.trace import Cue, Form, Trace, WheelCurve
 from proxytune.effects.wheels import SLIGHT_IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
@@ -107,13 +107,6 @@ class WheelGain:
         return signal * np.array((self.left, self.right)), None
 
 
-class Lag(NamedTuple):
-    """How much of a step is left after one sample, and on average over it."""
-
-    remainder: float
-    mean_remainder: float
-
-
 class Spin(NamedTuple):
     """Wheel speed at the end of the last sample, and the lag of the wheels: one for both, or one for each."""
 
@@ -150,32 +143,16 @@ class MotorLag:
         samples = per_wheel(self.time_constant * setting.rate_hz, self.imbalance)
         # One filter over both wheels is faster than one for each
         apart = samples if self.imbalance else samples[:1]
-        return Spin(np.asarray(setting.rest, dtype=float), tuple(_lag(value) for value in apart.tolist()))
+        return Spin(np.asarray(setting.rest, dtype=float), tuple(lag_of(value) for value in apart.tolist()))
 
     def apply(self, signal: Signal, memory: Spin) -> tuple[Signal, Spin]:
         """The mean speed over each sample, exact for a command that holds over it."""
         if len(memory.lags) == 1:
-            mean, speed = _follow(signal, memory.speed, memory.lags[0])
+            mean, speed = follow(signal, memory.speed, memory.lags[0])
             return mean, memory._replace(speed=speed)
         sides = [
-            _follow(signal[..., side : side + 1], memory.speed[..., side : side + 1], lag)
+            follow(signal[..., side : side + 1], memory.speed[..., side : side + 1], lag)
             for side, lag in enumerate(memory.lags)
         ]
         mean, speed = (np.concatenate(parts, axis=-1) for parts in zip(*sides, strict=True))
         return mean, memory._replace(speed=speed)
-
-
-def _lag(samples: float) -> Lag:
-    if samples == 0.0:
-        return Lag(0.0, 0.0)
-    remainder = float(np.exp(-1.0 / samples))
-    return Lag(remainder, samples * (1.0 - remainder))
-
-
-def _follow(signal: Signal, speed: Signal, lag: Lag) -> tuple[Signal, Signal]:
-    """Mean speed over each sample, and the speed after the last one."""
-    kept = lag.remainder
-    start = speed[..., None, :]
-    ends, _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-2, zi=kept * start)
-    starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)
-    return signal + lag.mean_remainder * (starts - signal), ends[..., -1, :]

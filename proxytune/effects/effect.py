@@ -50,6 +50,8 @@ class Setting:
         seed: Seed of everything random in the filter.
         headings: Headings known beforehand, sample by sample (…, n) [rad]: the starting heading alone (n = 1), or the
             measured ones.
+        places: Places known beforehand in the same way (…, n, 2) [m].
+        angles: Angles that the wheels have turned by, known beforehand in the same way (…, n, 2) [rad].
     """
 
     rate_hz: float
@@ -57,6 +59,8 @@ class Setting:
     nominal: Mapping[str, float]
     seed: int = 0
     headings: Signal = field(default_factory=lambda: np.zeros(1))
+    places: Signal = field(default_factory=lambda: np.zeros((1, 2)))
+    angles: Signal = field(default_factory=lambda: np.zeros((1, 2)))
 
 
 class Effect(Protocol):

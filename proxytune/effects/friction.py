@@ -47,22 +47,24 @@ class DeadBand:
 
 
 class Grip(NamedTuple):
-    """The duty at which each wheel breaks away (2,), the newest sample, and whether the wheels move."""
+    """The duties at which each wheel breaks away and stops (2,), the newest sample, and whether the wheels move."""
 
     breakaway: Signal
+    stop: Signal
     sample: Signal
     moving: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Stiction:
-    """A resting wheel needs a duty of `breakaway` to start; a moving one goes on down to half of it.
+    """A resting wheel needs a duty of `breakaway` to start; a moving one goes on down to `release` times that.
 
     A wheel whose duty changes sign comes to rest on the way.
     """
 
     breakaway: float
     imbalance: float
+    release: float
     name: ClassVar[str] = "stiction"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
@@ -76,25 +78,39 @@ class Stiction:
             source="small gear motors start at 0.1 to 0.3 of full duty",
         ),
         IMBALANCE,
+        Parameter(
+            name="release",
+            unit="",
+            low=0.0,
+            high=1.0,
+            neutral=0.5,
+            probes=(0.2, 0.35, 0.65, 0.8, 0.9, 1.0),
+            source="rolling friction by sticking friction: about half, nearly all where a driver cuts small duties",
+            shape=True,
+        ),
     )
     trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL), shown=WheelCurve.STEADY, forms=wheel_forms("breakaway"), stepwise=True
+        cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL),
+        shown=WheelCurve.STEADY,
+        forms=wheel_forms("breakaway", "release"),
+        stepwise=True,
     )
 
     def begin(self, setting: Setting) -> Grip:
         """A wheel moves from the start if its resting duty keeps a moving wheel going."""
         breakaway = per_wheel(self.breakaway, self.imbalance)
         rest = np.asarray(setting.rest, dtype=float)[..., None, :]
-        return Grip(breakaway, rest, np.abs(rest) >= breakaway / 2.0)
+        stop = self.release * breakaway
+        return Grip(breakaway, stop, rest, np.abs(rest) >= stop)
 
     def apply(self, signal: Signal, memory: Grip) -> tuple[Signal, Grip]:
         """A Schmitt trigger on each wheel's duty."""
         size = np.abs(signal)
         before = np.concatenate((memory.sample, signal[..., :-1, :]), axis=-2)
         starts = size >= memory.breakaway
-        stops = ~starts & ((size < memory.breakaway / 2.0) | (signal * before < 0.0))
+        stops = ~starts & ((size < memory.stop) | (signal * before < 0.0))
         moving = _latest(starts, stops, memory.moving)
-        return np.where(moving, signal, 0.0), Grip(memory.breakaway, signal[..., -1:, :], moving[..., -1:, :])
+        return np.where(moving, signal, 0.0), memory._replace(sample=signal[..., -1:, :], moving=moving[..., -1:, :])
 
 
 def _latest(on: NDArray[np.bool_], off: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:

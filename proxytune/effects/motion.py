@@ -1,7 +1,7 @@
 """Effects between the motion that the wheels ask of the body and the motion that the body makes."""
 
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
@@ -107,70 +107,3 @@ class LateralSlip:
         """Slide to the right in a bend to the left."""
         outwards = self.slip * signal[..., 0] * signal[..., 2]
         return _moved(signal[..., 0], signal[..., 1] - outwards, signal[..., 2]), None
-
-
-class Bearing(NamedTuple):
-    """Headings known beforehand (…, n), number of the next sample, its heading (…, 1), and samples per second."""
-
-    known: Signal
-    next: int
-    heading: Signal
-    rate_hz: float
-
-
-@dataclass(frozen=True)
-class FloorSlope:
-    """The floor rises along x and y: uphill the robot is slower, downhill faster, and at rest it stays.
-
-    The forward speed shrinks by (x · cos heading + y · sin heading) · min(1, |forward speed| / REST_SPEED).
-    """
-
-    x: float
-    y: float
-    name: ClassVar[str] = "floor_slope"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(
-            name=axis,
-            unit="m/s",
-            low=-0.3,
-            high=0.3,
-            neutral=0.0,
-            probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
-            source="speed that a small robot loses on a floor some degrees from level",
-        )
-        for axis in ("x", "y")
-    )
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.HEADING,), shown=Means(Cue.HEADING, (Panel("heading", "heading [deg]", "forward"),))
-    )
-
-    def begin(self, setting: Setting) -> Bearing:
-        """With the headings that are known beforehand."""
-        known = np.asarray(setting.headings, dtype=float)
-        shape = np.broadcast_shapes(known.shape[:-1], np.shape(setting.rest)[:-1])
-        known = np.broadcast_to(known, (*shape, known.shape[-1]))
-        return Bearing(known, 0, known[..., :1], setting.rate_hz)
-
-    def apply(self, signal: Signal, memory: Bearing) -> tuple[Signal, Bearing]:
-        """Slow the robot down by the slope along its heading at the start of each sample."""
-        forward = signal[..., 0]
-        headings, after = _headings(signal[..., 2], memory)
-        slope = self.x * np.cos(headings) + self.y * np.sin(headings)
-        slowed = forward - slope * np.minimum(1.0, np.abs(forward) / REST_SPEED)
-        return _moved(slowed, signal[..., 1], signal[..., 2]), after
-
-
-REST_SPEED = 0.02
-"""Below this forward speed [m/s] static friction takes up more and more of the slope."""
-
-
-def _headings(yaw: Signal, memory: Bearing) -> tuple[Signal, Bearing]:
-    """Headings at the start of each sample: known ones, and beyond them those that the yaw rate leads to."""
-    length = yaw.shape[-1]
-    known = memory.known[..., memory.next : memory.next + length]
-    given = known.shape[-1]
-    newest = known[..., -1:] if given else memory.heading
-    turned = np.cumsum(yaw[..., max(0, given - 1) :], axis=-1) / memory.rate_hz
-    path = np.concatenate((known[..., :-1], newest, newest + turned), axis=-1)
-    return path[..., :length], memory._replace(next=memory.next + length, heading=path[..., length:])

@@ -118,6 +118,7 @@ class Trace:
         forms: The forms that it can take; where there are none, a single one with every parameter free.
         stepwise: Whether its parameters change the motion by steps, so that no slope leads to their best values.
         draws: What it draws, if it strikes at random.
+        placed: Whether it acts in a part of the map: its parameters after the first are x, y [m] and a radius [m].
     """
 
     cues: tuple[Cue, ...]
@@ -125,6 +126,7 @@ class Trace:
     forms: tuple[Form, ...] = ()
     stepwise: bool = False
     draws: Draws | None = None
+    placed: bool = False
 
     def shown_in(self, form: str) -> WheelCurve | Means:
         """What shows the form of this name."""

@@ -16,6 +16,7 @@ IMBALANCE = Parameter(
     neutral=0.0,
     probes=(-1.0, -0.5, 0.5, 1.0),
     source="by definition: −1 is the left wheel alone, 1 the right one",
+    shape=True,
 )
 """How much more of an effect the right wheel has than the left one."""
 

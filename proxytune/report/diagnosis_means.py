@@ -108,6 +108,8 @@ def _signal(drives: Drives, rates: Rates, curve: Curve | None, panel: Panel) -> 
         "y": drives.poses[:, 0, 1],
         "heading": np.degrees(np.mod(drives.poses[:, 0, 2], 2.0 * np.pi)),
         "turn": np.degrees(said["turn"]),
+        "left angle": np.mod(drives.angles[drives.episode, drives.first, 0], 2.0 * np.pi),
+        "right angle": np.mod(drives.angles[drives.episode, drives.first, 1], 2.0 * np.pi),
         "bend": said["forward"] * said["turn"],
     }
     if panel.signal:

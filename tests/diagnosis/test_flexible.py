@@ -18,7 +18,7 @@ from proxytune.diagnosis.candidates import MOTION_EFFECTS
 from proxytune.diagnosis.drives import gather
 from proxytune.diagnosis.flexible import curves
 from proxytune.diagnosis.search import LEAST_GAIN
-from proxytune.diagnosis.signals import hats, signal_groups, wheel_angles
+from proxytune.diagnosis.signals import hats, signal_groups
 from proxytune.effects import CATALOGUE, Cue
 
 SHORT = {"episodes": 3, "seconds": 30.0}
@@ -91,7 +91,7 @@ def test_curves_come_best_first(clean):
 def test_a_wheel_has_turned_as_far_as_it_rolled():
     log = hidden.make_log(hidden.Case("plain", (), "normal", 5, 0.0, 0.0), episodes=2, seconds=10.0, noiseless=True)
     drives = gather(log, ROBOT, log.episodes)
-    angles = wheel_angles(drives)
+    angles = drives.angles
     way = np.stack([np.hypot(*np.diff(e.poses[:, :2], axis=0).T).sum() for e in log.episodes])
     rolled = np.abs(np.diff(angles, axis=1)).sum(axis=1).mean(axis=-1) * 0.0318
     assert (rolled > 0.9 * way).all()

@@ -22,14 +22,14 @@ PROBE_VALUES = [
 PROBES = [pytest.param(*probe, id=f"{probe[1]}={probe[2]}") for probe in PROBE_VALUES]
 
 
-IMBALANCED = [name for name, effect in CATALOGUE.items() if effect.parameters[-1].name == "imbalance"]
+IMBALANCED = [name for name, effect in CATALOGUE.items() if f"{name}.imbalance" in PARAMETERS]
 FLAT = [name for name, effect in CATALOGUE.items() if effect.stage not in (Stage.CAMERA, Stage.IMAGE)]
 
 
 def at(name, theta_name, value):
-    """An effect with one value of its own; an imbalance is one of an effect that is there."""
+    """An effect with one value of its own; what only shapes an effect is of one that is there."""
     main = CATALOGUE[name].parameters[0]
-    there = {theta_names(CATALOGUE[name])[0]: main.probes[2]} if theta_name.endswith(".imbalance") else {}
+    there = {theta_names(CATALOGUE[name])[0]: main.probes[2]} if PARAMETERS[theta_name].shape else {}
     (effect,) = effects_from({**there, theta_name: value}, ROBOT.figures)
     return effect
 
@@ -44,9 +44,25 @@ def a_signal(stage: Stage, seed: int, length: int = 90) -> np.ndarray:
     return np.repeat(random.uniform(-1.0, 1.0, (length // 3, len(CHANNELS[stage]))), 3, axis=0)
 
 
+def everywhere():
+    """Places along both axes that reach beyond every patch, nearest first, one after another and to and fro."""
+    way = np.repeat(np.linspace(0.0, 21.0, 225), 2) * np.tile((1.0, -1.0), 225)
+    along = np.stack((way, np.zeros_like(way)), axis=-1)
+    return np.stack((along, along[:, ::-1]), axis=1).reshape(-1, 2)
+
+
+EVERYWHERE = everywhere()
+
+
+def setting_for(effect, rest, seed=7):
+    """An effect of a place is shown one everywhere."""
+    known = {"places": EVERYWHERE, "headings": np.zeros(len(EVERYWHERE))}
+    return Setting(RATE_HZ, rest, ROBOT.figures, seed=seed, **(known if effect.trace and effect.trace.placed else {}))
+
+
 def run(effect, signal, cuts=(), seed=7):
     rest = signal[0] if effect.stage in (Stage.IMAGE, Stage.CAMERA) else np.zeros(signal.shape[-1])
-    memory = effect.begin(Setting(RATE_HZ, rest, ROBOT.figures, seed=seed))
+    memory = effect.begin(setting_for(effect, rest, seed))
     out = []
     for chunk in np.split(signal, sorted(cuts)):
         if len(chunk):
@@ -173,7 +189,7 @@ def test_memories_are_never_changed_in_place(name):
 def test_a_batch_is_filtered_like_its_members(name, theta_name, value):
     effect = at(name, theta_name, value)
     batch = np.stack([a_signal(effect.stage, seed) for seed in range(6)]).reshape(2, 3, 90, -1)
-    memory = effect.begin(Setting(RATE_HZ, np.zeros((2, 3, batch.shape[-1])), ROBOT.figures, seed=7))
+    memory = effect.begin(setting_for(effect, np.zeros((2, 3, batch.shape[-1]))))
     first, memory = effect.apply(batch[..., :50, :], memory)
     second, _ = effect.apply(batch[..., 50:, :], memory)
     together = np.concatenate((first, second), axis=-2)

@@ -87,7 +87,8 @@ def test_every_key_of_teaching_is_documented(key):
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_effect_and_its_parameters_are_documented(name):
-    row = next(line for line in STUDIES.splitlines() if line.startswith(f"| `{name}`"))
+    row = next((line for line in STUDIES.splitlines() if line.startswith(f"| `{name}`")), "")
+    assert row, f"studies/README.md has no row for the effect '{name}'"
     assert CATALOGUE[name].stage.value in row
     assert all(f"`{parameter.name}`" in row for parameter in CATALOGUE[name].parameters)
 

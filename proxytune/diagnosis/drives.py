@@ -71,6 +71,29 @@ class Drives:
         """Each increment in the body frame of its first pose (N, 3): forward, left [m], turn [rad]."""
         return relative(self.poses[:, 0], self.poses[:, 1])
 
+    @cached_property
+    def places(self) -> Floats:
+        """Measured place at the start of each tick (E, T, 2) [m], interpolated."""
+        return self._interpolated(self.poses[:, 0, :2])
+
+    @cached_property
+    def angles(self) -> Floats:
+        """How far each wheel has turned in its episode by the measured motion (E, T, 2) [rad], interpolated."""
+        figures = self.robot.figures
+        turn = self.measured[:, 2] * figures["effective_baseline"] / 2.0
+        wheels = np.stack((self.measured[:, 0] - turn, self.measured[:, 0] + turn), axis=1) / figures["wheel_radius"]
+        before = np.cumsum(wheels, axis=0) - wheels
+        return self._interpolated(before - before[np.searchsorted(self.episode, self.episode)])
+
+    def _interpolated(self, values: Floats) -> Floats:
+        """Values at the beginnings of the increments (N, channels) at every tick (E, T, channels)."""
+        out = np.zeros((*self.duties.shape[:2], values.shape[1]))
+        for episode in np.unique(self.episode):
+            own = self.episode == episode
+            for channel, column in enumerate(values[own].T):
+                out[episode, :, channel] = np.interp(np.arange(out.shape[1]), self.first[own], column)
+        return out
+
     @property
     def seconds(self) -> float:
         """How long the increments last together [s]."""

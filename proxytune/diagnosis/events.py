@@ -3,7 +3,6 @@
 A mean model cannot see them: a command that is lost now and then changes the motion after it, not on average.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,13 +11,11 @@ from scipy.optimize import minimize_scalar
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole, sum_by
 from proxytune.diagnosis.fitting import Fit
-from proxytune.diagnosis.replay import between, paths
+from proxytune.diagnosis.replay import RANDOM_EFFECTS, between, paths
+from proxytune.effects.trace import Draws
 
 MEMORY_S = 2.5
 """A command moves nothing any more after so long."""
-
-MOST_LOST = 4
-"""Commands lost in a row that are reckoned with."""
 
 SHIFTS = 99
 """How often the null distribution is drawn."""
@@ -59,28 +56,12 @@ class RandomEffect(NamedTuple):
 
 
 def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
-    """Lost and jittering commands, weighed on what the model leaves over."""
+    """Every effect that draws, weighed on what the model leaves over."""
     answered = responses(fitted, seed)
     if len(answered.size) == 0:
         return ()
-    lateness = 1.0 / fitted.drives.rate_hz
-    return (
-        _weighed("dropped_commands", _lost, (1e-3, 0.6), answered),
-        _weighed("delay_jitter", lambda spread, p, s: _jitter(spread / lateness, p, s), (2e-3, 0.3), answered),
-    )
-
-
-def _lost(probability: float, pull: Floats, size: Floats) -> Floats:
-    """Log-likelihood ratio of each command: none, one or more lost in a row; their mean is fitted already."""
-    number = np.arange(MOST_LOST + 1)
-    weight = np.log1p(-probability) + number * np.log(probability)
-    return _mixture(number - probability / (1.0 - probability), weight, pull, size)
-
-
-def _jitter(spread: float, pull: Floats, size: Floats) -> Floats:
-    """Log-likelihood ratio of each command: late by a time from 0 to the spread, in commands."""
-    late = spread * (np.linspace(0.0, 1.0, 9) - 0.5)
-    return _mixture(late, np.full(len(late), -np.log(len(late))), pull, size)
+    rate = fitted.drives.rate_hz
+    return tuple(_weighed(name, draws, rate, answered) for name, draws in RANDOM_EFFECTS.items())
 
 
 def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats:
@@ -89,21 +70,21 @@ def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats
     return np.asarray(np.logaddexp.reduce(ratios, axis=0))
 
 
-Ratio = Callable[[float, Floats, Floats], Floats]
-"""Log-likelihood ratio of each command, given the size of an effect, the command's pull and its size."""
+def _weighed(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
+    def ratio(value: float, pull: Floats) -> Floats:
+        late = draws.lateness(value, rate_hz)
+        return _mixture(late.commands, late.log_weights, pull, answered.size)
 
-
-def _weighed(effect: str, ratio: Ratio, bounds: tuple[float, float], answered: Responses) -> RandomEffect:
-    low, high = np.log(bounds)
+    low, high = np.log(draws.sizes)
     grid = np.exp(np.linspace(low, high, 25))
 
     def total(value: float) -> float:
-        return float(ratio(value, answered.pull, answered.size).sum())
+        return float(ratio(value, answered.pull).sum())
 
     here = int(np.argmax([total(value) for value in grid]))
     around = (float(np.log(grid[max(0, here - 1)])), float(np.log(grid[min(len(grid) - 1, here + 1)])))
     best = float(np.exp(minimize_scalar(lambda log: -total(np.exp(log)), bounds=around, method="bounded").x))
-    chance = np.max([ratio(value, answered.shifted, answered.size).sum(axis=1) for value in grid], axis=0)
+    chance = np.max([ratio(value, answered.shifted).sum(axis=1) for value in grid], axis=0)
     gain = total(best)
     likely = [value for value in grid if total(value) > gain - 1.92] + [best]
     p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))

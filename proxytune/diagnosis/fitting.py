@@ -18,7 +18,7 @@ from proxytune.diagnosis.innovations import (
     whitener,
 )
 from proxytune.diagnosis.replay import increments
-from proxytune.effects import PARAMETERS, effect_of
+from proxytune.effects import CATALOGUE, PARAMETERS, effect_of
 from proxytune.space import Theta
 
 ROUNDS = 3
@@ -29,9 +29,6 @@ STEP = 1e-3
 
 KEPT_SOLVABLE = 1e-6
 """Added to the curvature of the loss, so that a coordinate without a slope does no harm."""
-
-ROUGH_EFFECTS = ("stiction", "command_quantisation")
-"""Effects whose parameters change the motion by steps: no slope leads to their best value, so it is scanned for."""
 
 SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(0.99, 1.01, 11))
 """Where a scan looks in each round, as multiples of the value it starts from."""
@@ -75,8 +72,8 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
     """
     for number in range(ROUNDS):
         whiten = whitener(drives, noise)
-        theta = _scanned(drives, theta, tuple(filter(_is_rough, free)), whiten, SCANS[min(number, len(SCANS) - 1)])
-        smooth = tuple(coordinate for coordinate in free if not _is_rough(coordinate))
+        theta = _scanned(drives, theta, tuple(filter(is_stepwise, free)), whiten, SCANS[min(number, len(SCANS) - 1)])
+        smooth = tuple(coordinate for coordinate in free if not is_stepwise(coordinate))
         theta = _fit_theta(drives, theta, smooth, whiten)
         noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
     return seen(drives, theta, free, noise)
@@ -124,8 +121,10 @@ def _scanned(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten
     return theta
 
 
-def _is_rough(coordinate: Coordinate) -> bool:
-    return effect_of(coordinate[0]) in ROUGH_EFFECTS
+def is_stepwise(coordinate: Coordinate) -> bool:
+    """Whether it changes the motion by steps: no slope leads to its best value, so that is scanned for."""
+    trace = CATALOGUE[effect_of(coordinate[0])].trace
+    return trace is not None and trace.stepwise
 
 
 def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:

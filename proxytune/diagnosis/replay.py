@@ -8,17 +8,20 @@ import numpy as np
 from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
 from proxytune.driving.drivetrain import Drivetrain, drivetrain
 from proxytune.driving.planar import integrate
-from proxytune.effects import PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.effects import CATALOGUE, PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.effects.trace import Draws
 from proxytune.space import Theta
 
-RANDOM_EFFECTS = ("delay_jitter", "dropped_commands")
-"""Effects that draw; to first order they make commands late by their mean lateness."""
+RANDOM_EFFECTS: Mapping[str, Draws] = {
+    name: effect.trace.draws for name, effect in CATALOGUE.items() if effect.trace and effect.trace.draws
+}
+"""Effects that draw, each of one parameter; to first order they make commands late by their mean lateness."""
 
 
 def lateness(theta: Theta, rate_hz: float) -> float:
     """How late random effects make commands on average [s], at this many commands per second."""
-    lost = theta.get("dropped_commands", 0.0)
-    return theta.get("delay_jitter", 0.0) / 2.0 + lost / (1.0 - lost) / rate_hz
+    drawn = ((draws, theta.get(name, 0.0)) for name, draws in RANDOM_EFFECTS.items())
+    return sum((draws.lateness(value, rate_hz).mean_s for draws, value in drawn if value > 0.0), 0.0)
 
 
 def expected(theta: Theta, rate_hz: float) -> dict[str, float]:
@@ -97,9 +100,23 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
     else:
         turning = replace(setting, rest=drives.wheels[episode, start])
         wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.begin(turning).actuation)[0]
-    ahead = replace(setting, rest=np.zeros((len(begin), 2)), headings=drives.poses[begin, 0, 2:])
-    twists, _ = train.motion.apply(train.ideal(wheels), train.begin(ahead).motion)
+    ahead = replace(
+        setting,
+        rest=_before(drives, theta, train)[episode, start],
+        headings=drives.poses[begin, 0, 2:],
+        places=drives.poses[begin, :1, :2],
+        angles=drives.angles[episode, start][:, None],
+    )
+    twists, _ = train.motion.apply(train.ideal(wheels), train.motion.begin(ahead))
     return _seen(drives, twists, measurement)
+
+
+def _before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:
+    """The motion in the tick before each (E, T, 3), as effects that remember it need it; none before the first."""
+    still = np.zeros((*drives.duties.shape[:2], 3))
+    if train.motion.effects:
+        still[:, 1:] = twists_of(drives, theta)[:, :-1]
+    return still
 
 
 def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
@@ -134,7 +151,8 @@ def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
 
 def _setting(drives: Drives) -> Setting:
     nominal: Mapping[str, float] = {**drives.robot.figures, "control_rate": drives.rate_hz}
-    return Setting(drives.tick_hz, drives.rest, nominal, headings=drives.headings)
+    setting = Setting(drives.tick_hz, drives.rest, nominal)
+    return replace(setting, headings=drives.headings, places=drives.places, angles=drives.angles)
 
 
 def _seen(drives: Drives, twists: Floats, measurement: Chain) -> Floats:

@@ -7,12 +7,16 @@ from proxytune.effects.actuation import DriverMap, MotorLag, Trim, WheelGain
 from proxytune.effects.camera import CameraHeight, CameraPitch, CameraRoll, CameraYaw, FieldOfView, LensDistortion
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.effect import Effect
+from proxytune.effects.floor import FloorSlope, SlipperyPatch
 from proxytune.effects.friction import Backlash, DeadBand, Stiction
 from proxytune.effects.image import Blur
+from proxytune.effects.load import SlewRate, ThermalFade
 from proxytune.effects.measurement import HeadingOffset, MarkerOffset
 from proxytune.effects.messages import DelayJitter, DroppedCommands
-from proxytune.effects.motion import FloorSlope, LateralSlip, TurnSlip, YawScrub
+from proxytune.effects.motion import LateralSlip, TurnSlip, YawScrub
 from proxytune.effects.power import BatterySag, Saturation
+from proxytune.effects.ripple import WheelRipple
+from proxytune.effects.turning import CrossCoupling, Understeer, YawLag
 from proxytune.errors import SettingsError
 from proxytune.settings import nearest
 from proxytune.space import Parameter, Theta
@@ -22,6 +26,7 @@ _ALL: tuple[type[Effect], ...] = (
     DroppedCommands,
     CommandQuantisation,
     Delay,
+    SlewRate,
     DriverMap,
     DeadBand,
     Stiction,
@@ -29,12 +34,18 @@ _ALL: tuple[type[Effect], ...] = (
     Trim,
     WheelGain,
     BatterySag,
+    ThermalFade,
     MotorLag,
     Backlash,
+    WheelRipple,
     YawScrub,
+    Understeer,
+    YawLag,
     TurnSlip,
     LateralSlip,
+    CrossCoupling,
     FloorSlope,
+    SlipperyPatch,
     MarkerOffset,
     HeadingOffset,
     CameraPitch,

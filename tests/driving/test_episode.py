@@ -103,9 +103,11 @@ def strongest(theta_name):
 
 def theta_of(theta_name):
     """Without a value and with it: an imbalance is one of something that is there."""
-    effect, *parameter = theta_name.split(".")
+    effect = theta_name.split(".")[0]
     main = theta_names(CATALOGUE[effect])[0]
-    there = {main: strongest(main)} if parameter == ["imbalance"] else {}
+    there = {main: strongest(main)} if PARAMETERS[theta_name].shape else {}
+    if CATALOGUE[effect].trace and CATALOGUE[effect].trace.placed:
+        there |= {f"{effect}.x": 1.58, f"{effect}.y": 0.70, f"{effect}.radius": 0.6}
     weakest_is_felt = effect != "stiction"  # it is below every duty of the agent
     probe = PARAMETERS[theta_name].probes[0] if weakest_is_felt else strongest(theta_name)
     return there, {**there, theta_name: probe}

@@ -27,14 +27,14 @@ def values_to_agree_on():
         main = effect.parameters[0]
         there = {} if isinstance(main.neutral, str) else {theta_names(effect)[0]: main.probes[len(main.probes) // 2]}
         for theta_name, parameter in zip(theta_names(effect), effect.parameters, strict=True):
-            uneven = parameter.name == "imbalance"
-            for probe in parameter.probes[1:3] if uneven else parameter.probes[-2:-1]:
-                yield pytest.param(name, {**(there if uneven else {}), theta_name: probe}, id=f"{theta_name}={probe}")
+            shape = parameter.shape
+            for probe in parameter.probes[1:3] if shape else parameter.probes[-2:-1]:
+                yield pytest.param(name, {**(there if shape else {}), theta_name: probe}, id=f"{theta_name}={probe}")
 
 
 def twists_for(duties, **theta):
     train = drivetrain(ROBOT, effects_from({**ROBOT.theta, "delay": 0.0, **theta}, ROBOT.figures))
-    return train.apply(duties, train.begin(Setting(60.0, np.zeros(2), ROBOT.figures, 3, START[2:])))[0]
+    return train.apply(duties, train.begin(Setting(60.0, np.zeros(2), ROBOT.figures, 3, START[2:], START[None, :2])))[0]
 
 
 def poses_for(plant, duties, **theta):

@@ -18,11 +18,11 @@ from proxytune.diagnosis.search import LEAST_GAIN, Adopted
 from proxytune.diagnosis.signals import signal_groups
 from proxytune.diagnosis.windows import cut, strays
 from proxytune.driving.robot import read_robot
-from proxytune.effects import theta_names
+from proxytune.effects import Means, theta_names
 from proxytune.effects.catalogue import CATALOGUE
-from proxytune.report.diagnosis_effect import STATIC, TRANSIENT, effect_curve
+from proxytune.report.diagnosis_effect import effect_curve
 from proxytune.report.diagnosis_figures import SHOWN, diagnosis_figures
-from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, MOTIONS, retuned
+from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, retuned
 from proxytune.report.diagnosis_residual import MANY_WINDOWS, residual_map, residual_over_time, strayed
 from proxytune.report.style import BEFORE
 
@@ -270,9 +270,12 @@ def test_declared_parameters_give_way_to_the_curve_that_was_fitted_with_them(dia
     assert retuned(declared, idle) == pytest.approx(dict(declared.theta), abs=0.02)
 
 
-def test_every_motion_effect_has_a_curve():
-    assert set(MOTION_EFFECTS) == {*STATIC, *TRANSIENT, *MOTIONS}
-    assert all(name in GROUPS for name, _ in MOTIONS.values())
+def test_means_are_drawn_over_a_signal_that_has_a_figure_of_its_own():
+    forms = [(CATALOGUE[name].trace, form.form) for name in MOTION_EFFECTS for form in EVERY if form.effect == name]
+    shown = [trace.shown_in(form) for trace, form in forms]
+    means = [one for one in shown if isinstance(one, Means)]
+    assert len(means) >= 6
+    assert all(one.cue in GROUPS and one.panels for one in means)
 
 
 EVERY = candidates(read_robot("duckiebot").figures, {}, ("trim", "delay"))

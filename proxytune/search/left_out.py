@@ -26,6 +26,11 @@ POINTS = 1024
 WIDENINGS = (1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
 HELD = 0.9
 """Share of left-out trials that regions have to hold: of 24, one may miss 95 % regions by chance, and a second."""
+MARGIN = 1.25
+"""Regions are wider by so much again: trials of a search lie close together, a target where it has not looked.
+
+Of 46 searches of five engines for nine truths, regions held the truth in 40 without it, in 43 with it, in 45 with 1.5.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +52,12 @@ class LeftOut:
 
     @property
     def widening(self) -> float:
-        """By what to divide the log density besides, so that 95 % regions hold as many of them as they should."""
+        """By what to divide the log density besides, so that 95 % regions hold as many targets as they should."""
         if not self.enough:
-            return WIDENINGS[0]
+            return MARGIN
         held = (self.above <= LEVEL).mean(axis=0)
-        return next((one for one, share in zip(WIDENINGS, held, strict=True) if share >= HELD), WIDENINGS[-1])
+        enough = (one for one, share in zip(WIDENINGS, held, strict=True) if share >= HELD)
+        return MARGIN * next(enough, WIDENINGS[-1])
 
 
 def leave_out(model: OutputModel, trials: Sequence[Trial], goal: Goal, seed: int) -> LeftOut:

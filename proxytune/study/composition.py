@@ -4,13 +4,12 @@ from collections.abc import Collection, Iterable
 
 import numpy as np
 
-from proxytune.errors import RunError
 from proxytune.scores import Array
 from proxytune.search.goal import Goal
 from proxytune.search.knowledge import Knowledge, learn
 from proxytune.search.proposer import Compose, Trial, Values
 from proxytune.study.evaluate import known_outcomes
-from proxytune.study.history import episodes_of
+from proxytune.study.history import episodes_of, lacks_episodes
 from proxytune.study.noise import noise_of
 from proxytune.study.store import Outcome, Store, TrialRecord
 from proxytune.study.study import Study
@@ -28,7 +27,7 @@ def trial_of(study: Study, store: Store, done: TrialRecord) -> Trial:
     planned = episodes_of(study.settings, done)
     known = known_outcomes(study, store, planned)
     if len(known) < len(planned):
-        raise RunError(f"{store.path}: lacks episodes of trial {done.number}; move it away and run the study again")
+        raise lacks_episodes(store, done)
     return Trial(study.settings.space.values(done.theta), done.score, outputs_of(study, known.values()))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from proxytune.domain import Episode
 from proxytune.scores import ScoreTable
+from proxytune.search.knowledge import Knowledge
 from proxytune.study.composition import knowledge_of
 from proxytune.study.evaluate import Spent, known_outcomes, plan, run_missing, score, table
 from proxytune.study.objective import FRESH
@@ -75,7 +76,7 @@ def run_confirmation(study: Study, store: Store, watcher: Watcher) -> Spent:
     trials, spent = [trial for trial in store.trials() if trial.state != "open"], Spent()
     if not study.settings.confirm or not stopped(study, store, trials):
         return spent
-    chosen = candidates(study, store, trials)
+    chosen = candidates(trials, knowledge_of(study, store, trials))
     watcher.begin("fresh episodes", most_episodes(study.settings) - len(chosen) * per_candidate(study.settings))
     for number, trial in enumerate(chosen, start=1):
         planned = [episode for run in _plans(study.settings, trial) for episode in run]
@@ -83,36 +84,40 @@ def run_confirmation(study: Study, store: Store, watcher: Watcher) -> Spent:
     return spent
 
 
-def confirmation_of(study: Study, store: Store, trials: Sequence[TrialRecord]) -> Confirmation | None:
+def confirmation_of(
+    study: Study, store: Store, trials: Sequence[TrialRecord], learnt: Knowledge
+) -> Confirmation | None:
     """What the fresh episodes in the store say of these trials; None if it is off, or an episode is still missing.
 
-    Raises:
-        RunError: If no trial has a score.
+    Args:
+        study: Which study.
+        store: Where its episodes are.
+        trials: Finished trials, one of them with a score.
+        learnt: What they say of θ.
     """
     if not study.settings.confirm:
         return None
-    found = [_driven_again(study, store, trial) for trial in candidates(study, store, trials)]
+    found = [_driven_again(study, store, trial) for trial in candidates(trials, learnt)]
     known = tuple(candidate for candidate in found if candidate is not None)
     if len(known) < len(found):
         return None
-    return Confirmation(_answer(study, store, trials, known), known, per_candidate(study.settings))
+    return Confirmation(_answer(known, learnt), known, per_candidate(study.settings))
 
 
-def candidates(study: Study, store: Store, trials: Sequence[TrialRecord]) -> list[TrialRecord]:
+def candidates(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
     """The trials that are driven again, that of lowest expected PRPV first: a function of what was finished alone.
 
-    Raises:
-        RunError: If no trial has a score.
+    Args:
+        trials: Finished trials, one of them with a score.
+        learnt: What they say of θ.
     """
-    space = study.settings.space
     # Of a trial that was cut off it is certain that it is none of the best.
-    scored = {space.values(trial.theta): trial for trial in trials if trial.prpv is not None}
-    known = knowledge_of(study, store, trials)
-    expected = {values: mean for values, mean in known.expected.items() if values in scored}
+    scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.prpv is not None}
+    expected = {values: mean for values, mean in learnt.expected.items() if values in scored}
     best = min(expected, key=expected.__getitem__)
-    noise = float(known.fresh_scores(best).std())
+    noise = float(learnt.fresh_scores(best).std())
     near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
-    likeliest = known.likeliest_of(list(expected))
+    likeliest = learnt.likeliest_of(list(expected))
     return [scored[values] for values in dict.fromkeys([near[0], likeliest, *near[1:]])][:CANDIDATES]
 
 
@@ -162,9 +167,8 @@ def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]
     return assess(proxy=proxy, target=study.target, metrics=metrics, floor=floor)
 
 
-def _answer(study: Study, store: Store, trials: Sequence[TrialRecord], known: Sequence[Candidate]) -> Candidate:
+def _answer(known: Sequence[Candidate], learnt: Knowledge) -> Candidate:
     """Each candidate has as many fresh episodes, so what fresh noise does to all of them alike favours none."""
-    values = study.settings.space.values
-    expected = knowledge_of(study, store, trials).expected
-    scores = [[expected[values(one.trial.theta)], *(s for s in one.scores if s is not None)] for one in known]
+    expected = [learnt.expected[learnt.space.values(one.trial.theta)] for one in known]
+    scores = [[mean, *(s for s in one.scores if s is not None)] for mean, one in zip(expected, known, strict=True)]
     return known[int(np.argmin([np.mean(each) for each in scores]))]

@@ -12,7 +12,7 @@ from proxytune.study.composition import knowledge_of
 from proxytune.study.confirmation import Confirmation, confirmation_of
 from proxytune.study.cutting import spared
 from proxytune.study.evaluate import Evaluation, evaluation, known_outcomes, told
-from proxytune.study.history import as_trials, episodes_of
+from proxytune.study.history import as_trials, episodes_of, lacks_episodes
 from proxytune.study.noise import noise_of
 from proxytune.study.preflight import Preflight, preflight_of
 from proxytune.study.stopping import stopped
@@ -138,7 +138,7 @@ def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | N
         raise RunError(f"{store.path}: {reason}")
     space = study.settings.space
     learnt = knowledge_of(study, store, trials)
-    confirmation = confirmation_of(study, store, trials)
+    confirmation = confirmation_of(study, store, trials, learnt)
     answers = _answers(trials, learnt)
     answer = confirmation.answer.trial if confirmation else answers[-1]
     assert answer is not None
@@ -192,7 +192,7 @@ def known_evaluation(study: Study, store: Store, trial: TrialRecord) -> Evaluati
     """
     found = evaluation(study, store, trial.theta)
     if found is None:
-        raise RunError(f"{store.path}: lacks episodes of trial {trial.number}; move it away and run the study again")
+        raise lacks_episodes(store, trial)
     return found
 
 

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.scores import Array, Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare
@@ -79,11 +80,12 @@ def dominance(means: Array, metrics: Sequence[Metric]) -> Array:
         Shape (…, agents, agents): 1 where row dominates column (better beyond tolerance on one metric, worse on
         none), 0 where column dominates row, 0.5 where they are incomparable or tied.
     """
-    wins = np.zeros((*means.shape[:-1], means.shape[-2]), dtype=np.bool_)
-    for column, metric in enumerate(metrics):
-        merits, tie = metric.merits(means[..., column])
-        wins |= merits[..., :, None] - merits[..., None, :] > tie[..., None]
-    return 0.5 + 0.5 * (wins.astype(np.float64) - np.swapaxes(wins, -1, -2))
+    first, second = np.triu_indices(means.shape[-2], 1)
+    signs = 0.5 * _signs(means, metrics)
+    alpha = np.full((*means.shape[:-1], means.shape[-2]), 0.5)
+    alpha[..., first, second] += signs
+    alpha[..., second, first] -= signs
+    return alpha
 
 
 def prpv_of_means(proxy: Array, target: Array, metrics: Sequence[Metric]) -> Array:
@@ -97,8 +99,21 @@ def prpv_of_means(proxy: Array, target: Array, metrics: Sequence[Metric]) -> Arr
     Returns:
         Shape (…).
     """
-    difference = np.abs(dominance(proxy, metrics) - dominance(target, metrics))
-    return np.asarray(difference.sum(axis=(-1, -2)), dtype=np.float64)
+    # Each pair counts half in either order.
+    difference = np.abs(_signs(proxy, metrics) - _signs(target, metrics))
+    return np.asarray(difference.sum(axis=-1), dtype=np.float64)
+
+
+def _signs(means: Array, metrics: Sequence[Metric]) -> NDArray[np.int8]:
+    """2α − 1 of every pair of agents (…, pairs), the first of them before the second."""
+    first, second = np.triu_indices(means.shape[-2], 1)
+    better, worse = (np.zeros((*means.shape[:-2], len(first)), dtype=np.int8) for _ in range(2))
+    for column, metric in enumerate(metrics):
+        merits, tie = metric.merits(means[..., column])
+        ahead = merits[..., first] - merits[..., second]
+        better |= ahead > tie
+        worse |= ahead < -tie
+    return better - worse
 
 
 def prpv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Prpv:

@@ -107,7 +107,7 @@ def stopped_when(folder, count, number):
     while made(folder) < count and process.poll() is None:
         time.sleep(0.002)
     process.send_signal(number)
-    process.communicate(timeout=60)
+    process.communicate(timeout=300)
     return process.returncode
 
 
@@ -118,7 +118,9 @@ def test_a_run_stopped_at_any_moment_comes_to_the_same_document_as_one_that_was_
     for called in ("whole", "stopped"):
         folder = make_taught(make_study, called=called, jobs=jobs)
         if called == "stopped":
-            moments = np.sort(np.random.default_rng(int(jobs)).choice(np.arange(1, 100), 4, replace=False)).tolist()
+            # On a busy machine a signal comes late, so none is meant for the end.
+            before = np.arange(1, made(folder.with_name("whole")) * 2 // 3)
+            moments = np.sort(np.random.default_rng(int(jobs)).choice(before, 4, replace=False)).tolist()
             numbers = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
             statuses = [stopped_when(folder, count, number) for count, number in zip(moments, numbers, strict=True)]
             assert statuses == [-signal.SIGKILL, 130, 143, -signal.SIGKILL]

@@ -36,7 +36,7 @@ def known(seed, count=14, lost=()):
 def test_the_region_holds_the_truth_and_is_small():
     found = [known(seed) for seed in range(20)]
     assert sum(one.holds(truth_of(seed)) for seed, one in enumerate(found)) >= 18
-    assert np.median([one.posterior.share for one in found]) < 0.08
+    assert np.median([one.posterior.share for one in found]) < 0.12
     for one in found:
         assert {name: low < high for name, (low, high) in one.intervals.items()} == {"delay": True, "trim": True}
 
@@ -69,7 +69,7 @@ def test_who_is_sensitive_to_a_parameter_tells_of_it():
 
 
 def test_a_parameter_of_which_no_output_tells_is_unidentified():
-    assert known(3, lost=(1, 2, 3)).unidentified == ("trim",)
+    assert known(3, count=32, lost=(1, 2, 3)).unidentified == ("trim",)
     assert known(3).unidentified == ()
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from steps import SPACE, goal, whole
 
 from proxytune.search.design import design_point, to_unit
-from proxytune.search.left_out import FEWEST, WIDENINGS, LeftOut, leave_out
+from proxytune.search.left_out import FEWEST, MARGIN, WIDENINGS, LeftOut, leave_out
 from proxytune.search.output_model import fit_outputs
 from proxytune.search.proposer import Trial
 
@@ -45,20 +45,20 @@ def planted(missed, widening=0):
 
 
 def test_the_region_is_widened_until_it_holds_nine_of_ten():
-    assert planted(0).widening == planted(2).widening == 1.0
-    assert planted(3, 0).widening == WIDENINGS[1]
-    assert planted(3, 2).widening == WIDENINGS[3]
-    assert planted(20, len(WIDENINGS) - 1).widening == WIDENINGS[-1]
+    assert planted(0).widening == planted(2).widening == MARGIN
+    assert planted(3, 0).widening == MARGIN * WIDENINGS[1]
+    assert planted(3, 2).widening == MARGIN * WIDENINGS[3]
+    assert planted(20, len(WIDENINGS) - 1).widening == MARGIN * WIDENINGS[-1]
 
 
-def test_few_of_them_widen_nothing():
+def test_few_of_them_widen_nothing_beyond_the_margin():
     few = left_out(trials(FEWEST - 1))
     assert not few.enough
-    assert few.widening == 1.0
+    assert few.widening == MARGIN
 
 
 def test_a_single_trial_is_not_left_out():
-    assert left_out(trials(1)).widening == 1.0
+    assert left_out(trials(1)).widening == MARGIN
 
 
 def test_trials_that_lack_outputs_are_not_left_out_but_are_learnt_from():

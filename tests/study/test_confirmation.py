@@ -12,7 +12,7 @@ from proxytune.search.engines import make_proposer
 from proxytune.search.knowledge import learn
 from proxytune.search.misfit import Misfit
 from proxytune.study import confirmation
-from proxytune.study.composition import goal_of, trials_of
+from proxytune.study.composition import goal_of, knowledge_of, trials_of
 from proxytune.study.confirmation import (
     CANDIDATES,
     candidates,
@@ -73,7 +73,9 @@ def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_lik
     with Store.read(finished) as store:
         trials = store.trials()
         known = learn(study.settings.space, trials_of(study, store, trials), goal_of(study, store), 1)
-        chosen = [study.settings.space.values(trial.theta) for trial in candidates(study, store, trials)]
+        chosen = [
+            study.settings.space.values(trial.theta) for trial in candidates(trials, knowledge_of(study, store, trials))
+        ]
     ranked = list(known.expected)
     noise = known.fresh_scores(ranked[0]).std()
     near = [values for values in ranked if known.expected[values] - known.expected[ranked[0]] <= noise]
@@ -101,7 +103,7 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
         plant(study, store, lucky, -1.0)
         for rival in rivals:
             plant(study, store, rival, 1.0)
-        found = confirmation_of(study, store, trials)
+        found = confirmation_of(study, store, trials, knowledge_of(study, store, trials))
     assert found.answer.trial != lucky
     assert found.answer.scores == (0,)
     assert found.candidates[0].optimism > 0
@@ -188,7 +190,7 @@ def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished
 def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_score(finished):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(study, store, store.trials()):
+        for trial in candidates(store.trials(), knowledge_of(study, store, store.trials())):
             for episode in plan(study.settings, trial.theta, study.settings.seed + FRESH):
                 if episode.agent == "agent3":
                     store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
@@ -236,7 +238,7 @@ def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_t
 ):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(study, store, store.trials()):
+        for trial in candidates(store.trials(), knowledge_of(study, store, store.trials())):
             plant(study, store, trial, 1.0)
         found = result_of(study, store)
     monkeypatch.setattr(type(found.knowledge), "holds", lambda *_: inside)

@@ -142,7 +142,7 @@ def without_rests(drives: Drives) -> Drives:
     ticks = np.arange(told.shape[1])
     newest = np.maximum.accumulate(np.where(told, ticks, 0), axis=1)[drives.episode, drives.last - 1]
     moving = drives.first - newest <= REST_S * drives.tick_hz
-    return drives if moving.all() or not moving.any() else drives.only(moving)
+    return drives if moving.all() or not told.any() else drives.only(moving)
 
 
 def _ticks(rows: Floats, ticks: int, length: int) -> Floats:

@@ -1,4 +1,4 @@
-"""Are all drives of one robot? Each wheel's gain, as every drive alone would have it."""
+"""Are all drives of one robot, on one floor? Each wheel's gain, as every drive alone would have it."""
 
 from typing import NamedTuple
 

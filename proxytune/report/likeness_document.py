@@ -26,6 +26,6 @@ def unlike_notes(unlike: Unlike | None, names: Sequence[str]) -> list[str]:
         for gain, group in zip(unlike.gains, unlike.groups, strict=True)
     ]
     return [
-        f"drives disagree: the {unlike.wheel} wheel's gain is {' but '.join(parts)}, as if of two robots; nothing told "
-        "here holds for both: diagnose each group alone, or find what was changed between them"
+        f"drives disagree: the {unlike.wheel} wheel's gain is {' but '.join(parts)}, as if of two robots, or of "
+        "one on two floors; nothing told here holds for both: diagnose each group alone, or find what was changed"
     ]

@@ -123,5 +123,5 @@ def test_a_command_that_is_lost_is_lost_until_the_next_one():
         np.testing.assert_array_equal(
             duties[0, tick:following], np.tile(drives.duties[0, tick - 1], (following - tick, 1))
         )
-    assert np.abs(duties - drives.duties).max() > 0.01
+    assert np.any(duties != drives.duties)
     assert np.diff(lost[:, 1]).min() > 2.0 * drives.tick_hz

@@ -42,9 +42,14 @@ def test_drives_of_one_robot_are_alike(theta):
     assert unlike(planted_log({**TRUTH, **theta}, **SHORT)) is None
 
 
-@pytest.mark.parametrize("case", [hidden.IN_FORM[2], hidden.IN_FORM[20], hidden.OTHER_FORM[0], hidden.OUTSIDE[1]])
+@pytest.mark.parametrize("case", [hidden.IN_FORM[2], hidden.IN_FORM[20], hidden.OTHER_FORM[0], hidden.OUTSIDE[0]])
 def test_what_one_robot_lacks_does_not_make_two_of_it(case):
     assert unlike(hidden.make_log(case, episodes=8, seconds=40.0)) is None
+
+
+def test_drives_on_two_floors_fall_in_two_groups_too():
+    found = unlike(hidden.make_log(hidden.OUTSIDE[1], episodes=8, seconds=40.0))
+    assert sorted(found.gains) == pytest.approx([0.8, 1.0], abs=0.03)
 
 
 def test_a_single_drive_of_another_kind_is_no_second_robot():

@@ -11,7 +11,7 @@ from proxytune.logs import COMMANDS, read_log
 TOML = 'format = 1\nname = "yard"\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
 SAMPLES = "episode,time,x,y,heading\na,5.0,1,2,0\na,5.1,1,2,0\na,5.3,1,2,0\nb,0,0,0,0\nb,0.1,0,0,0\n"
 HEADER = "episode,time,v,omega\n"
-GOOD = HEADER + "b,-1,0.1,0.2\na,5.013,0.5,0.1\na,5.127,0.6,0.2\na,9.5,0.7,0.3\n"
+GOOD = HEADER + "b,0,0.1,0.2\na,5.013,0.5,0.1\na,5.127,0.6,0.2\na,9.5,0.7,0.3\n"
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_commands_keep_their_own_times_and_poses_their_grid(folder):
     np.testing.assert_array_equal(first.commands, [[0.5, 0.1], [0.6, 0.2], [0.7, 0.3]])
     np.testing.assert_allclose(first.times, [5.0, 5.1, 5.2, 5.3])
     assert np.isnan(first.poses[:, 0]).tolist() == [False, False, True, False]
-    np.testing.assert_array_equal(second.issued, [-1.0])
+    np.testing.assert_array_equal(second.issued, [0.0])
 
 
 def test_the_command_in_force_at_a_sample_is_the_newest_and_none_is_zero(folder):
@@ -74,9 +74,9 @@ def test_each_kind_of_command_has_columns_of_its_own(folder, command):
         (GOOD.replace("5.127", "inf"), "/commands.csv: line 4, column 'time': must be a finite number"),
         (GOOD.replace("5.127", "5.013"), "/commands.csv: line 4, column 'time': 5.013 s does not come after"),
         (GOOD.replace("a,", "c,"), "/commands.csv: line 3, column 'episode': 'c' is not in samples.csv"),
-        (GOOD.replace("b,-1,0.1,0.2\n", ""), "/samples.csv: line 5, column 'episode': 'b' is not in commands.csv"),
+        (GOOD.replace("b,0,0.1,0.2\n", ""), "/samples.csv: line 5, column 'episode': 'b' is not in commands.csv"),
         (
-            GOOD.replace("b,-1", "b,17"),
+            GOOD.replace("b,0,", "b,17,"),
             "/commands.csv: line 2, column 'time': the commands of 'b' lie between 17 and 17",
         ),
         (GOOD + "b,0,0,0\n", "/commands.csv: line 6, column 'episode': 'b' comes back after another episode"),

@@ -6,14 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS
+from proxytune.diagnosis.clocks import Clocks, read_clocks
 from proxytune.diagnosis.confirmation import bullet_strays, has_body
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit, intervals, seen
 from proxytune.diagnosis.innovations import Noise
+from proxytune.diagnosis.likeness import Unlike, two_robots
 from proxytune.diagnosis.manoeuvres import Manoeuvre, next_manoeuvre
-from proxytune.diagnosis.plausible import check_clocks, check_motion, check_units
+from proxytune.diagnosis.plausible import check_motion, check_units
 from proxytune.diagnosis.search import Adopted, Found, Told, search
-from proxytune.diagnosis.split import Parts, split
+from proxytune.diagnosis.split import Parts, all_drives, split
 from proxytune.diagnosis.visibility import unseen
 from proxytune.diagnosis.windows import Rmse, Windows, cut, floor, ratio, rmse, strays
 from proxytune.driving.robot import Robot
@@ -94,6 +96,9 @@ class Diagnosis:
         manoeuvre: What to drive to tell rivals apart, or None.
         parts: The drives that were fitted and tested.
         found: What the search came to.
+        clocks: Those of the log, and of the log to test on where that is another.
+        unlike: Two groups that the drives fall in as if of two robots, by number, or None.
+        drive_names: Names of the log's drives.
     """
 
     log: str
@@ -109,6 +114,9 @@ class Diagnosis:
     manoeuvre: Manoeuvre | None
     parts: Parts
     found: Found
+    clocks: tuple[Clocks, ...]
+    unlike: Unlike | None
+    drive_names: tuple[str, ...]
 
     @property
     def noise(self) -> Noise:
@@ -136,15 +144,18 @@ def diagnose(
         told: Hears of progress.
 
     Raises:
-        LogError: If the log cannot bear the question: too short, no motion, two clocks.
+        LogError: If the log cannot bear the question: too short, no motion, other units.
         SettingsError: If a declared effect is unknown or does not act on motion.
     """
     names = declared_parameters(declared)
     start = {name: robot.theta.get(name, PARAMETERS[name].neutral_value(robot.figures)) for name in names}
-    parts = split(log, robot, test)
+    own = read_clocks(log, robot)
+    clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
+    if any(one.offset.value for one in clocks) and "delay" not in names:
+        names, start = (*names, "delay"), {**start, "delay": own.assumed_delay_s}
+    parts = split(log, robot, test, clocks)
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
-    check_clocks(log.name, parts.fitted, start)
     found = search(parts.fitted, start, names, seed, told)
     told("testing on drives kept aside")
     errors = tuple(error for h in HORIZONS_S if (error := _error(found, parts.tested, h, seed)) is not None)
@@ -164,6 +175,9 @@ def diagnose(
         manoeuvre=next_manoeuvre(found),
         parts=parts,
         found=found,
+        clocks=clocks,
+        unlike=two_robots(all_drives(log, robot, own), found.model),
+        drive_names=tuple(episode.name for episode in log.episodes),
     )
 
 

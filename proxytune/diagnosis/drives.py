@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from proxytune.diagnosis.commands import commands_a_second, commands_of
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode
@@ -23,8 +24,8 @@ HELD_S = 0.2
 GAP_S = 1.0
 """Over longer gaps in the measured poses no motion is compared."""
 
-REST_SPEED = 1e-3
-"""Below this the commanded speed counts as none, as a fraction of full speed."""
+REST_S, REST_DUTY = 3.0, 1e-3
+"""A robot that was told to move less than this, for so long, rests."""
 
 Floats = NDArray[Any]
 Whole = NDArray[Any]
@@ -38,7 +39,8 @@ class Drives:
         robot: Whose drives they are.
         tick_hz: Ticks per second.
         rate_hz: Commands per second.
-        duties: Commands as fractions of full speed (E, T, 2).
+        duties: Commands as fractions of full speed (E, T, 2), each the mean over its tick.
+        issued: Whether a command is issued within each tick (E, T).
         rest: Duties before the first row (E, 2).
         headings: Measured heading at the start of each tick, interpolated (E, T).
         episode: Episode of each increment (N,).
@@ -55,6 +57,7 @@ class Drives:
     tick_hz: float
     rate_hz: float
     duties: Floats
+    issued: NDArray[np.bool_]
     rest: Floats
     headings: Floats
     episode: Whole
@@ -117,41 +120,16 @@ def relative(origin: Floats, pose: Floats) -> Floats:
     return np.stack((forward, left, difference[..., 2]), axis=-1)
 
 
-def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
-    """A log's commands (…, 2) as fractions of full wheel speed, left and right.
-
-    Raises:
-        LogError: If the log has no commands, or they ask for more than full speed.
-    """
-    figures = robot.figures
-    if log.command == "duty":
-        return commands
-    if log.command == "none":
-        raise LogError(f"{log.name}: has no commands; a log needs duties, twists or wheel speeds to learn from")
-    if log.command == "twist":
-        turn = commands[..., 1] * figures["effective_baseline"] / 2.0
-        speeds = np.stack((commands[..., 0] - turn, commands[..., 0] + turn), axis=-1)
-    else:
-        speeds = commands * figures["wheel_radius"]
-    duties = speeds / figures["full_speed"]
-    fastest = float(np.abs(duties).max())
-    if fastest > 1.0 + 1e-9:
-        raise LogError(
-            f"{log.name}: asks a wheel for {fastest * figures['full_speed']:.2f} m/s, more than the robot's full speed "
-            f"{figures['full_speed']:g} m/s; state a higher full_speed_m_s in log.toml"
-        )
-    return np.asarray(duties)
-
-
 def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
-    """A batch of a log's episodes.
+    """A batch of a log's episodes, each command held from its own time.
 
     Raises:
         LogError: If there is nothing to compare in them.
     """
     ticks = math.ceil(TICK_HZ / log.rate_hz)
     length = max(len(episode.times) for episode in episodes) * ticks
-    duties = np.stack([_ticks(duties_of(log, robot, e.commands), ticks, length) for e in episodes])
+    tick_hz = log.rate_hz * ticks
+    given = [commands_of(log, robot, episode, ticks) for episode in episodes]
     samples = [_samples(episode, log.rate_hz) for episode in episodes]
     rows = np.concatenate([np.stack((s[:-1], s[1:]), axis=1) for s in samples])
     number = np.repeat(np.arange(len(episodes)), [max(0, len(s) - 1) for s in samples])
@@ -163,10 +141,11 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
     linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))
     drives = Drives(
         robot=robot,
-        tick_hz=log.rate_hz * ticks,
-        rate_hz=log.rate_hz,
-        duties=duties,
-        rest=np.stack([_rest(e, robot) for e in episodes]),
+        tick_hz=tick_hz,
+        rate_hz=commands_a_second(log, episodes),
+        duties=np.stack([one.over_ticks(length, tick_hz) for one in given]),
+        issued=np.stack([one.ticks(length, tick_hz) for one in given]),
+        rest=np.stack([one.rest for one in given]),
         headings=np.stack([_ticks_of_heading(e, ticks, length) for e in episodes]),
         episode=number,
         first=rows[:, 0] * ticks,
@@ -178,6 +157,15 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
         wheels=_wheels(robot, episodes, ticks, length),
     )
     return drives.only(rows[:, 1] - rows[:, 0] <= GAP_S * log.rate_hz)
+
+
+def without_rests(drives: Drives) -> Drives:
+    """Drives without what comes longer than REST_S after the last command to move: an hour of it says nothing."""
+    told = np.any(np.abs(drives.duties) > REST_DUTY, axis=-1)
+    ticks = np.arange(told.shape[1])
+    newest = np.maximum.accumulate(np.where(told, ticks, 0), axis=1)[drives.episode, drives.last - 1]
+    moving = drives.first - newest <= REST_S * drives.tick_hz
+    return drives if moving.all() or not told.any() else drives.only(moving)
 
 
 def _ticks(rows: Floats, ticks: int, length: int) -> Floats:
@@ -198,13 +186,6 @@ def _ticks_of_heading(episode: LogEpisode, ticks: int, length: int) -> Floats:
     if len(known) == 0:
         return np.zeros(length)
     return np.asarray(np.interp(np.arange(length), known * ticks, episode.poses[known, 2]))
-
-
-def _rest(episode: LogEpisode, robot: Robot) -> Floats:
-    """What the wheels did before the first row: turned as measured, or stood."""
-    if episode.wheels is None or not np.isfinite(episode.wheels[0]).all():
-        return np.zeros(2)
-    return np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
 
 
 def _samples(episode: LogEpisode, rate_hz: float) -> Whole:

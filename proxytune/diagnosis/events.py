@@ -3,6 +3,7 @@
 A mean model cannot see them: a command that is lost now and then changes the motion after it, not on average.
 """
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -99,17 +100,12 @@ def responses(fitted: Fit, seed: int) -> Responses:
     Commands far apart are lost together, so that one replay tells of many.
     """
     drives = fitted.drives
-    rows, ticks = _changed(drives)
-    reach = round(MEMORY_S * drives.rate_hz)
+    changed, phase = _changed(drives)
     here = between(drives, paths(drives, fitted.theta))
     shifts = _shifts(len(drives.episode), seed)
     z = fitted.innovations.reshape(-1, 3)
     moved = np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1)
-    found = [
-        _lost_together(fitted, _without(drives, rows, phase, reach, ticks), here, moved)
-        for phase in range(reach)
-        if (rows[:, 1] % reach == phase).any()
-    ]
+    found = [_lost_together(fitted, changed[phase == number], here, moved) for number in np.unique(phase)]
     if not found:
         return Responses(np.empty(0), np.empty(0), np.empty((SHIFTS, 0)))
     pull, size, shifted = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
@@ -117,33 +113,34 @@ def responses(fitted: Fit, seed: int) -> Responses:
     return Responses(pull[kept], size[kept], shifted[:, kept])
 
 
-def _changed(drives: Drives) -> tuple[Whole, int]:
-    """Episode and row of every command that differs from the one before it, and ticks per row."""
-    ticks = round(drives.tick_hz / drives.rate_hz)
-    commands = drives.duties[:, ::ticks]
-    before = np.concatenate((drives.rest[:, None], commands[:, :-1]), axis=1)
-    return np.argwhere(np.any(commands != before, axis=-1)), ticks
+def _changed(drives: Drives) -> tuple[Whole, Whole]:
+    """Episode and tick of every command that differs from the one before it (C, 2), and its phase (C,).
+
+    Those of one phase are at least MEMORY_S apart: of commands closer together than usual the first counts.
+    """
+    before = np.concatenate((drives.rest[:, None], drives.duties[:, :-1]), axis=1)
+    found = np.argwhere(drives.issued & np.any(np.abs(drives.duties - before) > 1e-9, axis=-1))
+    number = np.floor(found[:, 1] * drives.rate_hz / drives.tick_hz + 1e-6).astype(int)
+    _, first = np.unique(found[:, 0] * (number.max(initial=0) + 1) + number, return_index=True)
+    return found[first], number[first] % math.ceil(MEMORY_S * drives.rate_hz)
 
 
-def _without(drives: Drives, rows: Whole, phase: int, reach: int, ticks: int) -> tuple[Floats, Whole, int]:
-    """Duties in which every command of a phase is lost."""
-    lost = rows[rows[:, 1] % reach == phase]
+def _without(drives: Drives, lost: Whole) -> Floats:
+    """Duties without some commands: the one before stays in force until the next."""
     duties = drives.duties.copy()
-    for episode, row in lost:
-        start = row * ticks
-        before = drives.rest[episode] if row == 0 else drives.duties[episode, start - 1]
-        duties[episode, start : start + ticks] = before
-    return duties, lost, reach * ticks
+    for episode, tick in lost:
+        later = np.flatnonzero(drives.issued[episode, tick + 1 :])
+        end = tick + 1 + int(later[0]) if len(later) else duties.shape[1]
+        duties[episode, tick:end] = drives.rest[episode] if tick == 0 else drives.duties[episode, tick - 1]
+    return duties
 
 
-def _lost_together(
-    fitted: Fit, without: tuple[Floats, Whole, int], here: Floats, moved: Floats
-) -> tuple[Floats, Floats, Floats]:
+def _lost_together(fitted: Fit, lost: Whole, here: Floats, moved: Floats) -> tuple[Floats, Floats, Floats]:
+    """Pull, size and shifted pulls of commands of one phase."""
     drives = fitted.drives
-    duties, lost, reach = without
-    other = replace(drives, duties=duties)
+    other = replace(drives, duties=_without(drives, lost))
     change = fitted.whiten.whiten(here - between(other, paths(other, fitted.theta)))
-    label = np.repeat(_label(drives, lost, reach), 3)
+    label = np.repeat(_label(drives, lost), 3)
     size = sum_by(label, change**2, len(lost))
     both = np.concatenate((fitted.innovations[:, None], moved), axis=1)
     pulls = sum_by(label, change[:, None] * both, len(lost))
@@ -165,11 +162,10 @@ def _loudness(label: Whole, change: Floats, innovations: Floats, share: Floats) 
     return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
 
 
-def _label(drives: Drives, lost: Whole, reach: int) -> Whole:
+def _label(drives: Drives, lost: Whole) -> Whole:
     """Which lost command each increment comes after, −1 where none (N,)."""
     length = drives.duties.shape[1]
-    keys = lost[:, 0] * length + lost[:, 1] * (reach // round(MEMORY_S * drives.rate_hz))
-    at = np.searchsorted(keys, drives.episode * length + drives.last - 1, side="right") - 1
+    at = np.searchsorted(lost @ (length, 1), drives.episode * length + drives.last - 1, side="right") - 1
     return np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
 
 

@@ -122,6 +122,7 @@ def imagined(drives: Drives, duties: Floats) -> Drives:
     return replace(
         drives,
         duties=np.repeat(duties, ticks, axis=0)[None],
+        issued=(np.arange(rows * ticks) % ticks == 0)[None],
         rest=np.zeros((1, 2)),
         headings=np.zeros((1, rows * ticks)),
         episode=np.zeros(rows - 1, dtype=int),

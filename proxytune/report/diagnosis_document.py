@@ -13,6 +13,8 @@ from proxytune.diagnosis.search import Adopted
 from proxytune.driving.robot import robot_names
 from proxytune.effects import CATALOGUE, Model, model_text, theta_names
 from proxytune.logs import GEOMETRY
+from proxytune.report.clocks_document import clocks_document, clocks_notes
+from proxytune.report.likeness_document import unlike_document, unlike_notes
 
 HORIZON_S = 2.0
 """The horizon of the one error that stands for all."""
@@ -48,6 +50,8 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_manoeuvre": _manoeuvre(diagnosis),
         "fitted_s": diagnosis.parts.fitted.seconds,
         "tested_s": diagnosis.parts.tested.seconds,
+        "clocks": clocks_document(diagnosis.clocks),
+        "unlike_drives": unlike_document(diagnosis.unlike, diagnosis.drive_names),
     }
 
 
@@ -175,7 +179,8 @@ def _table(title: str, columns: tuple[str, ...]) -> Table:
 
 
 def _notes(diagnosis: Diagnosis) -> list[str]:
-    notes = []
+    notes = clocks_notes(diagnosis.log, diagnosis.clocks, diagnosis.theta)
+    notes += unlike_notes(diagnosis.unlike, diagnosis.drive_names)
     for effect in diagnosis.effects:
         rivals = ", ".join(rival.label for rival in effect.rivals)
         beside = f"; these drives cannot tell it from {rivals}" if rivals else ""

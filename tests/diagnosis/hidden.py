@@ -63,12 +63,23 @@ class Scene(NamedTuple):
     times: Array
 
 
-def make_log(case: Case, *, episodes: int = 12, seconds: float = 60.0, noiseless: bool = False) -> Log:
-    """What would have been measured of this robot, 20 rows per second, from rest."""
+def make_log(
+    case: Case,
+    *,
+    episodes: int = 12,
+    seconds: float = 60.0,
+    noiseless: bool = False,
+    late_s: Array | float = 0.0,
+) -> Log:
+    """What would have been measured of this robot, 20 rows per second, from rest.
+
+    Poses are stamped later than commands by `late_s`, which may differ between episodes and rows.
+    """
     rows = round(seconds * RATE_HZ)
     drives = make_drives(case.seed, episodes, rows)
     level = 0.0 if noiseless else LEVELS[case.noise]
-    poses = measured(true_poses(case, drives, level), case, level)
+    late = np.broadcast_to(np.asarray(late_s, dtype=float), (episodes, rows))
+    poses = measured(_stamped(fine_poses(case, drives, level), late), case, level)
     times = np.arange(rows) / RATE_HZ
     drives_measured = (LogEpisode(f"{e:02d}", times, drives.duties[e], poses[e], None) for e in range(episodes))
     return Log(case.name, "duckiebot", "duty", float(RATE_HZ), {}, tuple(drives_measured))
@@ -76,10 +87,22 @@ def make_log(case: Case, *, episodes: int = 12, seconds: float = 60.0, noiseless
 
 def true_poses(case: Case, drives: Drives, level: float) -> Array:
     """Poses (E, rows, 3) of the middle of the axle, with `level` times the normal disturbance of motion."""
+    return fine_poses(case, drives, level)[:, ::PER_ROW]
+
+
+def _stamped(poses: Array, late_s: Array) -> Array:
+    """Fine poses as rows (E, rows, 3) that are stamped so much too late (E, rows); NaN where the drive had ended."""
+    step = np.arange(late_s.shape[1]) * PER_ROW - np.rint(late_s * FINE_HZ).astype(int)
+    there = (step >= 0) & (step < poses.shape[1])
+    rows = poses[np.arange(len(poses))[:, None], np.clip(step, 0, poses.shape[1] - 1)]
+    return np.where(there[..., None], rows, np.nan)
+
+
+def fine_poses(case: Case, drives: Drives, level: float) -> Array:
+    """The same at every fine step."""
     twists = disturbed(wheel_twists(case, drives.duties), case, level)
     places = [(PLACES[name], figures) for name, figures in case.effects if name in PLACES]
-    poses = _stepped(twists, drives.starts, places) if places else _integrated(twists, drives.starts)
-    return poses[:, ::PER_ROW]
+    return _stepped(twists, drives.starts, places) if places else _integrated(twists, drives.starts)
 
 
 def wheel_twists(case: Case, messages: Array) -> Array:

@@ -10,7 +10,7 @@ import pytest
 sys.path.append(str(Path(__file__).parent))
 
 import hidden
-from planted import ROBOT, TRUTH, drives_of, fitted, planted_log, with_poses
+from planted import ROBOT, TRUTH, driven_log, drives_of, fitted, planted_log, with_poses
 
 from proxytune.diagnosis.diagnosis import (
     HORIZONS_S,
@@ -149,3 +149,38 @@ def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
     model = fitted(drives)
     error = _error(Found(model, model, (), (), (), ()), drives, 5.0, 1)
     assert error is None or np.isfinite((*error.before.interval, *error.ratio.interval)).all()
+
+
+def test_one_drive_is_enough_if_it_is_long():
+    found = diagnose(planted_log(SCRUBBING, episodes=1, seconds=70.0), ROBOT, ("trim", "delay"))
+    assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
+    assert found.unlike is None
+
+
+def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result():
+    log = planted_log(SCRUBBING, episodes=6, seconds=12.0)
+    at_origin = driven_log(SCRUBBING, np.stack([e.commands for e in log.episodes]), np.zeros((6, 3)))
+    stubs = [
+        replace(e, name=f"stub {e.name}", times=e.times[:3], commands=e.commands[:3], poses=e.poses[:3])
+        for e in log.episodes
+    ]
+    found = diagnose(replace(at_origin, episodes=(*at_origin.episodes, *stubs)), ROBOT, ("trim", "delay"))
+    assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
+    assert not found.clocks[0].differ
+
+
+def test_an_hour_of_standing_with_a_minute_of_driving_gives_what_the_minute_gives():
+    rows = 20 * 1800
+    duties = np.zeros((1, 2 * rows, 2))
+    duties[0, rows : rows + 1400] = planted_log(SCRUBBING, episodes=1, seconds=70.0).episodes[0].commands
+    found = diagnose(driven_log(SCRUBBING, duties, np.zeros((1, 3))), ROBOT, ("trim", "delay"))
+    assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
+    assert found.parts.fitted.seconds == pytest.approx(38.0, abs=2.0)
+
+
+def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
+    log = hidden.make_log(hidden.CLEAN[1], episodes=6, seconds=20.0, late_s=-0.25)
+    found = diagnose(log, ROBOT, ("trim", "delay"))
+    assert found.clocks[0].offset.value == pytest.approx(hidden.CLEAN[1].delay - 0.25 - 0.15, abs=0.03)
+    assert found.effects == ()
+    assert found.theta["delay"].value == pytest.approx(0.15, abs=0.03)

@@ -6,8 +6,8 @@ from proxytune.diagnosis.drives import Drives, Floats, Whole, sum_by
 from proxytune.diagnosis.windows import Rmse, Windows, cut, measured_since, ratio, strays
 from proxytune.space import Theta
 
-FEWEST = 10
-"""With fewer windows that were driven again nothing is said of them."""
+FEWEST = 20
+"""Of fewer windows that were driven several times nothing is said."""
 
 ALIKE = 1e-6
 """Commands that differ by less than this [duty] are the same."""
@@ -20,42 +20,40 @@ def repeated_share(drives: Drives, theta: Theta, horizon_s: float) -> Rmse | Non
     what that takes: for two drives, √(½ mean square of their difference).
 
     Args:
-        drives: All drives of a log.
+        drives: All drives of a log, each as one block, so that windows of repeats begin together.
         theta: The model.
         horizon_s: Length of the windows [s].
     """
     windows = cut(drives, horizon_s)
-    if len(windows.begin) == 0:
+    if len(windows.begin) < FEWEST:
         return None
     label, counts = _again(drives, windows)
     kept = counts[label] > 1
-    if len(np.unique(label[kept])) == 0 or len(np.unique(windows.window[kept])) < 2 * FEWEST:
+    if len(np.unique(windows.window[kept])) < FEWEST:
         return None
     apart = _apart(measured_since(drives, windows)[:, :2], label, counts)
     missed = strays(drives, theta, windows)[:, 0] ** 2
-    place = (
-        drives.first[windows.begin][windows.window] + drives.duties.shape[1] * _alike(drives)[_episode(drives, windows)]
-    )
-    return ratio(apart[kept], missed[kept], place[kept])
+    first = np.flatnonzero(np.diff(windows.window, prepend=-1))
+    return ratio(apart[kept], missed[kept], label[first][windows.window][kept])
 
 
 def _again(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
-    """For each compared pose what it is a repeat of (M,), and how often each of those was driven."""
-    kind = _alike(drives)[_episode(drives, windows)]
+    """For each compared pose what it is a repeat of (M,), and how often each of those was driven.
+
+    A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero.
+    """
     begin, end = drives.first[windows.begin][windows.window], drives.last[windows.increment]
-    _, label, counts = np.unique(np.stack((kind, begin, end)), axis=1, return_inverse=True, return_counts=True)
+    past = _histories(drives)[drives.episode[windows.increment], end - 1]
+    alone = np.where(past == 0, np.arange(len(past)) + 1, 0)
+    _, label, counts = np.unique(np.stack((past, begin, end, alone)), axis=1, return_inverse=True, return_counts=True)
     return label.ravel(), counts
 
 
-def _episode(drives: Drives, windows: Windows) -> Whole:
-    return np.asarray(drives.episode[windows.increment])
-
-
-def _alike(drives: Drives) -> Whole:
-    """Episodes with the same commands have the same number (E,)."""
-    rounded = np.round(drives.duties.reshape(len(drives.duties), -1) / ALIKE)
-    _, kind = np.unique(rounded, axis=0, return_inverse=True)
-    return np.asarray(kind).ravel()
+def _histories(drives: Drives) -> Whole:
+    """A number for all commands up to each tick (E, T): equal ones have the same, and no commands have 0."""
+    rounded = np.round(drives.duties / ALIKE).astype(np.int64)
+    weights = np.random.default_rng(1).integers(1, 2**62, size=rounded.shape[1:])
+    return np.asarray(np.cumsum((rounded * weights).sum(axis=-1), axis=1))
 
 
 def _apart(moved: Floats, label: Whole, counts: Whole) -> Floats:

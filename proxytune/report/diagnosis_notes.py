@@ -102,11 +102,11 @@ def _next(diagnosis: Diagnosis) -> list[str]:
     found = diagnosis.manoeuvre
     if found is None:
         return []
-    clear = "" if found.nats_per_minute is None else f" ({found.nats_per_minute:.0f} nats a minute)"
-    lines = [f"to tell {' from '.join(found.between)}, drive {found.name}{clear}: {found.description}"]
+    often = f"{found.times} times from the same commands, and diagnose the log with these drives in it"
+    if found.nats_per_minute is None:
+        return [f"to tell noise from what is missing, drive {found.name} {often}: {found.description}"]
+    clear = f"({found.nats_per_minute:.0f} nats a minute)"
+    lines = [f"to tell {' from '.join(found.between)}, drive {found.name} {clear}: {found.description}"]
     if found.times > 1:
-        lines.append(
-            f"to tell noise from what is missing, drive this manoeuvre {found.times} times from the same commands, and "
-            "diagnose the log with these drives in it"
-        )
+        lines.append(f"to tell noise from what is missing, drive this {often}")
     return lines

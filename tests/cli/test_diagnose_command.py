@@ -303,7 +303,7 @@ def test_wrong_options_are_told_in_one_line(words, says, home, printed, capsys, 
 
 
 def test_people_read_that_a_clean_log_is_missing_nothing_and_where_the_files_are(tmp_path, capsys):
-    folder = write_log(hidden.make_log(hidden.CLEAN[0], episodes=6, seconds=12.0), tmp_path / "log")
+    folder = write_log(planted_log(TRUTH, episodes=6, seconds=12.0, noise=CALM), tmp_path / "log")
     assert main(["diagnose", str(folder), "--output", str(tmp_path / "out")]) == 0
     out = capsys.readouterr().out
     assert "nothing missing" in out
@@ -311,3 +311,14 @@ def test_people_read_that_a_clean_log_is_missing_nothing_and_where_the_files_are
     told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert (told["verdict"], told["effects"], told["residual_depends_on"]) == ("nothing missing", [], [])
     assert told["next_manoeuvre"] is None
+
+
+def test_where_the_noise_is_not_known_people_read_what_to_drive(tmp_path, capsys):
+    folder = write_log(hidden.make_log(hidden.CLEAN[0], episodes=6, seconds=12.0), tmp_path / "log")
+    assert main(["diagnose", str(folder), "--output", str(tmp_path / "out")]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert told["verdict"] == "cannot be told"
+    assert told["next_manoeuvre"]["times"] == 10
+    assert told["error"]["noise_floor"] < told["error"]["noise_floor_upper"] == pytest.approx(told["error"]["after"])
+    assert "10 times from the same commands" in out

@@ -74,7 +74,7 @@ def test_worth_is_told_on_drives_that_were_not_fitted(drives):
     assert set(much) == set(little) == {1.0, 2.0, 5.0}
     assert max(one.interval[0] for one in much.values()) > 1.2
     assert max(one.value for one in much.values()) > 1.5
-    assert all(one.value == pytest.approx(1.0, abs=0.03) for one in little.values())
+    assert all(one.interval[0] < MATERIAL and one.value < 1.2 for one in little.values())
 
 
 @pytest.mark.parametrize(("size", "matters"), [(0.4, True), (0.02, False)])

@@ -1,35 +1,36 @@
 """From a log to a verdict: what the declared model leaves over, which effect explains it, and what that is worth."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS
-from proxytune.diagnosis.clocks import Clocks, read_clocks
+from proxytune.diagnosis.clocks import Clocks, in_step, read_clocks
 from proxytune.diagnosis.confirmation import bullet_strays, has_body
-from proxytune.diagnosis.drives import Drives, Floats
-from proxytune.diagnosis.fitting import Fit, intervals, seen
+from proxytune.diagnosis.drives import Drives, Floats, gather
+from proxytune.diagnosis.fitting import Fit, intervals
+from proxytune.diagnosis.floor import pose_noise
+from proxytune.diagnosis.horizon_error import HorizonError, KeptAside, horizon_error
 from proxytune.diagnosis.innovations import Noise
 from proxytune.diagnosis.likeness import Unlike, two_robots
 from proxytune.diagnosis.manoeuvres import Manoeuvre, next_manoeuvre
+from proxytune.diagnosis.materiality import Worth, without_immaterial, worth
 from proxytune.diagnosis.plausible import check_motion, check_units
-from proxytune.diagnosis.search import Adopted, Found, Told, search
+from proxytune.diagnosis.polish import HORIZONS_S, Polish, polished
+from proxytune.diagnosis.search import Adopted, Dropped, Found, Told, Variant, search
 from proxytune.diagnosis.split import Parts, all_drives, split
+from proxytune.diagnosis.verdict import verdict
 from proxytune.diagnosis.visibility import unseen
-from proxytune.diagnosis.windows import Rmse, Windows, cut, floor, ratio, rmse, strays
+from proxytune.diagnosis.windows import cut, strays
 from proxytune.driving.robot import Robot
 from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, effect_of, theta_names
 from proxytune.errors import LogError
 from proxytune.logs import Log
 from proxytune.settings import nearest
-from proxytune.space import Theta
 
-HORIZONS_S = (1.0, 2.0, 5.0)
-"""Horizons at which the error is told."""
-
-FEWEST_BLOCKS = 3
-"""No error is told over windows from fewer blocks: it would have no interval."""
+MAIN_S = 2.0
+"""The horizon of the one error that stands for all."""
 
 CONFIRMED_S = 2.0
 """The horizon at which it is confirmed on the bullet plant."""
@@ -45,55 +46,24 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class HorizonError:
-    """The error of open-loop prediction over windows of one horizon, on drives that were not fitted.
-
-    Attributes:
-        horizon_s: Length of the windows [s].
-        windows: How many there are.
-        before: Position [m] with declared effects only.
-        after: Position [m] with the effects that were found.
-        ratio: After by before.
-        noise_floor: What a model that is right would have [m].
-        heading_before: Heading [rad].
-        heading_after: Heading [rad].
-        heading_floor: Heading [rad].
-    """
-
-    horizon_s: float
-    windows: int
-    before: Rmse
-    after: Rmse
-    ratio: Rmse
-    noise_floor: float
-    heading_before: Rmse
-    heading_after: Rmse
-    heading_floor: float
-
-    @property
-    def removable_left(self) -> float | None:
-        """The share of the squared error above the floor that is left, None where nothing was above it."""
-        above = self.before.value**2 - self.noise_floor**2
-        left = self.after.value**2 - self.noise_floor**2
-        return max(0.0, left) / above if above > 0.05 * self.before.value**2 else None
-
-
-@dataclass(frozen=True)
 class Diagnosis:
     """What a log says of a model.
 
     Attributes:
         log: The log's name.
         robot: The robot.
-        verdict: "nothing missing", "explained", "partly explained" or "unexplained".
+        verdict: "nothing missing", "explained", "partly explained", "unexplained" or "cannot be told".
         declared: Declared parameters, fitted without any other effect, by name in θ.
         theta: All parameters of the extended model, by name in θ.
-        effects: The effects that were added.
+        effects: The effects that were added, all of which matter for prediction.
+        immaterial: Effects that have evidence, and are not shown to matter for prediction: no part of the model.
+        worth: The error without each of both by the error with it, on drives that were not fitted, by name and horizon.
+        polish: How the extended model's parameters were fitted to windows, None where single steps tell as well.
         residual_depends_on: Signals that explain what no named effect does.
         errors: On the planar plant, by horizon, shortest first.
         confirmed: The error over 2 s on the bullet plant, None where the robot has no body for it.
         could_not_be_seen: Effects that these drives could not have shown.
-        manoeuvre: What to drive to tell rivals apart, or None.
+        manoeuvre: What to drive to tell rivals apart, or noise from what is missing; None where nothing is asked.
         parts: The drives that were fitted and tested.
         found: What the search came to.
         clocks: Those of the log, and of the log to test on where that is another.
@@ -107,6 +77,9 @@ class Diagnosis:
     declared: Mapping[str, Estimate]
     theta: Mapping[str, Estimate]
     effects: tuple[Adopted, ...]
+    immaterial: tuple[Adopted, ...]
+    worth: Mapping[str, Worth]
+    polish: Polish | None
     residual_depends_on: tuple[str, ...]
     errors: tuple[HorizonError, ...]
     confirmed: HorizonError | None
@@ -117,6 +90,15 @@ class Diagnosis:
     clocks: tuple[Clocks, ...]
     unlike: Unlike | None
     drive_names: tuple[str, ...]
+
+    @property
+    def dropped_values(self) -> dict[str, Estimate]:
+        """Values that effects had which do not matter, by name in θ; they are not in the model."""
+        return {
+            name: Estimate(beside.theta[name], (beside.theta[name],) * 2, PARAMETERS[name].unit)
+            for effect, beside in self.found.immaterial
+            for name in effect.names
+        }
 
     @property
     def noise(self) -> Noise:
@@ -157,22 +139,31 @@ def diagnose(
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
     found = search(parts.fitted, start, names, seed, told)
+    told("weighing what each effect is worth")
+    found = without_immaterial(found, seed)
+    told("fitting to windows of prediction")
+    found, polishes = _polished(found)
     told("testing on drives kept aside")
-    errors = tuple(error for h in HORIZONS_S if (error := _error(found, parts.tested, h, seed)) is not None)
+    tested = _tested(test or log, parts, found, clocks[-1])
+    errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h)) is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
+    answer = _verdict(found, main_error(errors))
     return Diagnosis(
         log=log.name,
         robot=robot,
-        verdict=_verdict(found),
-        declared=estimates(found.declared, ()),
-        theta=estimates(found.model, found.adopted),
+        verdict=answer,
+        declared=estimates(found.declared, (), polishes[0]),
+        theta=estimates(found.model, found.adopted, polishes[1]),
         effects=found.adopted,
+        immaterial=tuple(dropped.effect for dropped in found.immaterial),
+        worth=_worth(found, parts, seed),
+        polish=polishes[1],
         residual_depends_on=tuple(curve.group.name for curve in found.remainder),
         errors=errors,
-        confirmed=_confirmed(found, parts.tested, seed, told),
-        could_not_be_seen=unseen(found.model, set(map(effect_of, names)) | {effect.effect for effect in found.adopted}),
-        manoeuvre=next_manoeuvre(found),
+        confirmed=_confirmed(found, tested, told),
+        could_not_be_seen=_unseen(found, names),
+        manoeuvre=next_manoeuvre(found, again=answer == "cannot be told"),
         parts=parts,
         found=found,
         clocks=clocks,
@@ -200,9 +191,9 @@ def declared_parameters(effects: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def estimates(fitted: Fit, adopted: Iterable[Adopted]) -> dict[str, Estimate]:
+def estimates(fitted: Fit, adopted: Iterable[Adopted], polish: Polish | None) -> dict[str, Estimate]:
     """Every value of a fitted model with its interval; fixed ones have none to speak of."""
-    known = intervals(fitted)
+    known = dict(polish.intervals) if polish else intervals(fitted)
     for effect in adopted:
         if effect.interval is not None:
             known[effect.names[0]] = effect.interval
@@ -212,41 +203,46 @@ def estimates(fitted: Fit, adopted: Iterable[Adopted]) -> dict[str, Estimate]:
     }
 
 
-def _verdict(found: Found) -> str:
-    if found.remainder:
-        return "partly explained" if found.adopted else "unexplained"
-    return "explained" if found.adopted else "nothing missing"
+def _polished(found: Found) -> tuple[Found, tuple[Polish | None, Polish | None]]:
+    """Both models with parameters fitted to windows, where that helps: before and after are compared on equal terms."""
+    declared, before = polished(found.declared)
+    if not found.adopted and not found.immaterial:
+        return replace(found, declared=declared, model=declared), (before, before)
+    model, after = polished(found.model)
+    return replace(found, declared=declared, model=model), (before, after)
 
 
-def _confirmed(found: Found, drives: Drives, seed: int, told: Told) -> HorizonError | None:
-    if not has_body(drives):
+def _unseen(found: Found, declared: Iterable[str]) -> tuple[str, ...]:
+    seen = {effect.effect for effect in (*found.adopted, *(dropped.effect for dropped in found.immaterial))}
+    return unseen(found.model, set(map(effect_of, declared)) | seen)
+
+
+def _tested(log: Log, parts: Parts, found: Found, clocks: Clocks) -> KeptAside:
+    whole = in_step(gather(log, parts.tested.robot, log.episodes), clocks, range(len(log.episodes)))
+    return KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
+
+
+def main_error(errors: Sequence[HorizonError]) -> HorizonError:
+    """The one error that stands for all."""
+    return min(errors, key=lambda error: abs(error.horizon_s - MAIN_S))
+
+
+def _verdict(found: Found, error: HorizonError) -> str:
+    return verdict(error.after.value, error.floor, named=bool(found.adopted), unnamed=bool(found.remainder))
+
+
+def _confirmed(found: Found, tested: KeptAside, told: Told) -> HorizonError | None:
+    if not has_body(tested.drives):
         return None
     told("confirming on the bullet plant")
-    return _error(found, drives, CONFIRMED_S, seed, bullet_strays)
+    return horizon_error(found, tested, CONFIRMED_S, bullet_strays)
 
 
-Strays = Callable[[Drives, Theta, Windows], Floats]
-"""How far a model's poses are from measured ones (M, 2): [m], [rad]."""
-
-
-def _error(found: Found, drives: Drives, horizon_s: float, seed: int, how: Strays = strays) -> HorizonError | None:
-    windows = cut(drives, horizon_s)
-    if len(np.unique(drives.block[windows.begin])) < FEWEST_BLOCKS:
-        return None
-    blocks = drives.block[windows.begin][windows.window]
-    before, after = (how(drives, fitted.theta, windows) ** 2 for fitted in (found.declared, found.model))
-    place, turn = floor(seen(drives, found.model.theta, (), found.model.noise), windows, seed)
-    return HorizonError(
-        horizon_s=horizon_s,
-        windows=len(windows.begin),
-        before=rmse(before[:, 0], blocks),
-        after=rmse(after[:, 0], blocks),
-        ratio=ratio(after[:, 0], before[:, 0], blocks),
-        noise_floor=place,
-        heading_before=rmse(before[:, 1], blocks),
-        heading_after=rmse(after[:, 1], blocks),
-        heading_floor=turn,
-    )
+def _worth(found: Found, parts: Parts, seed: int) -> dict[str, Worth]:
+    """What every effect is worth on the drives kept aside, those that were dropped again too."""
+    model = Variant(found.model.theta, found.model.free)
+    weighed = [Dropped(effect, model) for effect in found.adopted] + list(found.immaterial)
+    return {effect.effect: worth(parts.fitted, parts.tested, beside, effect, seed) for effect, beside in weighed}
 
 
 def residual_over_time(drives: Drives, theta: Mapping[str, float], horizon_s: float) -> tuple[Floats, Floats]:

@@ -131,6 +131,15 @@ def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
     return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
 
 
+def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
+    """The paths (E, T + 1, 3) with random effects as one seed draws them, instead of as expected."""
+    robot = drives.robot
+    effects = effects_from({**robot.theta, **theta}, robot.figures)
+    train = drivetrain(robot, effects)
+    twists, _ = train.apply(drives.duties, train.begin(replace(_setting(drives), seed=seed)))
+    return _seen(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
+
+
 def _wheel_speeds(drives: Drives, train: Drivetrain, setting: Setting) -> Floats:
     memory = train.begin(setting)
     arrived, _ = train.command.apply(drives.duties, memory.command)

@@ -102,6 +102,20 @@ class Adopted:
     interval: tuple[float, float] | None = None
 
 
+class Variant(NamedTuple):
+    """A model's values in θ, and which of them are free."""
+
+    theta: Theta
+    free: tuple[Coordinate, ...]
+
+
+class Dropped(NamedTuple):
+    """An effect that was dropped, and the model that had it."""
+
+    effect: Adopted
+    beside: Variant
+
+
 @dataclass(frozen=True)
 class Found:
     """What the search came to.
@@ -113,6 +127,7 @@ class Found:
         tried: Every effect tried in the first round, best first.
         remainder: Curves over signals that explain what no named effect does, best first.
         curves: Curves over every signal before anything was added, best first.
+        immaterial: Effects that were adopted and dropped again, each with the model that it was dropped from.
     """
 
     declared: Fit
@@ -121,6 +136,7 @@ class Found:
     tried: tuple[Tried, ...]
     remainder: tuple[Curve, ...]
     curves: tuple[Curve, ...]
+    immaterial: tuple["Dropped", ...] = ()
 
 
 class _Round(NamedTuple):

@@ -26,6 +26,9 @@ TICKS = 3
 TICK_HZ = float(TICKS * RATE_HZ)
 ROBOT = read_robot("duckiebot")
 NOISE = Noise((0.02, 0.01, 0.08), (0.002, 0.005))
+CALM = Noise((0.002, 0.001, 0.008), (0.002, 0.005))
+"""Drives so even that the noise of their poses is all that is left."""
+
 DECLARED = (("trim",), ("delay",))
 TRUTH = {"trim": 0.03, "delay": 0.12}
 

@@ -57,7 +57,8 @@ class Row:
         before: Error with what is declared [m].
         after: Error with what was added [m].
         true: Error of the model that is right [m], NaN where there is none.
-        floor: The noise floor that was told [m].
+        floor: The noise floor that was told, its lower and upper end [m].
+        immaterial: Effects that were found and do not matter.
         problem: What went wrong, empty as a rule.
     """
 
@@ -69,13 +70,19 @@ class Row:
     before: float = np.nan
     after: float = np.nan
     true: float = np.nan
-    floor: float = np.nan
+    floor: tuple[float, float] = (np.nan, np.nan)
+    immaterial: tuple[str, ...] = ()
     problem: str = ""
 
     @property
     def flagged(self) -> bool:
         """Whether it was said that something is left over."""
         return self.verdict in FLAGGED
+
+    @property
+    def calm(self) -> bool:
+        """Whether it was said that nothing is left over."""
+        return self.verdict in ("explained", "nothing missing")
 
     @property
     def right(self) -> bool:
@@ -93,8 +100,9 @@ class Row:
     def text(self) -> str:
         """One line of the table."""
         added = " + ".join(f"{names[0]}({'/'.join(names[1:])})" if names[1:] else names[0] for names in self.adopted)
-        errors = " ".join(f"{1e3 * value:.1f}" for value in (self.before, self.after, self.true, self.floor))
+        errors = " ".join(f"{1e3 * value:.1f}" for value in (self.before, self.after, self.true, *self.floor))
         name = self.job.case.name + (f" without {self.job.without}" if self.job.without else "")
+        added += f"; immaterial: {', '.join(self.immaterial)}" if self.immaterial else ""
         rest = f" rest: {', '.join(self.depends_on)}" if self.depends_on else ""
         head = f"{self.job.kind:11s} {name:44s} {self.verdict:16s}"
         return f"{head} [{added}]{rest} {self.evidence:.0f} nats, mm: {errors} {self.problem}".rstrip()
@@ -140,7 +148,8 @@ def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
         before=error.before.value,
         after=error.after.value,
         true=_true_error(job, found.parts.tested, episodes, seconds),
-        floor=error.noise_floor,
+        floor=error.floor[:2],
+        immaterial=tuple(one.effect for one in found.immaterial),
     )
 
 
@@ -221,12 +230,18 @@ def rates(rows: Sequence[Row]) -> dict[str, Rate]:
         "in form wrong without a flag": _rate(by_kind.get("in form", []), lambda row: row.wrong),
         "pairs both named": _rate(pairs, lambda row: row.right),
         "pairs wrong without a flag": _rate(pairs, lambda row: row.wrong),
-        "clean false alarms": _rate(by_kind.get("clean", []), lambda row: row.verdict != "nothing missing"),
+        "clean false alarms": _rate(by_kind.get("clean", []), lambda row: bool(row.adopted) or row.flagged),
         "taken out flagged": _rate(lost, lambda row: row.flagged),
         "outside flagged": _rate(by_kind.get("outside", []), lambda row: row.flagged),
         "other form right or flagged": _rate(other, lambda row: row.right or row.flagged),
         "other form right": _rate(other, lambda row: row.right),
         "other form wrong without a flag": _rate(other, lambda row: row.wrong),
+        "explained beyond 1.3 x the true floor": _rate(
+            [row for row in rows if np.isfinite(row.true)], lambda row: row.calm and row.after > 1.3 * row.true
+        ),
+        "floor bracket holds the true one": _rate(
+            [row for row in rows if np.isfinite(row.true)], lambda row: row.floor[0] <= row.true <= row.floor[1]
+        ),
         "error after within 5 % of the true model's": Rate(sum(value < 1.05 for value in near), len(near)),
         "error after within 10 % of the true model's": Rate(sum(value < 1.10 for value in near), len(near)),
         "failed": _rate(rows, lambda row: bool(row.problem)),

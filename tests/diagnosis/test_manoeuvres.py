@@ -44,6 +44,16 @@ def test_without_rivals_there_is_nothing_to_tell_apart(drives):
     assert next_manoeuvre(found(drives, "dead_band")) is None
 
 
+def test_where_noise_is_not_known_what_is_driven_is_driven_ten_times(drives):
+    alone = next_manoeuvre(found(drives, "dead_band"), again=True)
+    assert (alone.times, alone.nats_per_minute) == (10, None)
+    assert alone.duties.shape == (1200, 2)
+    rivals = next_manoeuvre(found(drives, "dead_band", "stiction"), again=True)
+    assert rivals.times == 10
+    assert next_manoeuvre(found(drives, "dead_band", "stiction")).times == 1
+    assert rivals.between == ("dead_band", "stiction")
+
+
 @pytest.mark.parametrize(
     ("effect", "rival"),
     [("dead_band", "stiction"), ("lateral_slip", "marker_offset"), ("turn_slip", "yaw_scrub")],

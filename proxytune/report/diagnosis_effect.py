@@ -103,9 +103,9 @@ def _steady(drives: Drives, theta: Theta, commands: Floats) -> Floats:
 
 
 def _driven(drives: Drives, duties: Floats) -> Drives:
-    """The same robot from rest under other commands (E, T, 2)."""
-    still = np.zeros((len(duties), 2))
-    return replace(drives, duties=duties, rest=still, headings=np.zeros(duties.shape[:2]), wheels=None)
+    """The same robot from rest under other commands (E, T, 2), nothing being measured."""
+    still, unmeasured = np.zeros((len(duties), 2)), drives.only(np.zeros(len(drives.episode), dtype=bool))
+    return replace(unmeasured, duties=duties, rest=still, headings=np.zeros(duties.shape[:2]), wheels=None)
 
 
 def _flexible(diagnosis: Diagnosis, curve: Curve, column: int) -> tuple[Floats, Floats]:

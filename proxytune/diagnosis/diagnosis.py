@@ -14,6 +14,7 @@ from proxytune.diagnosis.innovations import Noise
 from proxytune.diagnosis.likeness import Unlike, two_robots
 from proxytune.diagnosis.manoeuvres import Manoeuvre, next_manoeuvre
 from proxytune.diagnosis.plausible import check_motion, check_units
+from proxytune.diagnosis.rests import without_long_rests
 from proxytune.diagnosis.search import Adopted, Found, Told, search
 from proxytune.diagnosis.split import Parts, all_drives, split
 from proxytune.diagnosis.visibility import unseen
@@ -149,6 +150,7 @@ def diagnose(
     """
     names = declared_parameters(declared)
     start = {name: robot.theta.get(name, PARAMETERS[name].neutral_value(robot.figures)) for name in names}
+    log, test = without_long_rests(log), without_long_rests(test) if test is not None else None
     own = read_clocks(log, robot)
     clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
     if any(one.offset.value for one in clocks) and "delay" not in names:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.drives import Drives, Floats, gather, without_rests
+from proxytune.diagnosis.drives import Drives, Floats, gather
 from proxytune.diagnosis.latency import (
     STEP_S,
     Latency,
@@ -98,7 +98,7 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     Raises:
         LogError: If there is nothing to compare in the log.
     """
-    drives = without_rests(gather(log, robot, log.episodes))
+    drives = gather(log, robot, log.episodes)
     speeds = measured_speeds(drives)
     if not len(speeds.first):
         return _one_clock(len(log.episodes))

@@ -18,6 +18,7 @@ from proxytune.diagnosis.manoeuvres import Manoeuvre, next_manoeuvre
 from proxytune.diagnosis.materiality import Worth, without_immaterial, worth
 from proxytune.diagnosis.plausible import check_motion, check_units
 from proxytune.diagnosis.polish import HORIZONS_S, Polish, polished
+from proxytune.diagnosis.rests import without_long_rests
 from proxytune.diagnosis.search import Adopted, Dropped, Found, Told, Variant, search
 from proxytune.diagnosis.split import Parts, all_drives, split
 from proxytune.diagnosis.verdict import verdict
@@ -131,6 +132,7 @@ def diagnose(
     """
     names = declared_parameters(declared)
     start = {name: robot.theta.get(name, PARAMETERS[name].neutral_value(robot.figures)) for name in names}
+    log, test = without_long_rests(log), without_long_rests(test) if test is not None else None
     own = read_clocks(log, robot)
     clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
     if any(one.offset.value for one in clocks) and "delay" not in names:

@@ -24,9 +24,6 @@ HELD_S = 0.2
 GAP_S = 1.0
 """Over longer gaps in the measured poses no motion is compared."""
 
-REST_S, REST_DUTY = 3.0, 1e-3
-"""A robot that was told to move less than this, for so long, rests."""
-
 Floats = NDArray[Any]
 Whole = NDArray[Any]
 
@@ -157,15 +154,6 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
         wheels=_wheels(robot, episodes, ticks, length),
     )
     return drives.only(rows[:, 1] - rows[:, 0] <= GAP_S * log.rate_hz)
-
-
-def without_rests(drives: Drives) -> Drives:
-    """Drives without what comes longer than REST_S after the last command to move: an hour of it says nothing."""
-    told = np.any(np.abs(drives.duties) > REST_DUTY, axis=-1)
-    ticks = np.arange(told.shape[1])
-    newest = np.maximum.accumulate(np.where(told, ticks, 0), axis=1)[drives.episode, drives.last - 1]
-    moving = drives.first - newest <= REST_S * drives.tick_hz
-    return drives if moving.all() or not told.any() else drives.only(moving)
 
 
 def _ticks(rows: Floats, ticks: int, length: int) -> Floats:

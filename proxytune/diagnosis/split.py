@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.clocks import Clocks, in_step
-from proxytune.diagnosis.drives import Drives, gather, without_rests
+from proxytune.diagnosis.drives import Drives, gather
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
 from proxytune.logs import Log
@@ -71,9 +71,9 @@ def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:
 
 
 def _gathered(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:
-    """Some of a log's drives, on one clock, long rests left out."""
+    """Some of a log's drives, on one clock."""
     drives = gather(log, robot, [log.episodes[i] for i in chosen])
-    return without_rests(in_step(drives, clocks[0], chosen) if clocks else drives)
+    return in_step(drives, clocks[0], chosen) if clocks else drives
 
 
 def _halves(drives: Drives) -> Parts:

@@ -261,10 +261,6 @@ BAD = {
     ),
     "a stationary robot": (changed(still), "stands still"),
     "NaN": (edited("x", 5, "nan"), "line 7, column 'x': must be a finite number"),
-    "two clocks apart": (
-        lambda folder: write_log(two_clocks(small_log(seconds=30.0)), folder),
-        " s earlier; they seem to come from two clocks",
-    ),
     "no poses": (changed(without_poses), "no two measured poses"),
     "no folder": (lambda folder: None, "no such folder"),
 }
@@ -282,6 +278,17 @@ def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_w
     assert says in line
     assert err.count("proxytune diagnose") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_two_clocks_are_told_and_taken_out(tmp_path, capsys):
+    folder = write_log(two_clocks(small_log(seconds=30.0)), tmp_path / "log")
+    assert main(["diagnose", str(folder), "--output", str(tmp_path / "out")]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "s after its command; poses are stamped 2.9" in words
+    assert "that was taken out" in words
+    told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert told["clocks"]["offset_s"] == pytest.approx(3.0 + TRUTH["delay"] - 0.15, abs=0.02)
+    assert [effect["name"] for effect in told["effects"]] == ["yaw_scrub"]
 
 
 @pytest.mark.parametrize(

@@ -185,12 +185,12 @@ def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result(
 
 
 def test_an_hour_of_standing_with_a_minute_of_driving_gives_what_the_minute_gives():
-    rows = 20 * 1800
-    duties = np.zeros((1, 2 * rows, 2))
-    duties[0, rows : rows + 1400] = planted_log(SCRUBBING, episodes=1, seconds=70.0).episodes[0].commands
+    duties = np.zeros((1, 20 * 3600, 2))
+    duties[0, 36000:37400] = planted_log(SCRUBBING, episodes=1, seconds=70.0).episodes[0].commands
     found = diagnose(driven_log(SCRUBBING, duties, np.zeros((1, 3))), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
-    assert found.parts.fitted.seconds == pytest.approx(38.0, abs=2.0)
+    assert found.parts.fitted.seconds == pytest.approx(37.0, abs=1.0)
+    assert found.drive_names == ("00 from 1799 s",)
 
 
 def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():

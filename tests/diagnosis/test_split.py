@@ -8,9 +8,8 @@ import pytest
 
 sys.path.append(str(Path(__file__).parent))
 
-from planted import ROBOT, TRUTH, driven_log, drives_of, planted_log
+from planted import ROBOT, TRUTH, planted_log, with_poses
 
-from proxytune.diagnosis.drives import REST_S, without_rests
 from proxytune.diagnosis.split import BLOCK_S, BLOCKS, split
 from proxytune.errors import LogError
 
@@ -60,29 +59,12 @@ def test_there_are_enough_blocks_to_leave_out_and_none_is_tiny(episodes, seconds
             assert not drives.linked[own][0]
 
 
-def resting(before_s, driving_s, after_s):
-    """One drive that stands, drives and stands again."""
-    rows = [round(seconds * 20) for seconds in (before_s, driving_s, after_s)]
-    duties = np.zeros((1, sum(rows), 2))
-    duties[0, rows[0] : rows[0] + rows[1]] = planted_log(TRUTH, episodes=1, seconds=driving_s).episodes[0].commands
-    return driven_log(TRUTH, duties, np.zeros((1, 3)))
+def test_half_of_the_measured_motion_not_of_the_time_is_fitted():
+    def lost(poses):
+        poses = poses.copy()
+        poses[400:1400] = np.nan
+        return poses
 
-
-def test_a_long_rest_is_left_out_and_a_short_one_is_kept():
-    drives = without_rests(drives_of(resting(200.0, 30.0, 100.0)))
-    assert drives.seconds == pytest.approx(30.0 + 2 * REST_S, abs=1.5)
-    assert np.all((drives.first <= REST_S * 60) | (drives.first >= 200.0 * 60 - 3))
-    assert drives.last.max() == pytest.approx((230.0 + REST_S) * 60.0, abs=6.0)
-    whole = drives_of(planted_log(TRUTH, episodes=2, seconds=20.0))
-    assert without_rests(whole) is whole
-
-
-def test_half_of_the_motion_not_of_the_time_is_fitted_and_blocks_share_it():
-    fitted, tested = split(resting(900.0, 60.0, 10.0), ROBOT, None)
-    assert fitted.seconds == pytest.approx(tested.seconds, abs=1.0)
+    fitted, tested = split(with_poses(planted_log(TRUTH, episodes=1, seconds=120.0), lost), ROBOT, None)
+    assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2)
     assert len(np.unique(fitted.block)) >= 6
-
-
-def test_a_robot_that_only_rests_keeps_its_poses_so_that_others_can_complain():
-    log = driven_log(TRUTH, np.zeros((1, 400, 2)), np.zeros((1, 3)))
-    assert without_rests(drives_of(log)).seconds > 19.0

@@ -9,7 +9,7 @@ import numpy as np
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.floor import PoseNoise, noise_floor
 from proxytune.diagnosis.polish import FEWEST_BLOCKS
-from proxytune.diagnosis.repeats import repeated_share
+from proxytune.diagnosis.repeats import repeated
 from proxytune.diagnosis.search import Found
 from proxytune.diagnosis.verdict import Bracket, bracket
 from proxytune.diagnosis.windows import Rmse, Windows, blocks_of, cut, ratio, rmse, strays
@@ -92,7 +92,7 @@ def horizon_error(found: Found, tested: KeptAside, horizon_s: float, how: Strays
         before=rmse(before[:, 0], blocks),
         after=rmse(after[:, 0], blocks),
         ratio=ratio(after[:, 0], before[:, 0], blocks),
-        floor=bracket(lower, reached, repeated_share(tested.whole, found.model.theta, horizon_s)),
+        floor=bracket(lower, reached, repeated(tested.whole, found.model.theta, horizon_s)),
         heading_before=rmse(before[:, 1], blocks),
         heading_after=rmse(after[:, 1], blocks),
         heading_floor=turn,

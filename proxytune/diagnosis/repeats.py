@@ -1,5 +1,7 @@
 """Manoeuvres that were driven twice from the same commands: what differs between them no model can predict."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole, sum_by
@@ -13,10 +15,22 @@ ALIKE = 1e-6
 """Commands that differ by less than this [duty] are the same."""
 
 
-def repeated_share(drives: Drives, theta: Theta, horizon_s: float) -> Rmse | None:
-    """What drives do not repeat, by a model's error over the same windows; None where too little was driven twice.
+class Repeated(NamedTuple):
+    """What drives from the same commands say of a model.
 
-    At 1 the model predicts all that repeats. Of windows driven n times the mean is taken off, and n/(n − 1) gives back
+    Attributes:
+        share: What they do not repeat, by the model's error over the same windows: at 1 it predicts all that repeats.
+        apart: What they do not repeat: RMSE of position [m].
+    """
+
+    share: Rmse
+    apart: float
+
+
+def repeated(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
+    """What drives do not repeat, and a model's error over the same windows; None where too little was driven twice.
+
+    Of windows driven n times the mean is taken off, and n/(n − 1) gives back
     what that takes: for two drives, √(½ mean square of their difference).
 
     Args:
@@ -34,7 +48,8 @@ def repeated_share(drives: Drives, theta: Theta, horizon_s: float) -> Rmse | Non
     apart = _apart(measured_since(drives, windows)[:, :2], label, counts)
     missed = strays(drives, theta, windows)[:, 0] ** 2
     first = np.flatnonzero(np.diff(windows.window, prepend=-1))
-    return ratio(apart[kept], missed[kept], label[first][windows.window][kept])
+    share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])
+    return Repeated(share, float(np.sqrt(apart[kept].mean())))
 
 
 def _again(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:

@@ -113,7 +113,7 @@ def _error(error: HorizonError) -> dict[str, Any]:
         "ratio_interval": list(error.ratio.interval),
         "noise_floor": error.floor.lower,
         "noise_floor_upper": error.floor.upper,
-        "not_repeated": _ratio(error.floor.repeated),
+        "not_repeated": _ratio(error.floor.again.share) if error.floor.again else None,
         "removable_left": error.removable_left,
         "unit": "m",
         "heading": {
@@ -125,8 +125,8 @@ def _error(error: HorizonError) -> dict[str, Any]:
     }
 
 
-def _ratio(one: Rmse | None) -> dict[str, Any] | None:
-    return None if one is None else {"value": one.value, "interval": list(one.interval)}
+def _ratio(one: Rmse) -> dict[str, Any]:
+    return {"value": one.value, "interval": list(one.interval)}
 
 
 def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:

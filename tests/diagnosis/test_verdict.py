@@ -2,12 +2,13 @@
 
 import pytest
 
+from proxytune.diagnosis.repeats import Repeated
 from proxytune.diagnosis.verdict import bracket, verdict
 from proxytune.diagnosis.windows import Rmse
 
-KNOWN = Rmse(0.97, (0.9, 1.05))
-BEYOND = Rmse(0.5, (0.4, 0.6))
-UNSURE = Rmse(0.75, (0.5, 1.1))
+KNOWN = Repeated(Rmse(0.97, (0.9, 1.05)), 0.0116)
+BEYOND = Repeated(Rmse(0.5, (0.4, 0.6)), 0.006)
+UNSURE = Repeated(Rmse(0.75, (0.5, 1.1)), 0.009)
 
 
 def said(after, lower, *, reached=None, repeated=None, named=True, unnamed=False):
@@ -30,6 +31,14 @@ def test_an_error_that_nothing_lowers_within_a_narrow_bracket_is_explained():
 def test_an_error_that_drives_do_not_repeat_is_explained():
     assert said(0.012, 0.004, repeated=KNOWN) == "explained"
     assert said(0.012, 0.004, repeated=KNOWN, named=False) == "nothing missing"
+
+
+def test_repeats_of_a_manoeuvre_that_never_meets_what_is_missing_explain_nothing():
+    assert said(0.029, 0.004, repeated=KNOWN) == "cannot be told"
+
+
+def test_nothing_is_explained_while_a_named_effect_lowers_the_error():
+    assert said(0.012, 0.004, repeated=KNOWN, reached=0.0105) == "cannot be told"
 
 
 @pytest.mark.parametrize(("named", "answer"), [(True, "partly explained"), (False, "unexplained")])

@@ -90,7 +90,7 @@ def finding_of(result: StudyResult) -> Finding:
     return Finding(
         parameters=parameters,
         region=learnt.posterior.share,
-        inside=learnt.holds(settings.space.values(result.best.trial.theta)),
+        inside=result.inside,
         prpv=judged.prpv.value,
         fresh=judged is not result.best.assessment,
         floor=result.floor,

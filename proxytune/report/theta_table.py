@@ -64,7 +64,7 @@ def _inside(result: StudyResult) -> list[str]:
     """Whether the best θ and the truth are in the 95 % region, where that is worth a line."""
     space, learnt = result.study.settings.space, result.knowledge
     lines = []
-    if not learnt.holds(space.values(result.best.trial.theta)):
+    if not result.inside:
         lines.append("the best θ by PRPV is outside the 95 % region, which is by every metric of every agent")
     if result.truth is not None and set(space.names) <= set(result.truth):
         holds = learnt.holds(space.values(result.truth))

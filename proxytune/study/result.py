@@ -84,6 +84,11 @@ class StudyResult:
         return self.knowledge.unidentified
 
     @property
+    def inside(self) -> bool:
+        """Whether the best θ lies in the 95 % region, which is by every metric of every agent."""
+        return self.knowledge.holds(self.knowledge.space.values(self.best.trial.theta))
+
+    @property
     def judged(self) -> Assessment:
         """What the answer is judged by: its fresh episodes, or while there are none its trial's own."""
         fresh = self.confirmation.answer.assessment if self.confirmation else None
@@ -102,8 +107,7 @@ class StudyResult:
         """
         if self.confirmation is None or self.confirmation.answer.assessment is None:
             return False
-        inside = self.knowledge.holds(self.knowledge.space.values(self.best.trial.theta))
-        return bool(self.judged.at_noise_floor) and self.knowledge.misfit.fits is not False and inside
+        return bool(self.judged.at_noise_floor) and self.knowledge.misfit.fits is not False and self.inside
 
     @property
     def failed_episodes(self) -> int:

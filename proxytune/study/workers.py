@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import signal
 import sys
 import threading
 import time
@@ -80,7 +81,12 @@ def _do_pickled(recipe: _Recipe, piece: Any) -> Any:
 
 @lru_cache
 def _end_with(parent: int) -> None:
-    """End this process soon after its parent: after a `kill -9` it would wait for work for minutes."""
+    """End this process with its parent, and not before.
+
+    After a `kill -9` it would wait for work for minutes. Ctrl-C reaches every process of a terminal; the parent answers
+    it, and ends this one.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         while os.getppid() == parent:

@@ -36,7 +36,7 @@ def known(seed, count=14, lost=()):
 def test_the_region_holds_the_truth_and_is_small():
     found = [known(seed) for seed in range(20)]
     assert sum(one.holds(truth_of(seed)) for seed, one in enumerate(found)) >= 18
-    assert np.median([one.posterior.share for one in found]) < 0.12
+    assert np.median([one.posterior.share for one in found]) < 0.10
     for one in found:
         assert {name: low < high for name, (low, high) in one.intervals.items()} == {"delay": True, "trim": True}
 

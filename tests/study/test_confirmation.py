@@ -9,10 +9,9 @@ from proxytune.errors import EpisodeError
 from proxytune.report.study_document import study_document
 from proxytune.report.study_table import fresh_lines
 from proxytune.search.engines import make_proposer
-from proxytune.search.knowledge import learn
 from proxytune.search.misfit import Misfit
 from proxytune.study import confirmation
-from proxytune.study.composition import goal_of, knowledge_of, trials_of
+from proxytune.study.composition import knowledge_of
 from proxytune.study.confirmation import (
     CANDIDATES,
     candidates,
@@ -72,10 +71,8 @@ def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_lik
     study = opened(finished)
     with Store.read(finished) as store:
         trials = store.trials()
-        known = learn(study.settings.space, trials_of(study, store, trials), goal_of(study, store), 1)
-        chosen = [
-            study.settings.space.values(trial.theta) for trial in candidates(trials, knowledge_of(study, store, trials))
-        ]
+        known = knowledge_of(study, store, trials)
+    chosen = [study.settings.space.values(trial.theta) for trial in candidates(trials, known)]
     ranked = list(known.expected)
     noise = known.fresh_scores(ranked[0]).std()
     near = [values for values in ranked if known.expected[values] - known.expected[ranked[0]] <= noise]

@@ -1,0 +1,16 @@
+"""Score tables: how well each agent did, episode by episode, and the metrics that judge it."""
+
+from proxytune.scores.files import read_domains, read_scores, write_scores
+from proxytune.scores.metric import ROUNDING, Array, Metric, varies
+from proxytune.scores.table import ScoreTable
+
+__all__ = [
+    "ROUNDING",
+    "Array",
+    "Metric",
+    "ScoreTable",
+    "read_domains",
+    "read_scores",
+    "varies",
+    "write_scores",
+]

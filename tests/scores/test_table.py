@@ -1,0 +1,40 @@
+"""A table is built from finished episodes, and keeps values with their names."""
+
+import numpy as np
+import pytest
+
+from proxytune.errors import ScoresError
+from proxytune.scores import ScoreTable
+
+
+def test_a_table_is_built_from_finished_episodes():
+    table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("B", 1): {"m": 2.0}, ("A", 2): {"m": 3.0}})
+    assert table.means[:, 0].tolist() == [2.0, 2.0]
+    assert table.driven.tolist() == [[True, True], [True, False]]
+
+
+@pytest.mark.parametrize(
+    "scored", [{}, {("A", 1): {"m": float("nan")}}, {("A", 1): {"m": 1.0, "n": 1.0}, ("A", 2): {"m": 1.0}}]
+)
+def test_episodes_without_a_finite_score_are_refused(scored):
+    with pytest.raises(ScoresError):
+        ScoreTable.from_episodes(scored)
+
+
+def test_an_unknown_metric_is_refused_with_the_nearest_name():
+    table = ScoreTable.from_episodes({("A", 1): {"distance": 1.0}})
+    with pytest.raises(ScoresError, match="no metric 'distanz' in the scores; did you mean 'distance'"):
+        table.select(["distanz"])
+
+
+def test_unpaired_episodes_share_no_label_and_keep_the_means():
+    table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("A", 2): {"m": 4.0}, ("B", 1): {"m": 2.0}})
+    loose = table.unpaired()
+    assert loose.driven.sum(axis=0).tolist() == [1, 1, 1]
+    np.testing.assert_array_equal(loose.means, table.means)
+
+
+def test_arranging_moves_values_with_their_names():
+    table = ScoreTable.from_episodes({(a, e): {"m": 10.0 * i + e} for i, a in enumerate("AB") for e in (1, 2)})
+    moved = table.arrange(agents=("B", "A"), episodes=("2", "1"))
+    assert moved.values[:, :, 0].tolist() == [[12.0, 11.0], [2.0, 1.0]]

@@ -92,13 +92,16 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
     arrived = np.clip(train.command.apply(drives.duties, memory.command)[0], -1.0, 1.0)
     episode, start = drives.episode[begin], drives.first[begin]
     ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
+    whole = train.actuation.apply(arrived, memory.actuation)[0]
     if drives.wheels is None:
-        wheels = train.actuation.apply(arrived, memory.actuation)[0][episode[:, None], ticks]
+        wheels = whole[episode[:, None], ticks]
     else:
         turning = replace(setting, rest=drives.wheels[episode, start])
         wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.begin(turning).actuation)[0]
-    ahead = replace(setting, rest=np.zeros((len(begin), 2)), headings=drives.poses[begin, 0, 2:])
-    twists, _ = train.motion.apply(train.ideal(wheels), train.begin(ahead).motion)
+    ahead = replace(setting, rest=np.zeros((len(begin), 3)), headings=drives.poses[begin, 0, 2:])
+    driven = replace(setting, rest=np.zeros((len(whole), 3)))
+    past = train.motion.begin_amid(ahead, driven, train.ideal(whole), episode, start)
+    twists, _ = train.motion.apply(train.ideal(wheels), past)
     return _seen(drives, twists, measurement)
 
 

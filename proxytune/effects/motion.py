@@ -132,16 +132,13 @@ class FloorSlope:
 
     def begin(self, setting: Setting) -> Bearing:
         """With the headings that are known beforehand."""
-        known = np.asarray(setting.headings, dtype=float)
-        shape = np.broadcast_shapes(known.shape[:-1], np.shape(setting.rest)[:-1])
-        known = np.broadcast_to(known, (*shape, known.shape[-1]))
-        return Bearing(known, 0, known[..., :1], setting.rate_hz)
+        return bearing(setting)
 
     def apply(self, signal: Signal, memory: Bearing) -> tuple[Signal, Bearing]:
         """Slow the robot down by the slope along its heading at the start of each sample."""
         forward = signal[..., 0]
-        headings, after = _headings(signal[..., 2], memory)
-        slope = self.x * np.cos(headings) + self.y * np.sin(headings)
+        course, after = headings(signal[..., 2], memory)
+        slope = self.x * np.cos(course) + self.y * np.sin(course)
         slowed = forward - slope * np.minimum(1.0, np.abs(forward) / REST_SPEED)
         return _moved(slowed, signal[..., 1], signal[..., 2]), after
 
@@ -150,7 +147,15 @@ REST_SPEED = 0.02
 """Below this forward speed [m/s] static friction takes up more and more of the slope."""
 
 
-def _headings(yaw: Signal, memory: Bearing) -> tuple[Signal, Bearing]:
+def bearing(setting: Setting) -> Bearing:
+    """The bearing before the first sample."""
+    known = np.asarray(setting.headings, dtype=float)
+    shape = np.broadcast_shapes(known.shape[:-1], np.shape(setting.rest)[:-1])
+    known = np.broadcast_to(known, (*shape, known.shape[-1]))
+    return Bearing(known, 0, known[..., :1], setting.rate_hz)
+
+
+def headings(yaw: Signal, memory: Bearing) -> tuple[Signal, Bearing]:
     """Headings at the start of each sample: known ones, and beyond them those that the yaw rate leads to."""
     length = yaw.shape[-1]
     known = memory.known[..., memory.next : memory.next + length]

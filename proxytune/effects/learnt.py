@@ -109,20 +109,16 @@ class Learnt:
             load=before(asked.loads),
         )
 
-    def features(self, signal: Signal, memory: Past) -> list[Signal]:
-        """What one unit of each weight of each curve adds to the twist (…, time, 3, knots), curve by curve.
+    def features(self, signal: Signal, memory: Past) -> list[tuple[Signal, Signal]]:
+        """What each weight adds, curve by curve: its features (…, time, knots) and the twist of one unit (3,).
 
         The heading is taken from what is known beforehand and from the twist that is asked for.
         """
         asked, _ = self._asked(signal, memory)
         course, _ = headings(signal[..., 2], memory.bearing)
         asked = asked._replace(heading=course)
-        found = []
-        for curve in self.curves:
-            channel = GROUPS[curve.group].channels[curve.channel]
-            basis = channel.basis(asked, curve.knots)
-            found.append(basis[..., None, :] * _direction(channel.to, memory.baseline)[:, None])
-        return found
+        channels = [(curve, GROUPS[curve.group].channels[curve.channel]) for curve in self.curves]
+        return [(one.basis(asked, curve.knots), _direction(one.to, memory.baseline)) for curve, one in channels]
 
     def _added(self, asked: Asked, baseline: float, *, of_heading: bool) -> Signal:
         added = np.zeros((*asked.forward.shape, 3))

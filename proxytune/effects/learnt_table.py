@@ -54,7 +54,7 @@ def learnt_effect(theta: Theta) -> Learnt | None:
             found.setdefault((group, channel), {})[_knot(name, knot)] = value
     ends = [bounds.get(f"{channel}@{end}", math.nan) for channel in Seen._fields for end in ("low", "high")]
     curves = [
-        Curve(group, channel, tuple(sorted(values)), tuple(values[knot] for knot in sorted(values)))  # type: ignore[type-var]
+        Curve(group, channel, tuple(sorted(values)), tuple(values[knot] for knot in sorted(values)))
         for (group, channel), values in found.items()
     ]
 
@@ -148,7 +148,7 @@ def _check_knots(curve: Curve, where: str, group: Group, problem: Callable[[str,
             raise problem(where, "0 is no knot: nothing is added there; take it out")
         if group.low is not None and values[0] < group.low:
             raise problem(where, f"must be at least {group.low:g} {group.unit}, got {values[0]:g}")
-    if list(curve.knots) != sorted(set(curve.knots)):  # type: ignore[type-var]
+    if list(curve.knots) != sorted(set(curve.knots)):
         raise problem(where, "must be in ascending order, each once")
 
 

@@ -141,7 +141,10 @@ def test_features_times_weights_are_what_is_added_where_headings_are_known(effec
     known = np.linspace(0.0, 3.0, 91)
     memory = effect.begin(Setting(RATE_HZ, np.zeros((1, 3)), ROBOT.figures, headings=known))
     parts = effect.features(signal, memory)
-    total = sum(part @ np.array(curve.weights) for part, curve in zip(parts, effect.curves, strict=True))
+    total = sum(
+        (basis @ np.array(curve.weights))[..., None] * unit
+        for (basis, unit), curve in zip(parts, effect.curves, strict=True)
+    )
     np.testing.assert_allclose(effect.apply(signal, memory)[0] - signal, total, rtol=0, atol=1e-12)
 
 

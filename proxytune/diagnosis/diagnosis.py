@@ -10,6 +10,7 @@ from proxytune.diagnosis.confirmation import bullet_strays, has_body
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit, intervals, seen
 from proxytune.diagnosis.innovations import Noise
+from proxytune.diagnosis.learning import Learning, learn
 from proxytune.diagnosis.manoeuvres import Manoeuvre, next_manoeuvre
 from proxytune.diagnosis.plausible import check_clocks, check_motion, check_units
 from proxytune.diagnosis.search import Adopted, Found, Told, search
@@ -87,13 +88,14 @@ class Diagnosis:
         declared: Declared parameters, fitted without any other effect, by name in θ.
         theta: All parameters of the extended model, by name in θ.
         effects: The effects that were added.
-        residual_depends_on: Signals that explain what no named effect does.
+        residual_depends_on: Signals that explain what no named effect does, those of the learnt remainder first.
         errors: On the planar plant, by horizon, shortest first.
         confirmed: The error over 2 s on the bullet plant, None where the robot has no body for it.
         could_not_be_seen: Effects that these drives could not have shown.
         manoeuvre: What to drive to tell rivals apart, or None.
         parts: The drives that were fitted and tested.
         found: What the search came to.
+        learning: What was learnt beside the named effects, and what that is worth.
     """
 
     log: str
@@ -109,6 +111,7 @@ class Diagnosis:
     manoeuvre: Manoeuvre | None
     parts: Parts
     found: Found
+    learning: Learning
 
     @property
     def noise(self) -> Noise:
@@ -146,6 +149,8 @@ def diagnose(
     check_units(log.name, parts.fitted, start)
     check_clocks(log.name, parts.fitted, start)
     found = search(parts.fitted, start, names, seed, told)
+    told("learning what no named effect explains")
+    learning = learn(found, parts.tested, HORIZONS_S)
     told("testing on drives kept aside")
     errors = tuple(error for h in HORIZONS_S if (error := _error(found, parts.tested, h, seed)) is not None)
     if not errors:
@@ -153,17 +158,18 @@ def diagnose(
     return Diagnosis(
         log=log.name,
         robot=robot,
-        verdict=_verdict(found),
+        verdict=_verdict(found, learning),
         declared=estimates(found.declared, ()),
         theta=estimates(found.model, found.adopted),
         effects=found.adopted,
-        residual_depends_on=tuple(curve.group.name for curve in found.remainder),
+        residual_depends_on=learning.depends_on(curve.group.name for curve in found.remainder),
         errors=errors,
         confirmed=_confirmed(found, parts.tested, seed, told),
         could_not_be_seen=unseen(found.model, set(map(effect_of, names)) | {effect.effect for effect in found.adopted}),
         manoeuvre=next_manoeuvre(found),
         parts=parts,
         found=found,
+        learning=learning,
     )
 
 
@@ -198,8 +204,8 @@ def estimates(fitted: Fit, adopted: Iterable[Adopted]) -> dict[str, Estimate]:
     }
 
 
-def _verdict(found: Found) -> str:
-    if found.remainder:
+def _verdict(found: Found, learning: Learning) -> str:
+    if found.remainder or learning.remainder.used:
         return "partly explained" if found.adopted else "unexplained"
     return "explained" if found.adopted else "nothing missing"
 

@@ -8,6 +8,7 @@ import numpy as np
 from proxytune.diagnosis.drives import Drives, Floats, Whole
 from proxytune.diagnosis.group_choice import Choice, Sums, choose, sums
 from proxytune.diagnosis.offers import offered
+from proxytune.diagnosis.window_slopes import HORIZON_S as FITTED_S
 from proxytune.diagnosis.window_slopes import slopes_of
 from proxytune.diagnosis.windows import Rmse, Windows, cut, ratio, strays
 from proxytune.effects.features import GROUPS
@@ -43,12 +44,14 @@ class Remainder:
         share: The share of each chosen group, by its title, in what is gained on blocks that are left out.
         guard: By horizon, the error with it over that without, each block predicted by a fit to others.
         used: Whether the guard lets it in.
+        held_out: Squared distance at the poses of windows of FITTED_S, predicted by fits to other blocks (M,) [m²].
     """
 
     theta: Mapping[str, float] = field(default_factory=dict)
     share: Mapping[str, float] = field(default_factory=dict)
     guard: Mapping[float, Rmse] = field(default_factory=dict)
     used: bool = False
+    held_out: Floats = field(default_factory=lambda: np.empty(0))
 
 
 def remainder(drives: Drives, theta: Theta) -> Remainder:
@@ -58,16 +61,19 @@ def remainder(drives: Drives, theta: Theta) -> Remainder:
         drives: What the model was fitted to.
         theta: The model.
     """
+    windows = cut(drives, FITTED_S)
+    before = strays(drives, theta, windows)[:, 0] ** 2
     blocks = int(drives.block.max()) + 1
     if blocks < FEWEST_PARTS:
-        return Remainder()
+        return Remainder(held_out=before)
     whole, folds = _fitted(drives, theta, min(PARTS, blocks))
     if not whole.gains:
-        return Remainder()
+        return Remainder(held_out=before)
     guard = _guard(drives, theta, folds)
     total = sum(whole.gains.values())
     share = {GROUPS[group].title: gain / total for group, gain in whole.gains.items()}
-    return Remainder(whole.theta, share, guard, _helps(guard))
+    after = _crossed(drives, theta, folds, windows)
+    return Remainder(whole.theta, share, guard, _helps(guard), after)
 
 
 @dataclass(frozen=True)
@@ -125,13 +131,14 @@ def _guard(drives: Drives, theta: Theta, folds: list[_Fitted]) -> dict[float, Rm
         blocks = drives.block[windows.begin][windows.window]
         if len(np.unique(blocks)) >= FEWEST_PARTS:
             before = strays(drives, theta, windows)[:, 0] ** 2
-            after = _crossed(drives, theta, folds, windows, min(PARTS, int(drives.block.max()) + 1))
+            after = _crossed(drives, theta, folds, windows)
             found[horizon_s] = ratio(after, before, blocks)
     return found
 
 
-def _crossed(drives: Drives, theta: Theta, folds: list[_Fitted], windows: Windows, parts: int) -> Floats:
+def _crossed(drives: Drives, theta: Theta, folds: list[_Fitted], windows: Windows) -> Floats:
     """Squared distance at every compared pose (M,), each predicted by the fit that left its block out."""
+    parts = min(PARTS, int(drives.block.max()) + 1)
     squares = np.empty(len(windows.increment))
     fold_of = (drives.block[windows.begin] % parts) % FOLDS
     for number, fold in enumerate(folds):

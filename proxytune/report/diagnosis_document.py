@@ -13,6 +13,7 @@ from proxytune.diagnosis.search import Adopted
 from proxytune.driving.robot import robot_names
 from proxytune.effects import CATALOGUE, Model, model_text, theta_names
 from proxytune.logs import GEOMETRY
+from proxytune.report.learnt_document import learnt_document, learnt_notes
 
 HORIZON_S = 2.0
 """The horizon of the one error that stands for all."""
@@ -40,6 +41,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "signals": [{"name": curve.group.name, "held_out_gain": curve.gain} for curve in diagnosis.found.curves],
         "residual_depends_on": list(diagnosis.residual_depends_on),
+        "learnt": learnt_document(diagnosis.learning),
         "error": _error(_main_error(diagnosis)),
         "errors": [_error(error) for error in diagnosis.errors],
         "error_on_bullet": _error(diagnosis.confirmed) if diagnosis.confirmed else None,
@@ -108,7 +110,7 @@ def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 def model_file(diagnosis: Diagnosis) -> str:
     """The extended model as model.toml."""
-    theta = {name: estimate.value for name, estimate in diagnosis.theta.items()}
+    theta = {name: estimate.value for name, estimate in diagnosis.theta.items()} | dict(diagnosis.learning.theta)
     bounds = {name: estimate.interval for name, estimate in diagnosis.theta.items()}
     known = diagnosis.robot.name in robot_names()
     geometry = {} if known else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
@@ -186,6 +188,7 @@ def _notes(diagnosis: Diagnosis) -> list[str]:
         notes.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; look at the heading")
     if diagnosis.residual_depends_on:
         notes.append(f"not explained by any named effect; it depends on: {', '.join(diagnosis.residual_depends_on)}")
+    notes += learnt_notes(diagnosis.learning)
     if diagnosis.could_not_be_seen:
         notes.append(f"could not have been seen in these drives: {', '.join(diagnosis.could_not_be_seen)}")
     if diagnosis.manoeuvre is not None:

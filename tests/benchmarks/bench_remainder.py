@@ -3,8 +3,8 @@
     python tests/benchmarks/bench_remainder.py [--episodes N] [--seconds S] [--names] CASE …
     python tests/benchmarks/bench_remainder.py [--names] FOLDER …
 
-A CASE is one of tests/diagnosis/hidden.py ("outside", "clean" and "in form" stand for many), a FOLDER is a log's. Without
-`--names` the search for named effects is left out: the remainder is learnt beside what is declared alone.
+A CASE is one of tests/diagnosis/hidden.py ("outside", "clean" and "in form" stand for many), a FOLDER is a log's.
+Without `--names` the search for named effects is left out: the remainder is learnt beside what is declared alone.
 """
 
 import argparse

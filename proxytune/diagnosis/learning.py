@@ -7,9 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.drives import Drives
-from proxytune.diagnosis.remainder import FITTED_S, Remainder, remainder
+from proxytune.diagnosis.likeness import Likeness, likeness
+from proxytune.diagnosis.remainder import Remainder, remainder
 from proxytune.diagnosis.search import Found
+from proxytune.diagnosis.window_slopes import FITTED_S
 from proxytune.diagnosis.windows import Rmse, cut, ratio, rmse, strays
+from proxytune.effects import effect_of
 
 DOUBTFUL = 0.95
 """Names are doubtful if curves beside what is declared alone bring the error beneath this share of that with names."""
@@ -39,11 +42,13 @@ class Learning:
         remainder: The curves, beside all named effects.
         errors: What they are worth, by horizon, shortest first; empty where they are not used.
         names_doubtful: Whether curves beside what is declared alone predict clearly better: then the names are wrong.
+        looks_like: The named effect that would do nearly as well as the curves, or None.
     """
 
     remainder: Remainder
     errors: tuple[LearntError, ...]
     names_doubtful: bool
+    looks_like: Likeness | None = None
 
     @property
     def theta(self) -> Mapping[str, float]:
@@ -66,7 +71,10 @@ def learn(found: Found, tested: Drives, horizons_s: Iterable[float]) -> Learning
     """
     beside = remainder(found.model.drives, found.model.theta)
     errors = [_error(found, beside, tested, horizon_s) for horizon_s in horizons_s] if beside.used else []
-    return Learning(beside, tuple(error for error in errors if error is not None), _doubtful(found, beside))
+    told = tuple(error for error in errors if error is not None)
+    taken = {effect_of(name) for name in found.model.theta}
+    like = likeness(found.model.drives, found.model.theta, beside, taken) if beside.used else None
+    return Learning(beside, told, _doubtful(found, beside), like)
 
 
 def _error(found: Found, beside: Remainder, drives: Drives, horizon_s: float) -> LearntError | None:

@@ -8,8 +8,7 @@ import numpy as np
 from proxytune.diagnosis.drives import Drives, Floats, Whole
 from proxytune.diagnosis.group_choice import Choice, Sums, choose, sums
 from proxytune.diagnosis.offers import offered
-from proxytune.diagnosis.window_slopes import HORIZON_S as FITTED_S
-from proxytune.diagnosis.window_slopes import slopes_of
+from proxytune.diagnosis.window_slopes import FITTED_S, slopes_of
 from proxytune.diagnosis.windows import Rmse, Windows, cut, ratio, strays
 from proxytune.effects.features import GROUPS
 from proxytune.effects.learnt import Learnt

@@ -12,7 +12,7 @@ from proxytune.effects.learnt import Learnt
 from proxytune.effects.learnt_table import is_learnt
 from proxytune.space import Theta
 
-HORIZON_S = 2.0
+FITTED_S = 2.0
 """What is learnt is fitted to windows of this length [s]."""
 
 POSES = 8
@@ -38,11 +38,11 @@ class Slopes(NamedTuple):
 
 def compared(drives: Drives) -> Windows:
     """The windows and poses that are fitted."""
-    windows = cut(drives, HORIZON_S)
+    windows = cut(drives, FITTED_S)
     step = int(np.ceil(len(windows.begin) / MOST_WINDOWS))
     chosen = np.arange(len(windows.begin)) % step == 0
     tick = drives.last[windows.increment] - drives.first[windows.begin][windows.window]
-    part = windows.window * POSES + np.minimum(POSES - 1, tick * POSES // (HORIZON_S * drives.tick_hz)).astype(int)
+    part = windows.window * POSES + np.minimum(POSES - 1, tick * POSES // (FITTED_S * drives.tick_hz)).astype(int)
     last = np.concatenate((part[1:] != part[:-1], [True]))
     kept = np.flatnonzero(last & chosen[windows.window])
     number = np.cumsum(chosen) - 1

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from proxytune.diagnosis.learning import Learning
+from proxytune.diagnosis.likeness import Likeness
 from proxytune.diagnosis.windows import Rmse
 
 
@@ -30,7 +31,14 @@ def learnt_document(learning: Learning) -> dict[str, Any]:
             for error in learning.errors
         ],
         "names_doubtful": learning.names_doubtful,
+        "looks_like": _likeness(learning.looks_like),
     }
+
+
+def _likeness(like: Likeness | None) -> dict[str, Any] | None:
+    if like is None:
+        return None
+    return {"name": like.effect, "form": like.form, "values": dict(like.theta), "share": like.share}
 
 
 def _ratios(found: Mapping[float, Rmse]) -> dict[str, dict[str, Any]]:
@@ -51,6 +59,12 @@ def learnt_notes(learning: Learning) -> list[str]:
         notes.append(f"learnt, not physics: curves over {curves}; error with them after {worth}")
     elif beside.theta:
         notes.append(f"curves over {curves} were tried and left out: they are not shown to help on drives left out")
+    if learning.looks_like is not None:
+        like = learning.looks_like
+        values = ", ".join(f"{name} {value:.3g}" for name, value in like.theta.items())
+        notes.append(
+            f"the curves look like {like.effect} ({values}), which alone keeps {100.0 * like.share:.0f} % of it"
+        )
     if learning.names_doubtful:
         notes.append(
             "beware: curves beside what is declared alone predict better than beside the named effects; the names are "

@@ -11,7 +11,10 @@ def learnt(*curves):
 
 
 TURNING = learnt(("turn_rate", "yaw", (-2.0, -0.5, 0.5, 2.0), (0.5, 0.3, -0.3, -0.5)))
-"""The robot turns too little, most of all slowly: no named effect of the catalogue does so."""
+"""The robot turns too little, most of all slowly: more or less a yaw scrub."""
+
+VEERING = learnt(("turn_rate", "yaw", (-2.0, -0.5, 0.5, 2.0), (0.3, 0.5, 0.5, 0.3)))
+"""The robot veers to the left whichever way it turns: no named effect does so."""
 
 MANY = learnt(
     ("transients", "left", (0.1, 0.5), (0.3, -0.2)),

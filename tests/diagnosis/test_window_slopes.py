@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import MANY, TURNING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.window_slopes import HORIZON_S, POSES, compared, slopes_of
+from proxytune.diagnosis.window_slopes import FITTED_S, POSES, compared, slopes_of
 from proxytune.effects.learnt_table import learnt_effect
 
 SIZE = 1e-4
@@ -47,5 +47,5 @@ def test_windows_are_thinned_to_a_few_poses_that_reach_their_end(drives):
     counts = np.bincount(windows.window)
     assert counts.max() == POSES
     lasts = (drives.last[windows.increment] - drives.first[windows.begin][windows.window]) / drives.tick_hz
-    assert lasts.max() == HORIZON_S
+    assert lasts.max() == FITTED_S
     assert np.all(np.diff(lasts)[np.diff(windows.window) == 0] > 0.0)

@@ -3,6 +3,7 @@
 import json
 
 from proxytune.diagnosis.learning import Learning, LearntError
+from proxytune.diagnosis.likeness import Likeness
 from proxytune.diagnosis.remainder import Remainder
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.learnt_document import learnt_document, learnt_notes
@@ -46,3 +47,10 @@ def test_what_was_tried_and_left_out_is_told_and_doubtful_names_are_warned_of():
 
 def test_nothing_is_said_where_nothing_was_found():
     assert learnt_notes(Learning(Remainder(), (), False)) == []
+
+
+def test_a_name_that_would_do_as_well_is_told():
+    like = Learning(USED.remainder, USED.errors, False, Likeness("turn_slip", "", {"turn_slip": 0.1}, 0.93))
+    assert learnt_notes(like)[1] == "the curves look like turn_slip (turn_slip 0.1), which alone keeps 93 % of it"
+    assert learnt_document(like)["looks_like"]["share"] == 0.93
+    assert learnt_document(USED)["looks_like"] is None

@@ -1,7 +1,7 @@
 """A learnt shape read back into a name: the named effect that does to the windows what the curves do."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
@@ -76,10 +76,10 @@ def _tuned(
     low, high = np.array([span(coordinate) for coordinate in form.free]).T
     start = (probe - low) / (high - low)
     simplex = np.vstack((start, start + np.eye(len(start)) * np.where(start < 0.9, 0.1, -0.1)))
-    found = minimize(
-        lambda shares: loss(form, low + shares * (high - low)),
-        start,
-        method="Nelder-Mead",
-        options={"initial_simplex": simplex, "maxfev": EVALUATIONS},
-    )
+
+    def left(shares: Floats, *_: Any, **__: Any) -> float:
+        return loss(form, low + shares * (high - low))
+
+    options: Any = {"initial_simplex": simplex, "maxfev": EVALUATIONS}
+    found = minimize(left, start, method="Nelder-Mead", options=options)
     return float(found.fun), form, np.clip(low + found.x * (high - low), low, high)

@@ -67,7 +67,8 @@ def _draw(axes: Axes, effect: Learnt, curve: Curve) -> None:
         _surface(axes, curve, factor, label)
     else:
         _line(axes, curve, factor)
-        axes.set_xlabel(f"{group.title} [{'deg' if curve.group == HEADING else group.unit}]", fontsize=8)
+        of = f"{group.title}, time constant" if curve.group in BY_TIME_CONSTANT else group.title
+        axes.set_xlabel(f"{of} [{'deg' if curve.group == HEADING else group.unit}]", fontsize=8)
         axes.set_ylabel(label, fontsize=8)
         axes.axhline(0.0, color=GREY, lw=0.6)
     if curve.group == "turn_rate":
@@ -80,6 +81,8 @@ def _line(axes: Axes, curve: Curve, factor: float) -> None:
     knots, weights = np.array(curve.knots), factor * np.array(curve.weights)
     if curve.group in BY_TIME_CONSTANT:
         axes.set_xscale("log")
+        axes.set_xticks(knots, [f"{knot:g}" for knot in knots])
+        axes.set_xticks([], minor=True)
         axes.vlines(knots, 0.0, weights, color=BLUE, lw=1.0)
         axes.plot(knots, weights, "o", color=BLUE, ms=4)
         return

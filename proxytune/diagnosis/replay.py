@@ -103,7 +103,7 @@ def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Fl
         wheels = whole[episode[:, None], ticks]
     else:
         turning = replace(setting, rest=drives.wheels[episode, start])
-        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.begin(turning).actuation)[0]
+        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
     ahead = _ahead(drives, begin)
     driven = replace(setting, rest=np.zeros((len(whole), 3)))
     past = train.motion.begin_amid(ahead, driven, train.ideal(whole), episode, start)

@@ -68,13 +68,16 @@ Strays = Callable[[Drives, Theta, Windows], Floats]
 """How far a model's poses are from measured ones (M, 2): [m], [rad]."""
 
 
-def horizon_error(found: Found, tested: KeptAside, horizon_s: float, how: Strays = strays) -> HorizonError | None:
+def horizon_error(
+    found: Found, tested: KeptAside, horizon_s: float, learnt: Theta, how: Strays = strays
+) -> HorizonError | None:
     """The error at a horizon, None where too few blocks have a window of it.
 
     Args:
         found: The models.
         tested: What they are tested on.
         horizon_s: Length of the windows [s].
+        learnt: What the extended model was taught besides its named effects; empty where nothing was.
         how: How a plant's poses are compared with measured ones.
     """
     drives = tested.drives
@@ -84,7 +87,10 @@ def horizon_error(found: Found, tested: KeptAside, horizon_s: float, how: Strays
     blocks = blocks_of(drives, windows)
     before, after = (how(drives, fitted.theta, windows) ** 2 for fitted in (found.declared, found.model))
     lower, turn = noise_floor(drives, windows, tested.noise)
-    others = [strays(drives, one.beside.theta, windows) ** 2 for one in found.immaterial]
+    besides = [one.beside.theta for one in found.immaterial]
+    if learnt:
+        besides.append({**found.model.theta, **learnt})
+    others = [strays(drives, theta, windows) ** 2 for theta in besides]
     reached = min(float(np.sqrt(squares[:, 0].mean())) for squares in (before, after, *others))
     return HorizonError(
         horizon_s=horizon_s,

@@ -9,6 +9,7 @@ from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
 from proxytune.driving.drivetrain import Drivetrain, drivetrain
 from proxytune.driving.planar import integrate
 from proxytune.effects import CATALOGUE, PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.effects.learnt import Learnt
 from proxytune.effects.trace import Draws
 from proxytune.space import Theta
 
@@ -89,26 +90,57 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
         begin: The increments at whose beginnings the windows start (W,).
         length: Ticks to go on for; commands after an episode's end are those at its end.
     """
-    train, measurement = _model(drives, theta)
+    return _seen(drives, window_twists(drives, theta, begin, length), _model(drives, theta)[1])
+
+
+def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
+    """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s]."""
+    train, _ = _model(drives, theta)
     setting = _setting(drives)
     memory = train.begin(setting)
     arrived = np.clip(train.command.apply(drives.duties, memory.command)[0], -1.0, 1.0)
     episode, start = drives.episode[begin], drives.first[begin]
     ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
+    whole = train.actuation.apply(arrived, memory.actuation)[0]
     if drives.wheels is None:
-        wheels = train.actuation.apply(arrived, memory.actuation)[0][episode[:, None], ticks]
+        wheels = whole[episode[:, None], ticks]
     else:
         turning = replace(setting, rest=drives.wheels[episode, start])
-        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.begin(turning).actuation)[0]
-    ahead = replace(
-        setting,
-        rest=_before(drives, theta, train)[episode, start],
+        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
+    ahead = _ahead(drives, begin, _before(drives, theta, train))
+    driven = replace(setting, rest=np.zeros((len(whole), 3)))
+    past = train.motion.begin_amid(ahead, driven, train.ideal(whole), episode, start)
+    return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
+
+
+def window_features(
+    drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
+) -> list[tuple[Floats, Floats]]:
+    """What each weight of a learnt effect beside a model adds to its motion in such windows, curve by curve.
+
+    Returns:
+        Features (W, length, knots) and the twist that one unit of them makes (3,).
+    """
+    whole = twists_of(drives, theta)
+    past = learnt.recall(_ahead(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
+    return learnt.features(window_twists(drives, theta, begin, length), past)
+
+
+def tracked(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+    """Measured poses, from the origin on, that twists lead to (W, length + 1, 3)."""
+    return _seen(drives, twists, _model(drives, theta)[1])
+
+
+def _ahead(drives: Drives, begin: Whole, before: Floats) -> Setting:
+    """What the motion effects of windows are told: the motion before each one, where it is, and how its wheels are."""
+    episode, start = drives.episode[begin], drives.first[begin]
+    return replace(
+        _setting(drives),
+        rest=before[episode, start],
         headings=drives.poses[begin, 0, 2:],
         places=drives.poses[begin, :1, :2],
         angles=drives.angles[episode, start][:, None],
     )
-    twists, _ = train.motion.apply(train.ideal(wheels), train.motion.begin(ahead))
-    return _seen(drives, twists, measurement)
 
 
 def _before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:

@@ -10,6 +10,7 @@ from proxytune.effects.effect import Effect
 from proxytune.effects.floor import FloorSlope, SlipperyPatch
 from proxytune.effects.friction import Backlash, DeadBand, Stiction
 from proxytune.effects.image import Blur
+from proxytune.effects.learnt_table import is_learnt, learnt_effect
 from proxytune.effects.load import SlewRate, ThermalFade
 from proxytune.effects.measurement import HeadingOffset, MarkerOffset
 from proxytune.effects.messages import DelayJitter, DroppedCommands
@@ -84,18 +85,22 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
 def effects_from(theta: Theta, nominal: Mapping[str, float]) -> tuple[Effect, ...]:
     """The effects that θ names, in the catalogue's order; parameters of theirs that it leaves out are neutral.
 
+    What was learnt comes last: it looks at the motion that all named effects ask for.
+
     Raises:
         SettingsError: If a name is not a parameter of the catalogue or its value is out of bounds.
     """
     for name, value in theta.items():
-        _check(name, value)
-    chosen = []
+        if not is_learnt(name):
+            _check(name, value)
+    chosen: list[Effect] = []
     for effect in _ALL:
         names = theta_names(effect)
         if any(name in theta for name in names):
             pairs = zip(names, effect.parameters, strict=True)
             chosen.append(effect(*(float(theta.get(n, p.neutral_value(nominal))) for n, p in pairs)))
-    return tuple(chosen)
+    learnt = learnt_effect(theta)
+    return tuple(chosen) if learnt is None else (*chosen, learnt)
 
 
 def _check(name: str, value: float) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,4 +80,13 @@ class Effect(Protocol):
 
     def apply(self, signal: Signal, memory: Memory) -> tuple[Signal, Memory]:
         """Filter the next chunk, shape (…, time, channels), and give the memory for the one after."""
+        ...
+
+
+@runtime_checkable
+class Recalling(Protocol):
+    """An effect for which it matters what came before a window that begins amid a drive."""
+
+    def recall(self, setting: Setting, signal: Signal, row: Signal, sample: Signal) -> Memory:
+        """The memory as of a sample (W,) of a row (W,) of longer signals (rows, time, channels)."""
         ...

@@ -18,6 +18,7 @@ from proxytune.effects import CATALOGUE, Model, model_text, theta_names
 from proxytune.logs import GEOMETRY
 from proxytune.report.clocks_document import clocks_document
 from proxytune.report.diagnosis_notes import decisive, headline, may_matter, notes, per_cent
+from proxytune.report.learnt_document import learnt_document
 from proxytune.report.likeness_document import unlike_document
 
 
@@ -38,6 +39,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "signals": [{"name": curve.group.name, "held_out_gain": curve.gain} for curve in diagnosis.found.curves],
         "residual_depends_on": list(diagnosis.residual_depends_on),
         "error": _error(main_error(diagnosis.errors)),
+        "learnt": learnt_document(diagnosis.learning),
         "errors": [_error(error) for error in diagnosis.errors],
         "error_on_bullet": _error(diagnosis.confirmed) if diagnosis.confirmed else None,
         "fitted_to_windows": _polish(diagnosis),
@@ -144,7 +146,7 @@ def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 def model_file(diagnosis: Diagnosis) -> str:
     """The extended model as model.toml."""
-    theta = {name: estimate.value for name, estimate in diagnosis.theta.items()}
+    theta = {name: estimate.value for name, estimate in diagnosis.theta.items()} | dict(diagnosis.learning.theta)
     bounds = {name: estimate.interval for name, estimate in diagnosis.theta.items()}
     known = diagnosis.robot.name in robot_names()
     geometry = {} if known else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}

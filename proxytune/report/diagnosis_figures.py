@@ -13,6 +13,7 @@ from proxytune.diagnosis.search import LEAST_GAIN, P_VALUE, Tried
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.diagnosis_effect import effect_curve
 from proxytune.report.diagnosis_residual import residual_map, residual_over_time, strayed
+from proxytune.report.learnt_figure import learnt_figure
 from proxytune.report.style import (
     BEFORE,
     BLUE,
@@ -55,7 +56,8 @@ SIGNAL = _Role("any curve over this signal", PURPLE, PURPLE)
 def diagnosis_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
     """Draw everything that a diagnosis has to show, by the name of the figure.
 
-    What has nothing to show is left out: the curve of an effect where none was added and no signal explains anything.
+    What has nothing to show is left out: the curve of an effect where none was added and no signal explains anything,
+    the learnt curves where none are used.
     """
     both = strayed(diagnosis)
     figures = {
@@ -63,6 +65,7 @@ def diagnosis_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
         "residual_map": residual_map(diagnosis.parts.tested, both),
         "ranking": _ranking(diagnosis),
         "effect_curve": effect_curve(diagnosis),
+        "learnt": learnt_figure(diagnosis.learning),
         "error": _errors(diagnosis),
     }
     return {name: figure for name, figure in figures.items() if figure is not None}

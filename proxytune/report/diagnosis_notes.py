@@ -5,6 +5,7 @@ from proxytune.diagnosis.materiality import MATERIAL, Worth
 from proxytune.diagnosis.search import Adopted
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.clocks_document import clocks_notes
+from proxytune.report.learnt_document import learnt_notes
 from proxytune.report.likeness_document import unlike_notes
 from proxytune.report.numbers import fixed, listed
 
@@ -32,6 +33,7 @@ def notes(diagnosis: Diagnosis) -> list[str]:
     lines += _cautions(diagnosis)
     if diagnosis.residual_depends_on:
         lines.append(f"not explained by any named effect; it depends on: {', '.join(diagnosis.residual_depends_on)}")
+    lines += learnt_notes(diagnosis.learning)
     if diagnosis.could_not_be_seen:
         lines.append(f"could not have been seen in these drives: {', '.join(diagnosis.could_not_be_seen)}")
     return lines + _next(diagnosis)

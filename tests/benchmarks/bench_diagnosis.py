@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from proxytune.diagnosis.diagnosis import diagnose
+from proxytune.diagnosis.diagnose import diagnose
 from proxytune.diagnosis.drives import gather
 from proxytune.diagnosis.innovations import FIRST_GUESS, fit_noise, whitener
 from proxytune.diagnosis.replay import increments

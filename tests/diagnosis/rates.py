@@ -13,7 +13,8 @@ from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, Case, make_log
 import proxytune.diagnosis.diagnosis as diagnosing
 import proxytune.diagnosis.search as searching
 from proxytune.diagnosis.candidates import Candidate, candidates
-from proxytune.diagnosis.diagnosis import Diagnosis, declared_effects, diagnose
+from proxytune.diagnosis.diagnose import declared_effects, diagnose
+from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.drives import Drives, relative
 from proxytune.diagnosis.events import RandomEffect, random_effects
 from proxytune.diagnosis.fitting import Fit

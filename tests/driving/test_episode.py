@@ -260,3 +260,24 @@ def test_the_same_commands_look_different_through_another_camera(tmp_path):
 
 def test_camera_effects_are_those_of_the_camera_stage():
     assert sum(effect.stage is Stage.CAMERA for effect in CATALOGUE.values()) == 6
+
+
+LEARNT = """
+format = 1
+robot = "duckiebot"
+[effects.learnt.range]
+forward = [-0.6, 0.6]
+yaw = [-4, 4]
+[effects.learnt.wheel_speed]
+knots = [0.2, 0.5]
+left = [-0.05, -0.1]
+"""
+
+
+@pytest.mark.parametrize("plant", ["bullet", "planar"])
+def test_a_proxy_drives_what_its_model_has_learnt(tmp_path, plant):
+    model = tmp_path / "model.toml"
+    model.write_text(LEARNT)
+    plain, learnt = (family(tmp_path, plant=plant, seconds=1.5, model=one) for one in (None, model))
+    assert learnt.identity != plain.identity
+    assert np.hypot(*(poses(learnt)[-1] - poses(plain)[-1])[:2]) > 0.01

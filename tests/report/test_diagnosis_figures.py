@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 import hidden
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS, candidates
-from proxytune.diagnosis.diagnosis import diagnose
+from proxytune.diagnosis.diagnose import diagnose
 from proxytune.diagnosis.innovations import huber
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, disturbed, increments
 from proxytune.diagnosis.search import LEAST_GAIN, Adopted

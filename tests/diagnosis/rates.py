@@ -10,7 +10,7 @@ import numpy as np
 from bullet_truth import BULLET, BulletCase, make_bullet_log
 from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, Case, make_log
 
-import proxytune.diagnosis.diagnosis as diagnosing
+import proxytune.diagnosis.diagnose as diagnosing
 import proxytune.diagnosis.search as searching
 from proxytune.diagnosis.candidates import Candidate, candidates
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
@@ -57,6 +57,7 @@ class Row:
         evidence: Of the hidden effects, that of the weakest [nats]; the best of all effects where none is hidden.
         before: Error with what is declared [m].
         after: Error with what was added [m].
+        learnt: Error with what was learnt besides [m], NaN where nothing is.
         true: Error of the model that is right [m], NaN where there is none.
         floor: The noise floor that was told, its lower and upper end [m].
         immaterial: Effects that were found and do not matter.
@@ -70,6 +71,7 @@ class Row:
     evidence: float = 0.0
     before: float = np.nan
     after: float = np.nan
+    learnt: float = np.nan
     true: float = np.nan
     floor: tuple[float, float] = (np.nan, np.nan)
     immaterial: tuple[str, ...] = ()
@@ -101,7 +103,9 @@ class Row:
     def text(self) -> str:
         """One line of the table."""
         added = " + ".join(f"{names[0]}({'/'.join(names[1:])})" if names[1:] else names[0] for names in self.adopted)
-        errors = " ".join(f"{1e3 * value:.1f}" for value in (self.before, self.after, self.true, *self.floor))
+        errors = " ".join(
+            f"{1e3 * value:.1f}" for value in (self.before, self.after, self.learnt, self.true, *self.floor)
+        )
         name = self.job.case.name + (f" without {self.job.without}" if self.job.without else "")
         added += f"; immaterial: {', '.join(self.immaterial)}" if self.immaterial else ""
         rest = f" rest: {', '.join(self.depends_on)}" if self.depends_on else ""
@@ -148,6 +152,7 @@ def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
         evidence=_evidence(job, found),
         before=error.before.value,
         after=error.after.value,
+        learnt=_learnt_error(found),
         true=_true_error(job, found.parts.tested, episodes, seconds),
         floor=error.floor[:2],
         immaterial=tuple(one.effect for one in found.immaterial),
@@ -184,6 +189,11 @@ def _evidence(job: Job, found: Diagnosis) -> float:
     if not job.right or job.without:
         return max(gains.values(), default=0.0)
     return min(max(gains.get(name, 0.0) for name in names) for names in job.right)
+
+
+def _learnt_error(found: Diagnosis) -> float:
+    errors = found.learning.errors
+    return min(errors, key=lambda one: abs(one.horizon_s - HORIZON_S)).after.value if errors else float("nan")
 
 
 def _true_error(job: Job, tested: Drives, episodes: int, seconds: float) -> float:

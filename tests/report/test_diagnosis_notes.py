@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from proxytune.diagnosis.diagnosis import Estimate
+from proxytune.diagnosis.learning import Learning
 from proxytune.diagnosis.manoeuvres import LIBRARY, Manoeuvre
 from proxytune.diagnosis.polish import Polish
+from proxytune.diagnosis.remainder import Remainder
 from proxytune.diagnosis.search import Adopted
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.diagnosis_notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
@@ -23,6 +25,13 @@ MUCH = {2.0: Rmse(1.34, (1.2, 1.5))}
 def diagnosis(**changes):
     plain = {"log": "run", "verdict": "explained", "effects": (), "immaterial": (), "worth": {}, "polish": None}
     plain |= {"errors": (), "residual_depends_on": (), "could_not_be_seen": (), "manoeuvre": None}
+    plain |= {
+        "clocks": (),
+        "unlike": None,
+        "drive_names": (),
+        "learning": Learning(Remainder(), (), False),
+        "theta": {},
+    }
     plain |= {"dropped_values": {"lateral_slip": Estimate(0.0024, (0.0024, 0.0024), "s")}}
     return SimpleNamespace(**{**plain, **changes})
 

@@ -162,14 +162,22 @@ def predictive(fitted: Fit) -> Floats:
 
     Leaving a block out moves the parameters by one Newton step.
     """
-    shifted = left_out(fitted, fitted.slopes, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
+    sums = slopes_by_block(fitted, fitted.slopes)
+    shifted = left_out(fitted, fitted.slopes, sums, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
     loss = huber(shifted).reshape(-1, 3).sum(axis=1) + fitted.whiten.log_determinant
     return sum_by(fitted.drives.block, -loss, int(fitted.drives.block.max()) + 1)
 
 
-def left_out(fitted: Fit, columns: Floats, penalty: Floats) -> Floats:
-    """The innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it."""
-    pull, curve = slopes_by_block(fitted, columns)
+def left_out(fitted: Fit, columns: Floats, sums: tuple[Floats, Floats], penalty: Floats) -> Floats:
+    """The innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it.
+
+    Args:
+        fitted: What was fitted without the columns.
+        columns: Change of the innovations per unit of each weight.
+        sums: The blocks' slopes along the columns.
+        penalty: Curvature that pulls the weights to 0.
+    """
+    pull, curve = sums
     rest = curve.sum(axis=0) - curve + penalty
     moved = -np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
     own = np.repeat(moved[fitted.drives.block], 3, axis=0)

@@ -76,6 +76,8 @@ def effect_of(theta_name: str) -> str:
     return theta_name.split(".")[0]
 
 
+_NAMED: Mapping[type[Effect], tuple[str, ...]] = {effect: theta_names(effect) for effect in _ALL}
+
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
     {name: parameter for effect in _ALL for name, parameter in zip(theta_names(effect), effect.parameters, strict=True)}
 )
@@ -94,9 +96,8 @@ def effects_from(theta: Theta, nominal: Mapping[str, float]) -> tuple[Effect, ..
         if not is_learnt(name):
             _check(name, value)
     chosen: list[Effect] = []
-    for effect in _ALL:
-        names = theta_names(effect)
-        if any(name in theta for name in names):
+    for effect, names in _NAMED.items():
+        if not theta.keys().isdisjoint(names):
             pairs = zip(names, effect.parameters, strict=True)
             chosen.append(effect(*(float(theta.get(n, p.neutral_value(nominal))) for n, p in pairs)))
     learnt = learnt_effect(theta)

@@ -65,7 +65,7 @@ def driven(case: Case, course: drives.Course, level: float) -> Array:
         pose, twist = poses[:, step], twists[:, step]
         for effect, figures in places:
             twist = effect(twist, pose, step * run.step_s, **figures)
-        poses[:, step + 1] = _path(twist[:, None], pose, run)[:, 1]
+        poses[:, step + 1] = _moved(pose, twist, run)
     return poses[:, ::per_row]
 
 
@@ -132,3 +132,12 @@ def _path(twists: Array, starts: Array, run: Run) -> Array:
     places = (starts[:, :1] + 1j * starts[:, 1:2]) + np.cumsum(moved, axis=1)
     later = np.stack((places.real, places.imag, headings), axis=-1)
     return np.concatenate((starts[:, None], later), axis=1)
+
+
+def _moved(pose: Array, twist: Array, run: Run) -> Array:
+    """The same for one step (E, 3), the chord of its arc to a ten-thousandth of a millionth."""
+    forward, aside, turn = (twist * run.step_s).T
+    middle = pose[:, 2] + turn / 2.0 if run.exact else pose[:, 2]
+    chord = 1.0 - turn**2 / 24.0 if run.exact else 1.0
+    east, north = np.cos(middle) * chord, np.sin(middle) * chord
+    return pose + np.stack((forward * east - aside * north, forward * north + aside * east, turn), axis=1)

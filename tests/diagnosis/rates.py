@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from unittest import mock
 
 import numpy as np
-from bullet_truth import BULLET, BulletCase, make_bullet_log
-from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, Case, make_log
+from bullet_truth import BulletCase, make_bullet_log
+from rate_jobs import GENERATORS, Job
 
 import proxytune.diagnosis.diagnose as diagnosing
 import proxytune.diagnosis.search as searching
@@ -29,20 +29,6 @@ CLEAR = 30.0
 
 HORIZON_S = 2.0
 FLAGGED = ("partly explained", "unexplained")
-
-
-@dataclass(frozen=True)
-class Job:
-    """A case to diagnose; `without` is taken out of the catalogue."""
-
-    kind: str
-    case: Case | BulletCase
-    without: str = ""
-
-    @property
-    def right(self) -> tuple[tuple[str, ...], ...]:
-        """For every hidden effect, the names that count as right."""
-        return getattr(self.case, "right", ())
 
 
 @dataclass(frozen=True)
@@ -113,27 +99,6 @@ class Row:
         return f"{head} [{added}]{rest} {self.evidence:.0f} nats, mm: {errors} {self.problem}".rstrip()
 
 
-def all_jobs(every: int = 1) -> tuple[Job, ...]:
-    """Every n-th case of each kind, the kinds mixed so that any beginning has a share of each."""
-    whole = {
-        "in form": [Job("in form", case) for case in IN_FORM],
-        "other form": [Job("other form", case) for case in OTHER_FORM],
-        "pair": [Job("pair", case) for case in PAIRS],
-        "outside": [Job("outside", case) for case in OUTSIDE],
-        "taken out": [Job("taken out", case, case.right[0][0]) for case in IN_FORM],
-        "clean": [Job("clean", case) for case in CLEAN],
-        "bullet": [Job("bullet", case) for case in BULLET],
-    }
-    chosen = [_shuffled(jobs[::every]) for jobs in whole.values()]
-    placed = [((n + 0.5) / len(jobs), k, job) for k, jobs in enumerate(chosen) for n, job in enumerate(jobs)]
-    return tuple(job for _, _, job in sorted(placed, key=lambda entry: entry[:2]))
-
-
-def _shuffled(jobs: list[Job]) -> list[Job]:
-    """In an order of their own, so that neighbours do not hide the same effect."""
-    return [jobs[number] for number in np.random.default_rng(1).permutation(len(jobs))]
-
-
 def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
     """Diagnose one case."""
     robot = read_robot("duckiebot")
@@ -159,10 +124,12 @@ def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
     )
 
 
-def _log(job: Job, episodes: int, seconds: float) -> Log:
+def _log(job: Job, episodes: int, seconds: float, noiseless: bool = False) -> Log:
     if isinstance(job.case, BulletCase):
-        return make_bullet_log(job.case, episodes=episodes, seconds=seconds)
-    return make_log(job.case, episodes=episodes, seconds=seconds)
+        return make_bullet_log(job.case, episodes=episodes, seconds=seconds, noiseless=noiseless)
+    make_log = GENERATORS[job.generator].make_log
+    log: Log = make_log(job.case, episodes=episodes, seconds=seconds, noiseless=noiseless)
+    return log
 
 
 @contextmanager
@@ -200,7 +167,7 @@ def _true_error(job: Job, tested: Drives, episodes: int, seconds: float) -> floa
     """The error of the same windows when the hidden robot itself predicts, undisturbed; NaN where it draws."""
     if isinstance(job.case, BulletCase) or {name for names in job.right for name in names} & set(RANDOM_EFFECTS):
         return float("nan")
-    quiet = make_log(job.case, episodes=episodes, seconds=seconds, noiseless=True)
+    quiet = _log(job, episodes, seconds, noiseless=True)
     poses = np.stack([episode.poses for episode in quiet.episodes])[2::3]
     windows = cut(tested, HORIZON_S)
     ticks = round(tested.tick_hz / tested.rate_hz)

@@ -10,15 +10,17 @@ from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
 from proxytune.diagnosis.drives import gather
 from proxytune.diagnosis.fitting import Fit, intervals
 from proxytune.diagnosis.floor import pose_noise
+from proxytune.diagnosis.found import Adopted, Dropped, Found, Variant
 from proxytune.diagnosis.horizon_error import HorizonError, KeptAside, horizon_error
 from proxytune.diagnosis.learning import Learning, learn
 from proxytune.diagnosis.likeness import two_robots
 from proxytune.diagnosis.manoeuvres import next_manoeuvre
-from proxytune.diagnosis.materiality import Worth, without_immaterial, worth
+from proxytune.diagnosis.materiality import Worth, worth
+from proxytune.diagnosis.naming import name_effects
 from proxytune.diagnosis.plausible import check_motion, check_units
 from proxytune.diagnosis.polish import HORIZONS_S, Polish, polished
 from proxytune.diagnosis.rests import without_long_rests
-from proxytune.diagnosis.search import Adopted, Dropped, Found, Told, Variant, search
+from proxytune.diagnosis.search import Told, fit_declared
 from proxytune.diagnosis.split import Parts, all_drives, split
 from proxytune.diagnosis.verdict import verdict
 from proxytune.diagnosis.visibility import unseen
@@ -65,9 +67,8 @@ def diagnose(
     parts = split(log, robot, test, clocks)
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
-    found = search(parts.fitted, start, names, seed, told)
-    told("weighing what each effect is worth")
-    found = without_immaterial(found, seed)
+    told("fitting what is declared")
+    found = name_effects(fit_declared(parts.fitted, start, names), seed, told)
     told("fitting to windows of prediction")
     found, polishes = _polished(found)
     told("learning what no named effect explains")

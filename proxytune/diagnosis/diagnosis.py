@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from proxytune.diagnosis.clocks import Clocks
+from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.horizon_error import HorizonError
 from proxytune.diagnosis.innovations import Noise
 from proxytune.diagnosis.learning import Learning
@@ -11,13 +12,16 @@ from proxytune.diagnosis.likeness import Unlike
 from proxytune.diagnosis.manoeuvres import Manoeuvre
 from proxytune.diagnosis.materiality import Worth
 from proxytune.diagnosis.polish import Polish
-from proxytune.diagnosis.search import Adopted, Found
 from proxytune.diagnosis.split import Parts
 from proxytune.driving.robot import Robot
 from proxytune.effects import PARAMETERS
 
 MAIN_S = 2.0
 """The horizon of the one error that stands for all."""
+
+
+EDGE = 0.01
+"""A value this near to an end of its range, as a share of the range, is at the end."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,20 @@ class Diagnosis:
             for effect, beside in self.found.immaterial
             for name in effect.names
         }
+
+    def at_edge(self, effect: Adopted) -> tuple[str, ...]:
+        """Parameters of an effect, by name in θ, that were fitted to an end of their range which is not neutral.
+
+        The effect then stands for something else.
+        """
+        fitted = {name for coordinate in effect.free for name in coordinate}
+        return tuple(name for name in effect.names if name in fitted & set(self.theta) and self._at_edge(name))
+
+    def _at_edge(self, name: str) -> bool:
+        parameter, value = PARAMETERS[name], self.theta[name].value
+        reach = EDGE * (parameter.high - parameter.low)
+        ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(self.robot.figures)]
+        return any(abs(value - end) <= reach for end in ends)
 
     @property
     def noise(self) -> Noise:

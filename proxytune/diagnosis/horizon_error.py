@@ -8,9 +8,9 @@ import numpy as np
 
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.floor import PoseNoise, noise_floor
+from proxytune.diagnosis.found import Found
 from proxytune.diagnosis.polish import FEWEST_BLOCKS
 from proxytune.diagnosis.repeats import repeated
-from proxytune.diagnosis.search import Found
 from proxytune.diagnosis.verdict import Bracket, bracket
 from proxytune.diagnosis.windows import Rmse, Windows, blocks_of, cut, ratio, rmse, strays
 from proxytune.space import Theta

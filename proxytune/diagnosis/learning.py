@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.drives import Drives
+from proxytune.diagnosis.found import Found
 from proxytune.diagnosis.lookalike import Lookalike, lookalike
 from proxytune.diagnosis.remainder import Remainder, remainder
-from proxytune.diagnosis.search import Found
 from proxytune.diagnosis.window_slopes import FITTED_S
 from proxytune.diagnosis.windows import Rmse, cut, ratio, rmse, strays
 from proxytune.effects import effect_of

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from proxytune.diagnosis.adoption import NATS_APART
 from proxytune.diagnosis.candidates import Candidate
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit, seen
-from proxytune.diagnosis.search import NATS_APART, Adopted, Found
+from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.visibility import trace_of
 
 SECONDS = 60.0

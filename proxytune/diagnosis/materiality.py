@@ -13,9 +13,9 @@ import numpy as np
 
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import fit
+from proxytune.diagnosis.found import Adopted, Dropped, Found, Variant
 from proxytune.diagnosis.polish import compared, fit_windows, held_out, horizons
 from proxytune.diagnosis.replay import drawn_paths, lateness, paths
-from proxytune.diagnosis.search import Adopted, Dropped, Found, Variant
 from proxytune.diagnosis.windows import Rmse, Windows, blocks_of, cut, moved_along, ratio, strays
 
 MATERIAL = 1.05

@@ -9,9 +9,9 @@ from rich.table import Table
 from rich.text import Text
 
 from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
+from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.horizon_error import HorizonError
 from proxytune.diagnosis.materiality import Worth
-from proxytune.diagnosis.search import Adopted
 from proxytune.diagnosis.windows import Rmse
 from proxytune.driving.robot import robot_names
 from proxytune.effects import CATALOGUE, Model, model_text, theta_names
@@ -71,7 +71,8 @@ def _effect(effect: Adopted, theta: Mapping[str, Estimate]) -> dict[str, Any]:
 
 
 def _added(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
-    return _effect(effect, diagnosis.theta) | {"worth": _worth(diagnosis.worth.get(effect.effect, {}))}
+    worth = _worth(diagnosis.worth.get(effect.effect, {}))
+    return _effect(effect, diagnosis.theta) | {"worth": worth, "at_edge": list(diagnosis.at_edge(effect))}
 
 
 def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.flexible import Curve
+from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, drawn_wheel_speeds, wheel_speeds
-from proxytune.diagnosis.search import Adopted
 from proxytune.effects import CATALOGUE, Means, WheelCurve
 from proxytune.report.diagnosis_means import ANY, GROUPS, draw_means, means_figure, rates_of, retuned
 from proxytune.report.style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below

@@ -7,9 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from proxytune.diagnosis.choice import P_VALUE
 from proxytune.diagnosis.diagnosis import Diagnosis
+from proxytune.diagnosis.found import Tried
 from proxytune.diagnosis.horizon_error import HorizonError
-from proxytune.diagnosis.search import LEAST_GAIN, P_VALUE, Tried
+from proxytune.diagnosis.round import LEAST_GAIN
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.diagnosis_effect import effect_curve
 from proxytune.report.diagnosis_residual import residual_map, residual_over_time, strayed

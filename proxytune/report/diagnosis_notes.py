@@ -1,8 +1,8 @@
 """What a diagnosis says in sentences: each effect and its worth, what does not matter, what is left, what to drive."""
 
 from proxytune.diagnosis.diagnosis import Diagnosis
+from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.materiality import MATERIAL, Worth
-from proxytune.diagnosis.search import Adopted
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.clocks_document import clocks_notes
 from proxytune.report.learnt_document import learnt_notes
@@ -91,7 +91,10 @@ def _ends(one: Rmse, decimals: int) -> str:
 
 
 def _cautions(diagnosis: Diagnosis) -> list[str]:
-    lines = []
+    edges = [name for effect in diagnosis.effects for name in diagnosis.at_edge(effect)]
+    lines = [f"beware: {listed(edges)} at the end of what can be: it stands for something else"] if edges else []
+    if diagnosis.verdict == "partly explained":
+        lines.append("beware: where something is left that has no name, added effects may stand for it: no physics yet")
     worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
     if worse:
         lines.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; look at the heading")

@@ -22,7 +22,7 @@ from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, make_log
 from proxytune.diagnosis.diagnose import declared_effects, declared_parameters
 from proxytune.diagnosis.fitting import fit
 from proxytune.diagnosis.remainder import HORIZONS_S, remainder
-from proxytune.diagnosis.search import search
+from proxytune.diagnosis.search import fit_declared, search
 from proxytune.diagnosis.split import split
 from proxytune.diagnosis.vehicle import robot_of
 from proxytune.diagnosis.windows import cut, strays
@@ -50,7 +50,7 @@ def row(name, log, true_mm, names):
     declared = declared_parameters(declared_effects(robot))
     start = {one: robot.theta.get(one, PARAMETERS[one].neutral_value(robot.figures)) for one in declared}
     if names:
-        found = search(parts.fitted, start, declared, 1, lambda _: None)
+        found = search(fit_declared(parts.fitted, start, declared), 1, lambda _: None)
         models = {"before": found.declared.theta, "names": found.model.theta}
     else:
         models = {"before": fit(parts.fitted, start, tuple((one,) for one in declared)).theta}

@@ -11,7 +11,7 @@ from bullet_truth import BulletCase, make_bullet_log
 from rate_jobs import GENERATORS, Job
 
 import proxytune.diagnosis.diagnose as diagnosing
-import proxytune.diagnosis.search as searching
+import proxytune.diagnosis.round as looking
 from proxytune.diagnosis.candidates import Candidate, candidates
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
 from proxytune.diagnosis.diagnosis import Diagnosis
@@ -143,8 +143,8 @@ def _without(effect: str) -> Iterator[None]:
         return tuple(found for found in random_effects(model, seed) if found.effect != effect)
 
     with (
-        mock.patch.object(searching, "candidates", forms),
-        mock.patch.object(searching, "random_effects", chancy),
+        mock.patch.object(looking, "candidates", forms),
+        mock.patch.object(looking, "random_effects", chancy),
         mock.patch.object(diagnosing, "has_body", return_value=False),
     ):
         yield

@@ -18,9 +18,9 @@ from proxytune.diagnosis.diagnose import (
     diagnose,
 )
 from proxytune.diagnosis.floor import PoseNoise
+from proxytune.diagnosis.found import Found
 from proxytune.diagnosis.horizon_error import KeptAside, horizon_error
 from proxytune.diagnosis.polish import HORIZONS_S
-from proxytune.diagnosis.search import Found
 from proxytune.driving.robot import read_robot
 from proxytune.errors import LogError
 

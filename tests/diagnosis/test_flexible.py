@@ -17,7 +17,7 @@ from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives
 from proxytune.diagnosis.candidates import MOTION_EFFECTS
 from proxytune.diagnosis.drives import gather
 from proxytune.diagnosis.flexible import curves
-from proxytune.diagnosis.search import LEAST_GAIN
+from proxytune.diagnosis.round import LEAST_GAIN
 from proxytune.diagnosis.signals import hats, signal_groups
 from proxytune.effects import CATALOGUE, Cue
 

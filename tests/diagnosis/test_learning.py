@@ -11,10 +11,10 @@ from learnt_truth import TURNING
 from planted import TRUTH, planted_drives
 
 from proxytune.diagnosis.fitting import seen
+from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.innovations import FIRST_GUESS
 from proxytune.diagnosis.learning import Learning, learn
 from proxytune.diagnosis.remainder import Remainder
-from proxytune.diagnosis.search import Adopted, Found
 
 WRONG = Adopted("saturation", "", ("saturation.limit",), (), 100.0, 0.001, ())
 

@@ -10,8 +10,8 @@ sys.path.append(str(Path(__file__).parent))
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.fitting import seen
+from proxytune.diagnosis.found import Adopted, Found, Variant
 from proxytune.diagnosis.materiality import MATERIAL, Weighed, lacking, without_immaterial, worth
-from proxytune.diagnosis.search import Adopted, Found, Variant
 from proxytune.diagnosis.windows import Rmse
 
 SCRUB, SLIP = (("yaw_scrub",),), (("lateral_slip",),)

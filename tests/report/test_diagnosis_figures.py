@@ -13,9 +13,10 @@ import hidden
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS, candidates
 from proxytune.diagnosis.diagnose import diagnose
+from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.innovations import huber
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, disturbed, increments
-from proxytune.diagnosis.search import LEAST_GAIN, Adopted
+from proxytune.diagnosis.round import LEAST_GAIN
 from proxytune.diagnosis.signals import signal_groups
 from proxytune.diagnosis.windows import cut, strays
 from proxytune.driving.robot import read_robot

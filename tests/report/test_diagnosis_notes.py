@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from proxytune.diagnosis.diagnosis import Estimate
+from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.learning import Learning
 from proxytune.diagnosis.manoeuvres import LIBRARY, Manoeuvre
 from proxytune.diagnosis.polish import Polish
 from proxytune.diagnosis.remainder import Remainder
-from proxytune.diagnosis.search import Adopted
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.diagnosis_notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
 
@@ -23,7 +23,14 @@ MUCH = {2.0: Rmse(1.34, (1.2, 1.5))}
 
 
 def diagnosis(**changes):
-    plain = {"log": "run", "verdict": "explained", "effects": (), "immaterial": (), "worth": {}, "polish": None}
+    plain = {"at_edge": lambda effect: ()} | {
+        "log": "run",
+        "verdict": "explained",
+        "effects": (),
+        "immaterial": (),
+        "worth": {},
+        "polish": None,
+    }
     plain |= {"errors": (), "residual_depends_on": (), "could_not_be_seen": (), "manoeuvre": None}
     plain |= {
         "clocks": (),
@@ -91,3 +98,14 @@ def test_a_ratio_is_told_as_what_it_adds():
     assert decisive(LITTLE) == 5.0
     assert may_matter(LITTLE)
     assert not may_matter(SURE)
+
+
+def test_a_value_at_the_end_of_its_range_is_no_physics():
+    lines = notes(diagnosis(effects=(BAND,), at_edge=lambda effect: effect.names))
+    assert "beware: dead_band.width at the end of what can be: it stands for something else" in lines
+
+
+def test_beside_what_has_no_name_values_are_no_physics_yet():
+    lines = notes(diagnosis(verdict="partly explained"))
+    assert any("no physics yet" in line for line in lines)
+    assert notes(diagnosis()) == []

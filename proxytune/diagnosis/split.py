@@ -9,6 +9,7 @@ import numpy as np
 
 from proxytune.diagnosis.clocks import Clocks, in_step
 from proxytune.diagnosis.drives import Drives, gather
+from proxytune.diagnosis.thinning import thinned
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
 from proxytune.logs import Log
@@ -18,6 +19,9 @@ FEWEST_EPISODES = 6
 
 LEAST_S = 20.0
 """Less measured motion than this is not enough to fit, and as much again to test."""
+
+MOST_S = 900.0
+"""No more seconds are fitted where there are drives to choose from: every replay takes all of them."""
 
 BLOCKS = 16
 """Each part has at least about so many blocks, if they last BLOCK_S."""
@@ -51,9 +55,8 @@ def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = (
             _gathered(log, robot, every, clocks[:1]), _gathered(test, robot, range(len(test.episodes)), clocks[1:])
         )
     elif len(log.episodes) >= FEWEST_EPISODES:
-        parts = Parts(
-            _gathered(log, robot, [i for i in every if i % 3 != 2], clocks), _gathered(log, robot, every[2::3], clocks)
-        )
+        fitted = _few(log, [i for i in every if i % 3 != 2])
+        parts = Parts(_gathered(log, robot, fitted, clocks), _gathered(log, robot, every[2::3], clocks))
     else:
         parts = _halves(_gathered(log, robot, every, clocks))
     for name, drives in zip(("fit", "test on"), parts, strict=True):
@@ -62,7 +65,15 @@ def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = (
                 f"{log.name}: only {drives.seconds:.0f} s of measured motion to {name}, at least {LEAST_S:.0f} s are "
                 "needed for each; record more episodes"
             )
-    return Parts(in_blocks(parts.fitted), in_blocks(parts.tested))
+    return Parts(thinned(in_blocks(parts.fitted)), in_blocks(parts.tested))
+
+
+def _few(log: Log, chosen: Sequence[int]) -> list[int]:
+    """So many of these drives, spread evenly, that MOST_S are fitted; what is left over is not needed."""
+    seconds = sum(float(log.episodes[i].times[-1] - log.episodes[i].times[0]) for i in chosen)
+    wanted = max(FEWEST_EPISODES, math.ceil(len(chosen) * min(1.0, MOST_S / max(seconds, 1.0))))
+    count = min(len(chosen), wanted)
+    return [chosen[number * len(chosen) // count] for number in range(count)]
 
 
 def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:

@@ -1,5 +1,6 @@
 """Are all drives of one robot, on one floor? Each wheel's gain, as every drive alone would have it."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +11,8 @@ from proxytune.diagnosis.innovations import HUBER, clipped
 
 GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
 
-LEAST_DRIVES = 2
-"""Each of two robots has driven at least so often."""
+LEAST_DRIVES, LEAST_PART = 2, 0.3
+"""Each of two robots has driven at least so often, and this share of all drives: a few may be alike by their commands."""
 
 LEAST_APART = 0.04
 """Robots whose wheels are more alike than this are one."""
@@ -78,7 +79,8 @@ def _groups(
     """How clearly drives fall in two groups at the widest gap between sorted gains, 1 where just so; and the groups."""
     sure = np.flatnonzero(deviations < LEAST_APART)
     order = sure[np.argsort(gains[sure])]
-    places = np.arange(LEAST_DRIVES, len(order) - LEAST_DRIVES + 1)
+    least = max(LEAST_DRIVES, math.ceil(LEAST_PART * len(order)))
+    places = np.arange(least, len(order) - least + 1)
     if not len(places):
         return 0.0, ((), ())
     sorted_gains = gains[order]

@@ -152,7 +152,7 @@ def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
     drives = drives_of(log)
     model = fitted(drives)
     tested = KeptAside(drives, drives, PoseNoise(0.002, 0.005))
-    error = horizon_error(Found(model, model, (), (), (), ()), tested, 5.0)
+    error = horizon_error(Found(model, model, (), (), (), ()), tested, 5.0, {})
     assert error is None or np.isfinite((*error.before.interval, *error.ratio.interval)).all()
 
 

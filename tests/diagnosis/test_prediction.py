@@ -54,10 +54,10 @@ def test_a_stub_at_a_drives_end_is_not_counted_as_a_window(log):
 @pytest.mark.parametrize("extra", [TURNING, MANY], ids=["turning", "many"])
 def test_learnt_motion_is_predicted_with_its_past_before_each_window(log, extra):
     driven = planted_log({**TRUTH, **extra}, episodes=2, seconds=10.0, noise=None)
-    assert agreement(predict(driven, ROBOT, TRUTH, 2.0), driven)[0] > 0.005
-    place, turn, _ = agreement(predict(driven, ROBOT, {**TRUTH, **extra}, 2.0), driven)
-    assert place < 1e-9
-    assert turn < 1e-9
+    assert agreement(predict(driven, ROBOT, TRUTH, 2.0), driven, 2.0).place > 0.005
+    found = agreement(predict(driven, ROBOT, {**TRUTH, **extra}, 2.0), driven, 2.0)
+    assert found.place < 1e-9
+    assert found.turn < 1e-9
 
 
 def test_another_model_does_not(log):

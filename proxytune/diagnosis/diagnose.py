@@ -169,4 +169,4 @@ def _worth(found: Found, parts: Parts, seed: int) -> dict[str, Worth]:
     """What every effect is worth on the drives kept aside, those that were dropped again too."""
     model = Variant(found.model.theta, found.model.free)
     weighed = [Dropped(effect, model) for effect in found.adopted] + list(found.immaterial)
-    return {effect.effect: worth(parts.fitted, parts.tested, beside, effect, seed) for effect, beside in weighed}
+    return {effect.effect: worth(parts.fitted, parts.tested, beside, effect, seed) for effect, beside, _ in weighed}

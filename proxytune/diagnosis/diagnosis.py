@@ -86,7 +86,7 @@ class Diagnosis:
         """Values that effects had which do not matter, by name in θ; they are not in the model."""
         return {
             name: Estimate(beside.theta[name], (beside.theta[name],) * 2, PARAMETERS[name].unit)
-            for effect, beside in self.found.immaterial
+            for effect, beside, _ in self.found.immaterial
             for name in effect.names
         }
 

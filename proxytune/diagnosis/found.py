@@ -58,10 +58,11 @@ class Variant(NamedTuple):
 
 
 class Dropped(NamedTuple):
-    """An effect that was dropped, and the model that had it."""
+    """An effect that was dropped, the model that had it, and whether it is shown to have done harm to predictions."""
 
     effect: Adopted
     beside: Variant
+    harmful: bool = False
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from proxytune.diagnosis.innovations import HUBER, clipped
 GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
 
 LEAST_DRIVES, LEAST_PART = 2, 0.3
-"""Each of two robots has driven at least so often, and this share of all drives: a few may be alike by their commands."""
+"""Each of two robots has driven at least so often, and this share of all drives: few may be alike by their commands."""
 
 LEAST_APART = 0.04
 """Robots whose wheels are more alike than this are one."""

@@ -46,6 +46,11 @@ class Weighed(NamedTuple):
         return any(one.value >= MATERIAL and one.interval[0] > 1.0 for one in self.worth.values())
 
     @property
+    def harmful(self) -> bool:
+        """Whether predictions are shown to be better without it."""
+        return any(one.value <= 1.0 / MATERIAL and one.interval[1] < 1.0 for one in self.worth.values())
+
+    @property
     def largest(self) -> float:
         """The largest of the ratios."""
         return max(one.value for one in self.worth.values())
@@ -66,7 +71,7 @@ def without_immaterial(found: Found, seed: int) -> Found:
         weakest = min((one for one in weighed if not one.material), key=lambda one: one.largest, default=None)
         if weakest is None:
             break
-        dropped.append(Dropped(weakest.effect, variant))
+        dropped.append(Dropped(weakest.effect, variant, weakest.harmful))
         variant = lacking(variant, weakest.effect, drives.rate_hz)
         kept.remove(weakest.effect)
     if not dropped:

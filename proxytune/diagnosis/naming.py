@@ -1,4 +1,4 @@
-"""The named effects of a model: those with evidence that matter, and were not chosen beside one that does not."""
+"""The named effects of a model: those with evidence that matter, and were not chosen beside one that does harm."""
 
 from dataclasses import replace
 
@@ -12,8 +12,8 @@ from proxytune.diagnosis.search import Told, search
 def name_effects(base: Fit, seed: int, told: Told) -> Found:
     """Search for what a model is missing, and drop what does not matter.
 
-    What was chosen beside an effect that is dropped again may be wrong. So the search is then made once more without
-    that effect, and taken where it predicts no worse.
+    What was chosen beside an effect that does harm may be wrong. So the search is then made once more without that
+    effect, and taken where it predicts no worse.
 
     Args:
         base: The model with declared parameters only, fitted.
@@ -30,10 +30,11 @@ def name_effects(base: Fit, seed: int, told: Told) -> Found:
 
 
 def _weighed(base: Fit, seed: int, told: Told, without: tuple[str, ...]) -> tuple[Found, tuple[Dropped, ...]]:
-    """What a search comes to, and what was dropped of it that others had been chosen beside."""
+    """What a search comes to, and what was dropped of it that did harm and that others had been chosen beside."""
     found = search(base, seed, told, without)
     told("weighing what each effect is worth")
     kept = without_immaterial(found, seed)
     order = [effect.effect for effect in found.adopted]
     last = max((order.index(effect.effect) for effect in kept.adopted), default=-1)
-    return kept, tuple(dropped for dropped in kept.immaterial if order.index(dropped.effect.effect) < last)
+    harmful = (dropped for dropped in kept.immaterial if dropped.harmful)
+    return kept, tuple(dropped for dropped in harmful if order.index(dropped.effect.effect) < last)

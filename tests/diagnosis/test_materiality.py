@@ -108,3 +108,13 @@ def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_la
     one = Weighed(adopted("x"), {float(h): Rmse(value, ends) for h, (value, *ends) in enumerate(ratios)})
     assert one.material == material
     assert MATERIAL == 1.05
+
+
+def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_without_it():
+    def weighed(value, low, high):
+        return Weighed(adopted("lateral_slip", SLIP), {2.0: Rmse(value, (low, high))})
+
+    assert weighed(0.9, 0.85, 0.96).harmful
+    assert not weighed(0.9, 0.75, 1.02).harmful
+    assert not weighed(0.97, 0.95, 0.99).harmful
+    assert not weighed(1.2, 1.1, 1.3).harmful

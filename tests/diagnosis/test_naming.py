@@ -1,6 +1,7 @@
-"""What was chosen beside an effect that does not matter is searched for again without it."""
+"""What was chosen beside an effect that does harm is searched for again without it."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,14 @@ def searching(answers, asked):
     return search
 
 
-def named(base, monkeypatch, *answers):
+def named(base, monkeypatch, *answers, harmful=True):
+    whole = naming.without_immaterial
+
+    def weighed(found, seed):
+        kept = whole(found, seed)
+        return replace(kept, immaterial=tuple(one._replace(harmful=harmful) for one in kept.immaterial))
+
+    monkeypatch.setattr(naming, "without_immaterial", weighed)
     asked, told = [], []
     monkeypatch.setattr(naming, "search", searching(answers, asked))
     return naming.name_effects(base, 1, told.append), asked, told
@@ -47,6 +55,12 @@ def test_an_effect_that_misled_is_left_out_of_a_second_search_and_still_told(bas
     assert "searching again without lateral_slip" in told
     assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
     assert [dropped.effect.effect for dropped in found.immaterial] == ["lateral_slip"]
+
+
+def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
+    found, asked, _ = named(base, monkeypatch, SLIP, SCRUB, harmful=False)
+    assert asked == [()]
+    assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
 
 
 def test_an_effect_that_was_found_last_and_does_not_matter_misled_nobody(base, monkeypatch):

@@ -18,6 +18,9 @@ GRID = (4, 6)
 """Knots of a curve over a wheel's speed, over the yaw rate, over time or use, and over speed and yaw rate together."""
 
 TRANSIENTS_S = (0.04, 0.1, 0.25, 0.63, 1.6)
+REVERSALS_M = (0.003, 0.01, 0.03, 0.1)
+"""Ways over which the memory of a reversal fades [m]."""
+
 LOADS_S = (1.0, 4.5, 20.0)
 """Time constants of the low-passes."""
 
@@ -38,6 +41,7 @@ def offered(drives: Drives, theta: Theta) -> Learnt:
         "turn_rate": _corners(yaw, TURN_KNOTS),
         "speed_and_turn": _pairs(_corners(forward, GRID[0]), _corners(yaw, GRID[1])),
         "transients": TRANSIENTS_S,
+        "reversal": REVERSALS_M,
         "direction": (-1.0,) if float((forward < -0.01 * drives.robot.figures["full_speed"]).mean()) > RARE else (),
         "time": _steps(seconds),
         "use": _steps(float(effort.mean()) * seconds / 60.0),

@@ -14,7 +14,7 @@ Knots = tuple[Knot, ...]
 
 
 class Asked(NamedTuple):
-    """The motion asked for, held within what was seen, and its past; all but `bands` and `loads` are (…, time).
+    """The motion asked for, held within what was seen, and its past, (…, time) where nothing else is said.
 
     Attributes:
         forward: Forward speed [m/s].
@@ -25,6 +25,7 @@ class Asked(NamedTuple):
         heading: Heading [rad].
         bands: Of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants).
         loads: Low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants).
+        rolled: How far each wheel has rolled since it last turned the other way [m] (2, …, time).
     """
 
     forward: Signal
@@ -35,6 +36,7 @@ class Asked(NamedTuple):
     heading: Signal
     bands: Signal
     loads: Signal
+    rolled: Signal
 
 
 class Channel(NamedTuple):
@@ -87,6 +89,19 @@ def _backwards(asked: Asked, knots: Knots) -> Signal:
     return hats(np.clip(asked.forward / REST_SPEED, -1.0, 1.0), knots)
 
 
+def _slowing(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """The bands of a wheel that is slower than it has been of late, 0 while it speeds up."""
+    bands = asked.bands[wheel]
+    slow = asked.wheels[wheel][..., None] - np.cumsum(bands, axis=-1)
+    return np.where(bands * slow < 0.0, bands, 0.0)
+
+
+def _after_reversal(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """A wheel's speed, fading with the way since it last turned the other way."""
+    way = np.abs(asked.rolled[wheel])[..., None]
+    return np.asarray(asked.wheels[wheel][..., None] * np.exp(-way / np.asarray(knots)))
+
+
 def _waves(wave: Callable[[Signal], Signal]) -> Callable[[Asked, Knots], Signal]:
     """Harmonics of the heading while the robot moves."""
     return lambda a, k: wave(a.heading[..., None] * np.asarray(k)) * _moving(a)[..., None]
@@ -125,8 +140,16 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
             },
         ),
         "transients": Group(
-            "changes of wheel speed", "s", _of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]), 1e-3
+            "changes of wheel speed",
+            "s",
+            {
+                **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
+                "left_slowing": Channel("left", "of the change", lambda a, k: _slowing(a, k, 0)),
+                "right_slowing": Channel("right", "of the change", lambda a, k: _slowing(a, k, 1)),
+            },
+            1e-3,
         ),
+        "reversal": Group("way since reversal", "m", _of_wheels("of its speed", _after_reversal), 1e-3),
         "direction": Group(
             "direction of travel",
             "sign",

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from proxytune.effects.effect import Setting, Signal, Stage
 from proxytune.effects.features import GROUPS, HEADING, Asked, Knots
 from proxytune.effects.known import Known, beforehand, values_along
+from proxytune.effects.past import low_passes, rolled_since
 from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
 
@@ -37,6 +37,7 @@ class Past(NamedTuple):
         use: Minutes at full speed.
         slow: Low-passes of each wheel's speed (2, …, time constants).
         load: Low-passes of the mean wheel speed's size (…, time constants).
+        rolled: How far each wheel has rolled since it last turned the other way [m] (2, …), negative backwards.
         bearing: The heading, and headings that are known beforehand.
         rate_hz: Samples per second.
         baseline: The robot's effective baseline [m].
@@ -47,6 +48,7 @@ class Past(NamedTuple):
     use: Signal
     slow: Signal
     load: Signal
+    rolled: Signal
     bearing: Known
     rate_hz: float
     baseline: float
@@ -74,7 +76,15 @@ class Learnt:
         load = np.zeros((*batch, len(self._constants("load"))))
         nominal = setting.nominal
         figures = (setting.rate_hz, nominal["effective_baseline"], nominal["full_speed"])
-        return Past(np.zeros(batch), np.zeros(batch), slow, load, beforehand(setting.headings, setting), *figures)
+        return Past(
+            np.zeros(batch),
+            np.zeros(batch),
+            slow,
+            load,
+            np.zeros((2, *batch)),
+            beforehand(setting.headings, setting),
+            *figures,
+        )
 
     def apply(self, signal: Signal, memory: Past) -> tuple[Signal, Past]:
         """Add what the curves say."""
@@ -109,6 +119,7 @@ class Learnt:
             use=before(asked.use),
             slow=np.stack([before(one) for one in slow]),
             load=before(asked.loads),
+            rolled=np.stack([before(one) for one in asked.rolled]),
         )
 
     def features(self, signal: Signal, memory: Past) -> list[tuple[Signal, Signal]]:
@@ -143,11 +154,13 @@ class Learnt:
         effort = np.abs(wheels).mean(axis=0) / past.full_speed
         seconds = past.seconds[..., None] + np.arange(1, forward.shape[-1] + 1) / past.rate_hz
         use = past.use[..., None] + np.cumsum(effort, axis=-1) / (60.0 * past.rate_hz)
-        slow = _low_passes(wheels, past.slow, self._constants("transients"), past.rate_hz)
-        load = _low_passes(effort, past.load, self._constants("load"), past.rate_hz)
+        slow = low_passes(wheels, past.slow, self._constants("transients"), past.rate_hz)
+        load = low_passes(effort, past.load, self._constants("load"), past.rate_hz)
         bands = -np.diff(slow, axis=-1, prepend=wheels[..., None])
+        rolled = rolled_since(wheels, past.rolled, past.rate_hz)
         after = past._replace(seconds=seconds[..., -1], use=use[..., -1], slow=slow[..., -1, :], load=load[..., -1, :])
-        return Asked(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), bands, load), after
+        asked = Asked(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), bands, load, rolled)
+        return asked, after._replace(rolled=rolled[..., -1])
 
 
 def _direction(to: str, baseline: float) -> Signal:
@@ -155,13 +168,3 @@ def _direction(to: str, baseline: float) -> Signal:
     wheel = {"left": (0.5, 0.0, -1.0 / baseline), "right": (0.5, 0.0, 1.0 / baseline)}
     body = {"forward": (1.0, 0.0, 0.0), "sideways": (0.0, 1.0, 0.0), "yaw": (0.0, 0.0, 1.0)}
     return np.array({**wheel, **body}[to])
-
-
-def _low_passes(signal: Signal, slow: Signal, constants: Knots, rate_hz: float) -> Signal:
-    """First-order low-passes of a signal (…, time), one for each time constant [s] (…, time, constants)."""
-    out = np.empty((*signal.shape, len(constants)))
-    for number, constant in enumerate(constants):
-        kept = float(np.exp(-1.0 / (np.asarray(constant) * rate_hz)))
-        start = kept * slow[..., number][..., None]
-        out[..., number], _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=start)
-    return out

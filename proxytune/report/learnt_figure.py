@@ -19,7 +19,9 @@ SHOWN_AS = {
 }
 """How weights are told, by their unit: a factor and its unit; shares in per cent."""
 
-BY_TIME_CONSTANT = ("transients", "load")
+FADING = {"transients": "time constant", "load": "time constant", "reversal": "fading over"}
+"""Groups whose weights are points, each of something that fades, and what their knots are."""
+
 PAIRS = "speed_and_turn"
 
 
@@ -67,7 +69,7 @@ def _draw(axes: Axes, effect: Learnt, curve: Curve) -> None:
         _surface(axes, curve, factor, label)
     else:
         _line(axes, curve, factor)
-        of = f"{group.title}, time constant" if curve.group in BY_TIME_CONSTANT else group.title
+        of = f"{group.title}, {FADING[curve.group]}" if curve.group in FADING else group.title
         axes.set_xlabel(f"{of} [{'deg' if curve.group == HEADING else group.unit}]", fontsize=8)
         axes.set_ylabel(label, fontsize=8)
         axes.axhline(0.0, color=GREY, lw=0.6)
@@ -77,9 +79,9 @@ def _draw(axes: Axes, effect: Learnt, curve: Curve) -> None:
 
 
 def _line(axes: Axes, curve: Curve, factor: float) -> None:
-    """A curve through its knots, and through 0 at 0; time constants are points."""
+    """A curve through its knots, and through 0 at 0; what fades is points."""
     knots, weights = np.array(curve.knots), factor * np.array(curve.weights)
-    if curve.group in BY_TIME_CONSTANT:
+    if curve.group in FADING:
         axes.set_xscale("log")
         axes.set_xticks(knots, [f"{knot:g}" for knot in knots])
         axes.set_xticks([], minor=True)

@@ -45,11 +45,31 @@ class SlewRate:
 
     def apply(self, signal: Signal, memory: Ramp) -> tuple[Signal, Ramp]:
         """Go towards each sample by one step at most."""
-        duty, reached = memory.duty, np.empty(np.shape(signal))
-        for sample, wanted in enumerate(np.moveaxis(signal, -2, 0)):
-            duty = np.minimum(np.maximum(wanted, duty - memory.step), duty + memory.step)
-            reached[..., sample, :] = duty
-        return reached, memory._replace(duty=duty)
+        series = np.moveaxis(np.asarray(signal, dtype=float), -2, -1)
+        start = np.broadcast_to(memory.duty, series.shape[:-1])
+        ramps = _ramps(series.reshape(-1, series.shape[-1]), start.ravel(), memory.step)
+        reached = np.moveaxis(ramps.reshape(series.shape), -1, -2)
+        return reached, memory._replace(duty=reached[..., -1, :])
+
+
+def _ramps(wanted: Signal, start: Signal, step: float) -> Signal:
+    """Each row (rows, time) followed by one step a sample at most, ramp by ramp: one for each change of what is wanted."""
+    begins = np.flatnonzero(np.diff(wanted, axis=1, prepend=np.nan))
+    lengths = np.diff(begins, append=wanted.size)
+    held = wanted.ravel()[begins]
+    gaps = np.empty(len(begins))
+    row, here = 0, 0.0
+    for number, (first, value, reach) in enumerate(
+        zip(begins.tolist(), held.tolist(), (lengths * step).tolist(), strict=True)
+    ):
+        if first % wanted.shape[1] == 0:
+            row, here = row + 1, float(start[row])
+        gaps[number] = gap = here - value
+        here = value + (gap - reach if gap > reach else gap + reach if gap < -reach else 0.0)
+    of = np.repeat(np.arange(len(begins)), lengths)
+    way = (np.arange(wanted.size) - begins[of] + 1) * step
+    ramp = np.sign(gaps[of]) * np.maximum(0.0, np.abs(gaps[of]) - way)
+    return np.asarray((held[of] + ramp).reshape(wanted.shape))
 
 
 class Heat(NamedTuple):

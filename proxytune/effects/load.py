@@ -53,7 +53,7 @@ class SlewRate:
 
 
 def _ramps(wanted: Signal, start: Signal, step: float) -> Signal:
-    """Each row (rows, time) followed by one step a sample at most, ramp by ramp: one for each change of what is wanted."""
+    """Each row (rows, time) followed by one step a sample at most: one ramp for each change of what is wanted."""
     begins = np.flatnonzero(np.diff(wanted, axis=1, prepend=np.nan))
     lengths = np.diff(begins, append=wanted.size)
     held = wanted.ravel()[begins]

@@ -89,7 +89,7 @@ def _error(found: Found, beside: Remainder, drives: Drives, horizon_s: float) ->
 
 
 def _doubtful(found: Found, beside: Remainder) -> bool:
-    if not found.adopted:
+    if not found.adopted or not len(beside.held_out):
         return False
     drives = found.model.drives
     alone = remainder(drives, found.declared.theta)

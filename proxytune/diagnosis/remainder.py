@@ -61,11 +61,11 @@ def remainder(drives: Drives, theta: Theta) -> Remainder:
         theta: The model.
     """
     windows = cut(drives, FITTED_S)
-    before = strays(drives, theta, windows)[:, 0] ** 2
-    blocks = int(drives.block.max()) + 1
+    blocks = len(np.unique(drives.block[windows.begin]))
+    before = strays(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
     if blocks < FEWEST_PARTS:
         return Remainder(held_out=before)
-    whole, folds = _fitted(drives, theta, min(PARTS, blocks))
+    whole, folds = _fitted(drives, theta, min(PARTS, int(drives.block.max()) + 1))
     if not whole.gains:
         return Remainder(held_out=before)
     guard = _guard(drives, theta, folds)

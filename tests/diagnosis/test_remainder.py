@@ -21,6 +21,12 @@ def found():
     return drives, remainder(drives, TRUTH)
 
 
+def test_drives_too_short_for_a_window_teach_nothing():
+    drives = planted_drives(TRUTH, episodes=8, seconds=1.5)
+    learnt = remainder(drives, TRUTH)
+    assert (learnt.used, dict(learnt.theta), len(learnt.held_out)) == (False, {}, 0)
+
+
 def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_drives(found):
     _, learnt = found
     assert learnt.used

@@ -14,6 +14,7 @@ from proxytune.diagnosis import thinning
 from proxytune.diagnosis.replay import increments
 from proxytune.diagnosis.split import in_blocks
 from proxytune.diagnosis.thinning import joined, thinned
+from proxytune.diagnosis.windows import cut
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +44,7 @@ def test_a_right_model_predicts_joined_increments_too(drives):
 
 def test_a_block_is_shortened_and_none_is_lost(drives, monkeypatch):
     monkeypatch.setattr(thinning, "MOST", 300)
+    monkeypatch.setattr(thinning, "STRETCH_S", 1.0)
     few = thinned(drives)
     assert 250 <= len(few.episode) <= 300 + len(set(drives.block))
     assert set(few.block) == set(drives.block)
@@ -51,6 +53,14 @@ def test_a_block_is_shortened_and_none_is_lost(drives, monkeypatch):
     sizes = np.bincount(few.block)
     assert sizes.max() <= 2 * sizes.min()
     assert len(set(few.first[~few.linked])) > 1, "not always a block's beginning"
+
+
+def test_drives_of_two_seconds_stay_whole_and_fewer_are_taken(monkeypatch):
+    monkeypatch.setattr(thinning, "MOST", 300)
+    drives = in_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None))
+    few = thinned(drives)
+    assert thinning.FEWEST_BLOCKS <= len(set(few.block)) < 60
+    assert len(cut(few, 2.0).begin) == len(set(few.block))
 
 
 def test_poses_that_are_missing_stay_missing(drives):

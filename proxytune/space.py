@@ -10,7 +10,7 @@ Theta = Mapping[str, float]
 """A point of the domain family: parameter name to value, in the parameter's unit."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Parameter:
     """One tunable figure of an effect.
 
@@ -23,6 +23,7 @@ class Parameter:
             figure that the effect replaces.
         probes: Values that a search for a missing effect starts from.
         source: Where the bounds come from.
+        shape: Whether it only shapes what the effect's first parameter does: alone it changes nothing.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Parameter:
     neutral: float | str
     probes: tuple[float, ...] = ()
     source: str = ""
+    shape: bool = False
 
     def neutral_value(self, nominal: Mapping[str, float]) -> float:
         """The neutral value for a robot with these nominal figures."""

@@ -18,6 +18,7 @@ from proxytune.driving.agents import AGENTS
 from proxytune.driving.robot import UNITS
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE
+from proxytune.effects.features import GROUPS
 from proxytune.search.engines import ENGINES, STUDY_ENGINES
 from proxytune.study.settings import KEYS
 from proxytune.study.teaching import KEYS as TEACHING_KEYS
@@ -87,9 +88,16 @@ def test_every_key_of_teaching_is_documented(key):
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_effect_and_its_parameters_are_documented(name):
-    row = next(line for line in STUDIES.splitlines() if line.startswith(f"| `{name}`"))
+    row = next((line for line in STUDIES.splitlines() if line.startswith(f"| `{name}`")), "")
+    assert row, f"studies/README.md has no row for the effect '{name}'"
     assert CATALOGUE[name].stage.value in row
     assert all(f"`{parameter.name}`" in row for parameter in CATALOGUE[name].parameters)
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_every_group_that_can_be_learnt_and_its_channels_are_documented(group):
+    row = next(line for line in STUDIES.splitlines() if line.startswith(f"| `{group}`"))
+    assert all(f"`{channel}`" in row for channel in GROUPS[group].channels)
 
 
 @pytest.mark.parametrize("metric", METRICS)

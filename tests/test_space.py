@@ -21,6 +21,6 @@ def test_bounds_that_cannot_be_searched_are_refused_by_name(bounds):
 
 
 def test_a_neutral_value_may_be_the_robots_own_figure():
-    parameter = Parameter("camera_height", "m", 0.05, 0.2, "camera_height")
+    parameter = Parameter(name="camera_height", unit="m", low=0.05, high=0.2, neutral="camera_height")
     assert parameter.neutral_value({"camera_height": 0.108}) == 0.108
-    assert Parameter("trim", "", -1.0, 1.0, 0.0).neutral_value({}) == 0.0
+    assert Parameter(name="trim", unit="", low=-1.0, high=1.0, neutral=0.0).neutral_value({}) == 0.0

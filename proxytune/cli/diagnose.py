@@ -9,7 +9,8 @@ from rich.console import Console, Group
 from rich.text import Text
 
 from proxytune.cli.answer import Answer
-from proxytune.diagnosis.diagnosis import Diagnosis, declared_effects, diagnose
+from proxytune.diagnosis.diagnose import declared_effects, diagnose
+from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.vehicle import robot_of
 from proxytune.errors import InputError
 from proxytune.logs import read_log

@@ -31,18 +31,24 @@ def run(arguments: argparse.Namespace) -> Answer:
     model, log = read_model(arguments.model), read_log(arguments.log)
     table = predict(log, _robot(model, log), model.theta, arguments.horizon)
     write_text(arguments.output, table.to_csv(index=False))
-    place, turn, compared = agreement(table, log)
+    found = agreement(table, log, arguments.horizon)
     document = {
         "predictions": str(arguments.output),
         "rows": len(table),
-        "windows": int(table[["episode", "start_time"]].drop_duplicates().shape[0]),
+        "windows": found.windows,
         "horizon_s": arguments.horizon,
-        "error": {"value": place, "unit": "m", "heading": turn, "heading_unit": "rad", "poses": compared},
+        "error": {
+            "value": found.place,
+            "unit": "m",
+            "heading": found.turn,
+            "heading_unit": "rad",
+            "poses": found.poses,
+        },
     }
     error = (
-        f"RMSE {1e3 * place:.1f} mm, {np.degrees(turn):.2f}° over {compared} poses"
-        if compared
-        else "no pose to compare"
+        f"RMSE {1e3 * found.place:.1f} mm, {np.degrees(found.turn):.2f}° over {found.poses} poses"
+        if found.poses
+        else "no measured pose lasts a window"
     )
     return Answer(
         document, Text(f"{document['windows']} windows of {arguments.horizon:g} s: {error}\n{arguments.output}")

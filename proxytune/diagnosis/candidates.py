@@ -3,15 +3,14 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import repeat
 
 from proxytune.diagnosis.fitting import Coordinate
 from proxytune.diagnosis.replay import RANDOM_EFFECTS
-from proxytune.effects import CATALOGUE, Stage, theta_names
+from proxytune.effects import CATALOGUE, Effect, Form, theta_names
 from proxytune.space import Parameter, Theta
 
-MOTION_STAGES = (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION, Stage.MEASUREMENT)
-
-MOTION_EFFECTS = tuple(name for name, effect in CATALOGUE.items() if effect.stage in MOTION_STAGES)
+MOTION_EFFECTS = tuple(name for name, effect in CATALOGUE.items() if effect.trace)
 """The effects that measured motion can show."""
 
 
@@ -58,57 +57,39 @@ def candidates(nominal: Mapping[str, float], theta: Theta, taken: Iterable[str])
 
 
 def _forms(effect: str, nominal: Mapping[str, float], theta: Theta) -> list[Candidate]:
-    names, parameters = theta_names(CATALOGUE[effect]), CATALOGUE[effect].parameters
-    here = [theta.get(n, p.neutral_value(nominal)) for n, p in zip(names, parameters, strict=True)]
-    known = dict(zip(names, here, strict=True))
-    if "imbalance" in [p.name for p in parameters]:
-        return _wheel_forms(effect, names, known, parameters)
-    if effect == "wheel_gain":
-        return _gain_forms(names, known, parameters)
-    if effect == "battery_sag":
-        return [_single(effect, n, n.split(".")[1], known, p) for n, p in zip(names, parameters, strict=True)]
-    probes = zip(*(_away(p, known[n]) for n, p in zip(names, parameters, strict=True)), strict=False)
-    free = tuple((name,) for name in names)
-    return [Candidate(effect, "", free, {}, tuple(here), tuple(probes))]
+    kind = CATALOGUE[effect]
+    known = {
+        parameter.name: theta.get(name, parameter.neutral_value(nominal))
+        for name, parameter in zip(theta_names(kind), kind.parameters, strict=True)
+    }
+    present = known[kind.parameters[0].name] != kind.parameters[0].neutral
+    return [_candidate(kind, form, known) for form in _forms_of(kind) if form.present in (None, present)]
 
 
-def _wheel_forms(
-    effect: str, names: tuple[str, ...], known: Mapping[str, float], parameters: tuple[Parameter, ...]
-) -> list[Candidate]:
-    main, imbalance = names
-    probes = tuple((value,) for value in _away(parameters[0], known[main]))
-    both = Candidate(effect, "", ((main,),), {imbalance: known[imbalance]}, (known[main],), probes)
-    if known[main] != _neutral(parameters[0]):
-        uneven = tuple((known[main], value) for value in parameters[1].probes)
-        return [both, Candidate(effect, "uneven wheels", ((main,), (imbalance,)), {}, tuple(known.values()), uneven)]
-    sides = (("left wheel", -1.0), ("right wheel", 1.0))
-    return [both] + [
-        Candidate(effect, form, ((main,),), {imbalance: side}, (known[main],), probes) for form, side in sides
+def _forms_of(kind: type[Effect]) -> tuple[Form, ...]:
+    """The forms that an effect may take: with every parameter free, unless it says otherwise."""
+    stated = kind.trace.forms if kind.trace else ()
+    return stated or (Form(tuple((parameter.name,) for parameter in kind.parameters)),)
+
+
+def _candidate(kind: type[Effect], form: Form, known: Mapping[str, float]) -> Candidate:
+    names = {parameter.name: name for parameter, name in zip(kind.parameters, theta_names(kind), strict=True)}
+    parameters = {parameter.name: parameter for parameter in kind.parameters}
+    held = {name for coordinate in form.free for name in coordinate}
+    tried = [
+        _away(parameters[first], known[first]) if first in form.moved or not form.moved else repeat(known[first])
+        for first, *_ in form.free
     ]
-
-
-def _gain_forms(
-    names: tuple[str, ...], known: Mapping[str, float], parameters: tuple[Parameter, ...]
-) -> list[Candidate]:
-    left, right = names
-    probes = tuple((value,) for value in _away(parameters[0], known[left]))
-    return [
-        Candidate("wheel_gain", "", ((left, right),), {}, (known[left],), probes),
-        Candidate("wheel_gain", "left wheel", ((left,),), {right: known[right]}, (known[left],), probes),
-        Candidate("wheel_gain", "right wheel", ((right,),), {left: known[left]}, (known[right],), probes),
-    ]
-
-
-def _single(effect: str, name: str, form: str, known: Mapping[str, float], parameter: Parameter) -> Candidate:
-    fixed = {other: value for other, value in known.items() if other != name}
-    probes = tuple((value,) for value in _away(parameter, known[name]))
-    return Candidate(effect, form, ((name,),), fixed, (known[name],), probes)
+    return Candidate(
+        effect=kind.name,
+        form=form.name,
+        free=tuple(tuple(names[name] for name in coordinate) for coordinate in form.free),
+        fixed={names[name]: form.fixed.get(name, value) for name, value in known.items() if name not in held},
+        neutral=tuple(known[first] for first, *_ in form.free),
+        probes=tuple(zip(*tried, strict=False)),
+    )
 
 
 def _away(parameter: Parameter, here: float) -> tuple[float, ...]:
     """The probes that differ from where the model is."""
     return tuple(value for value in parameter.probes if not math.isclose(value, here, abs_tol=1e-9))
-
-
-def _neutral(parameter: Parameter) -> float:
-    return math.nan if isinstance(parameter.neutral, str) else parameter.neutral

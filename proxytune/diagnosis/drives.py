@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from proxytune.diagnosis.commands import commands_a_second, commands_of
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode
@@ -23,9 +24,6 @@ HELD_S = 0.2
 GAP_S = 1.0
 """Over longer gaps in the measured poses no motion is compared."""
 
-REST_SPEED = 1e-3
-"""Below this the commanded speed counts as none, as a fraction of full speed."""
-
 Floats = NDArray[Any]
 Whole = NDArray[Any]
 
@@ -38,7 +36,8 @@ class Drives:
         robot: Whose drives they are.
         tick_hz: Ticks per second.
         rate_hz: Commands per second.
-        duties: Commands as fractions of full speed (E, T, 2).
+        duties: Commands as fractions of full speed (E, T, 2), each the mean over its tick.
+        issued: Whether a command is issued within each tick (E, T).
         rest: Duties before the first row (E, 2).
         headings: Measured heading at the start of each tick, interpolated (E, T).
         episode: Episode of each increment (N,).
@@ -55,6 +54,7 @@ class Drives:
     tick_hz: float
     rate_hz: float
     duties: Floats
+    issued: NDArray[np.bool_]
     rest: Floats
     headings: Floats
     episode: Whole
@@ -70,6 +70,29 @@ class Drives:
     def measured(self) -> Floats:
         """Each increment in the body frame of its first pose (N, 3): forward, left [m], turn [rad]."""
         return relative(self.poses[:, 0], self.poses[:, 1])
+
+    @cached_property
+    def places(self) -> Floats:
+        """Measured place at the start of each tick (E, T, 2) [m], interpolated."""
+        return self._interpolated(self.poses[:, 0, :2])
+
+    @cached_property
+    def angles(self) -> Floats:
+        """How far each wheel has turned in its episode by the measured motion (E, T, 2) [rad], interpolated."""
+        figures = self.robot.figures
+        turn = self.measured[:, 2] * figures["effective_baseline"] / 2.0
+        wheels = np.stack((self.measured[:, 0] - turn, self.measured[:, 0] + turn), axis=1) / figures["wheel_radius"]
+        before = np.cumsum(wheels, axis=0) - wheels
+        return self._interpolated(before - before[np.searchsorted(self.episode, self.episode)])
+
+    def _interpolated(self, values: Floats) -> Floats:
+        """Values at the beginnings of the increments (N, channels) at every tick (E, T, channels)."""
+        out = np.zeros((*self.duties.shape[:2], values.shape[1]))
+        for episode in np.unique(self.episode):
+            own = self.episode == episode
+            for channel, column in enumerate(values[own].T):
+                out[episode, :, channel] = np.interp(np.arange(out.shape[1]), self.first[own], column)
+        return out
 
     @property
     def seconds(self) -> float:
@@ -94,41 +117,16 @@ def relative(origin: Floats, pose: Floats) -> Floats:
     return np.stack((forward, left, difference[..., 2]), axis=-1)
 
 
-def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
-    """A log's commands (…, 2) as fractions of full wheel speed, left and right.
-
-    Raises:
-        LogError: If the log has no commands, or they ask for more than full speed.
-    """
-    figures = robot.figures
-    if log.command == "duty":
-        return commands
-    if log.command == "none":
-        raise LogError(f"{log.name}: has no commands; a log needs duties, twists or wheel speeds to learn from")
-    if log.command == "twist":
-        turn = commands[..., 1] * figures["effective_baseline"] / 2.0
-        speeds = np.stack((commands[..., 0] - turn, commands[..., 0] + turn), axis=-1)
-    else:
-        speeds = commands * figures["wheel_radius"]
-    duties = speeds / figures["full_speed"]
-    fastest = float(np.abs(duties).max())
-    if fastest > 1.0 + 1e-9:
-        raise LogError(
-            f"{log.name}: asks a wheel for {fastest * figures['full_speed']:.2f} m/s, more than the robot's full speed "
-            f"{figures['full_speed']:g} m/s; state a higher full_speed_m_s in log.toml"
-        )
-    return np.asarray(duties)
-
-
 def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
-    """A batch of a log's episodes.
+    """A batch of a log's episodes, each command held from its own time.
 
     Raises:
         LogError: If there is nothing to compare in them.
     """
     ticks = math.ceil(TICK_HZ / log.rate_hz)
     length = max(len(episode.times) for episode in episodes) * ticks
-    duties = np.stack([_ticks(duties_of(log, robot, e.commands), ticks, length) for e in episodes])
+    tick_hz = log.rate_hz * ticks
+    given = [commands_of(log, robot, episode, ticks) for episode in episodes]
     samples = [_samples(episode, log.rate_hz) for episode in episodes]
     rows = np.concatenate([np.stack((s[:-1], s[1:]), axis=1) for s in samples])
     number = np.repeat(np.arange(len(episodes)), [max(0, len(s) - 1) for s in samples])
@@ -140,10 +138,11 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
     linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))
     drives = Drives(
         robot=robot,
-        tick_hz=log.rate_hz * ticks,
-        rate_hz=log.rate_hz,
-        duties=duties,
-        rest=np.stack([_rest(e, robot) for e in episodes]),
+        tick_hz=tick_hz,
+        rate_hz=commands_a_second(log, episodes),
+        duties=np.stack([one.over_ticks(length, tick_hz) for one in given]),
+        issued=np.stack([one.ticks(length, tick_hz) for one in given]),
+        rest=np.stack([one.rest for one in given]),
         headings=np.stack([_ticks_of_heading(e, ticks, length) for e in episodes]),
         episode=number,
         first=rows[:, 0] * ticks,
@@ -175,13 +174,6 @@ def _ticks_of_heading(episode: LogEpisode, ticks: int, length: int) -> Floats:
     if len(known) == 0:
         return np.zeros(length)
     return np.asarray(np.interp(np.arange(length), known * ticks, episode.poses[known, 2]))
-
-
-def _rest(episode: LogEpisode, robot: Robot) -> Floats:
-    """What the wheels did before the first row: turned as measured, or stood."""
-    if episode.wheels is None or not np.isfinite(episode.wheels[0]).all():
-        return np.zeros(2)
-    return np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
 
 
 def _samples(episode: LogEpisode, rate_hz: float) -> Whole:

@@ -3,7 +3,7 @@
 A mean model cannot see them: a command that is lost now and then changes the motion after it, not on average.
 """
 
-from collections.abc import Callable
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,13 +12,11 @@ from scipy.optimize import minimize_scalar
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole, sum_by
 from proxytune.diagnosis.fitting import Fit
-from proxytune.diagnosis.replay import between, paths
+from proxytune.diagnosis.replay import RANDOM_EFFECTS, between, paths
+from proxytune.effects.trace import Draws
 
 MEMORY_S = 2.5
 """A command moves nothing any more after so long."""
-
-MOST_LOST = 4
-"""Commands lost in a row that are reckoned with."""
 
 SHIFTS = 99
 """How often the null distribution is drawn."""
@@ -59,28 +57,12 @@ class RandomEffect(NamedTuple):
 
 
 def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
-    """Lost and jittering commands, weighed on what the model leaves over."""
+    """Every effect that draws, weighed on what the model leaves over."""
     answered = responses(fitted, seed)
     if len(answered.size) == 0:
         return ()
-    lateness = 1.0 / fitted.drives.rate_hz
-    return (
-        _weighed("dropped_commands", _lost, (1e-3, 0.6), answered),
-        _weighed("delay_jitter", lambda spread, p, s: _jitter(spread / lateness, p, s), (2e-3, 0.3), answered),
-    )
-
-
-def _lost(probability: float, pull: Floats, size: Floats) -> Floats:
-    """Log-likelihood ratio of each command: none, one or more lost in a row; their mean is fitted already."""
-    number = np.arange(MOST_LOST + 1)
-    weight = np.log1p(-probability) + number * np.log(probability)
-    return _mixture(number - probability / (1.0 - probability), weight, pull, size)
-
-
-def _jitter(spread: float, pull: Floats, size: Floats) -> Floats:
-    """Log-likelihood ratio of each command: late by a time from 0 to the spread, in commands."""
-    late = spread * (np.linspace(0.0, 1.0, 9) - 0.5)
-    return _mixture(late, np.full(len(late), -np.log(len(late))), pull, size)
+    rate = fitted.drives.rate_hz
+    return tuple(_weighed(name, draws, rate, answered) for name, draws in RANDOM_EFFECTS.items())
 
 
 def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats:
@@ -89,21 +71,21 @@ def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats
     return np.asarray(np.logaddexp.reduce(ratios, axis=0))
 
 
-Ratio = Callable[[float, Floats, Floats], Floats]
-"""Log-likelihood ratio of each command, given the size of an effect, the command's pull and its size."""
+def _weighed(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
+    def ratio(value: float, pull: Floats) -> Floats:
+        late = draws.lateness(value, rate_hz)
+        return _mixture(late.commands, late.log_weights, pull, answered.size)
 
-
-def _weighed(effect: str, ratio: Ratio, bounds: tuple[float, float], answered: Responses) -> RandomEffect:
-    low, high = np.log(bounds)
+    low, high = np.log(draws.sizes)
     grid = np.exp(np.linspace(low, high, 25))
 
     def total(value: float) -> float:
-        return float(ratio(value, answered.pull, answered.size).sum())
+        return float(ratio(value, answered.pull).sum())
 
     here = int(np.argmax([total(value) for value in grid]))
     around = (float(np.log(grid[max(0, here - 1)])), float(np.log(grid[min(len(grid) - 1, here + 1)])))
     best = float(np.exp(minimize_scalar(lambda log: -total(np.exp(log)), bounds=around, method="bounded").x))
-    chance = np.max([ratio(value, answered.shifted, answered.size).sum(axis=1) for value in grid], axis=0)
+    chance = np.max([ratio(value, answered.shifted).sum(axis=1) for value in grid], axis=0)
     gain = total(best)
     likely = [value for value in grid if total(value) > gain - 1.92] + [best]
     p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
@@ -118,17 +100,12 @@ def responses(fitted: Fit, seed: int) -> Responses:
     Commands far apart are lost together, so that one replay tells of many.
     """
     drives = fitted.drives
-    rows, ticks = _changed(drives)
-    reach = round(MEMORY_S * drives.rate_hz)
+    changed, phase = _changed(drives)
     here = between(drives, paths(drives, fitted.theta))
     shifts = _shifts(len(drives.episode), seed)
     z = fitted.innovations.reshape(-1, 3)
     moved = np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1)
-    found = [
-        _lost_together(fitted, _without(drives, rows, phase, reach, ticks), here, moved)
-        for phase in range(reach)
-        if (rows[:, 1] % reach == phase).any()
-    ]
+    found = [_lost_together(fitted, changed[phase == number], here, moved) for number in np.unique(phase)]
     if not found:
         return Responses(np.empty(0), np.empty(0), np.empty((SHIFTS, 0)))
     pull, size, shifted = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
@@ -136,33 +113,34 @@ def responses(fitted: Fit, seed: int) -> Responses:
     return Responses(pull[kept], size[kept], shifted[:, kept])
 
 
-def _changed(drives: Drives) -> tuple[Whole, int]:
-    """Episode and row of every command that differs from the one before it, and ticks per row."""
-    ticks = round(drives.tick_hz / drives.rate_hz)
-    commands = drives.duties[:, ::ticks]
-    before = np.concatenate((drives.rest[:, None], commands[:, :-1]), axis=1)
-    return np.argwhere(np.any(commands != before, axis=-1)), ticks
+def _changed(drives: Drives) -> tuple[Whole, Whole]:
+    """Episode and tick of every command that differs from the one before it (C, 2), and its phase (C,).
+
+    Those of one phase are at least MEMORY_S apart: of commands closer together than usual the first counts.
+    """
+    before = np.concatenate((drives.rest[:, None], drives.duties[:, :-1]), axis=1)
+    found = np.argwhere(drives.issued & np.any(np.abs(drives.duties - before) > 1e-9, axis=-1))
+    number = np.floor(found[:, 1] * drives.rate_hz / drives.tick_hz + 1e-6).astype(int)
+    _, first = np.unique(found[:, 0] * (number.max(initial=0) + 1) + number, return_index=True)
+    return found[first], number[first] % math.ceil(MEMORY_S * drives.rate_hz)
 
 
-def _without(drives: Drives, rows: Whole, phase: int, reach: int, ticks: int) -> tuple[Floats, Whole, int]:
-    """Duties in which every command of a phase is lost."""
-    lost = rows[rows[:, 1] % reach == phase]
+def _without(drives: Drives, lost: Whole) -> Floats:
+    """Duties without some commands: the one before stays in force until the next."""
     duties = drives.duties.copy()
-    for episode, row in lost:
-        start = row * ticks
-        before = drives.rest[episode] if row == 0 else drives.duties[episode, start - 1]
-        duties[episode, start : start + ticks] = before
-    return duties, lost, reach * ticks
+    for episode, tick in lost:
+        later = np.flatnonzero(drives.issued[episode, tick + 1 :])
+        end = tick + 1 + int(later[0]) if len(later) else duties.shape[1]
+        duties[episode, tick:end] = drives.rest[episode] if tick == 0 else drives.duties[episode, tick - 1]
+    return duties
 
 
-def _lost_together(
-    fitted: Fit, without: tuple[Floats, Whole, int], here: Floats, moved: Floats
-) -> tuple[Floats, Floats, Floats]:
+def _lost_together(fitted: Fit, lost: Whole, here: Floats, moved: Floats) -> tuple[Floats, Floats, Floats]:
+    """Pull, size and shifted pulls of commands of one phase."""
     drives = fitted.drives
-    duties, lost, reach = without
-    other = replace(drives, duties=duties)
+    other = replace(drives, duties=_without(drives, lost))
     change = fitted.whiten.whiten(here - between(other, paths(other, fitted.theta)))
-    label = np.repeat(_label(drives, lost, reach), 3)
+    label = np.repeat(_label(drives, lost), 3)
     size = sum_by(label, change**2, len(lost))
     both = np.concatenate((fitted.innovations[:, None], moved), axis=1)
     pulls = sum_by(label, change[:, None] * both, len(lost))
@@ -184,11 +162,10 @@ def _loudness(label: Whole, change: Floats, innovations: Floats, share: Floats) 
     return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
 
 
-def _label(drives: Drives, lost: Whole, reach: int) -> Whole:
+def _label(drives: Drives, lost: Whole) -> Whole:
     """Which lost command each increment comes after, −1 where none (N,)."""
     length = drives.duties.shape[1]
-    keys = lost[:, 0] * length + lost[:, 1] * (reach // round(MEMORY_S * drives.rate_hz))
-    at = np.searchsorted(keys, drives.episode * length + drives.last - 1, side="right") - 1
+    at = np.searchsorted(lost @ (length, 1), drives.episode * length + drives.last - 1, side="right") - 1
     return np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
 
 

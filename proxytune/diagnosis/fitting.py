@@ -18,7 +18,7 @@ from proxytune.diagnosis.innovations import (
     whitener,
 )
 from proxytune.diagnosis.replay import increments
-from proxytune.effects import PARAMETERS, effect_of
+from proxytune.effects import CATALOGUE, PARAMETERS, effect_of
 from proxytune.space import Theta
 
 ROUNDS = 3
@@ -29,9 +29,6 @@ STEP = 1e-3
 
 KEPT_SOLVABLE = 1e-6
 """Added to the curvature of the loss, so that a coordinate without a slope does no harm."""
-
-ROUGH_EFFECTS = ("stiction", "command_quantisation")
-"""Effects whose parameters change the motion by steps: no slope leads to their best value, so it is scanned for."""
 
 SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(0.99, 1.01, 11))
 """Where a scan looks in each round, as multiples of the value it starts from."""
@@ -75,8 +72,8 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
     """
     for number in range(ROUNDS):
         whiten = whitener(drives, noise)
-        theta = _scanned(drives, theta, tuple(filter(_is_rough, free)), whiten, SCANS[min(number, len(SCANS) - 1)])
-        smooth = tuple(coordinate for coordinate in free if not _is_rough(coordinate))
+        theta = _scanned(drives, theta, tuple(filter(is_stepwise, free)), whiten, SCANS[min(number, len(SCANS) - 1)])
+        smooth = tuple(coordinate for coordinate in free if not is_stepwise(coordinate))
         theta = _fit_theta(drives, theta, smooth, whiten)
         noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
     return seen(drives, theta, free, noise)
@@ -124,8 +121,10 @@ def _scanned(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten
     return theta
 
 
-def _is_rough(coordinate: Coordinate) -> bool:
-    return effect_of(coordinate[0]) in ROUGH_EFFECTS
+def is_stepwise(coordinate: Coordinate) -> bool:
+    """Whether it changes the motion by steps: no slope leads to its best value, so that is scanned for."""
+    trace = CATALOGUE[effect_of(coordinate[0])].trace
+    return trace is not None and trace.stepwise
 
 
 def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
@@ -163,14 +162,22 @@ def predictive(fitted: Fit) -> Floats:
 
     Leaving a block out moves the parameters by one Newton step.
     """
-    shifted = left_out(fitted, fitted.slopes, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
+    sums = slopes_by_block(fitted, fitted.slopes)
+    shifted = left_out(fitted, fitted.slopes, sums, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
     loss = huber(shifted).reshape(-1, 3).sum(axis=1) + fitted.whiten.log_determinant
     return sum_by(fitted.drives.block, -loss, int(fitted.drives.block.max()) + 1)
 
 
-def left_out(fitted: Fit, columns: Floats, penalty: Floats) -> Floats:
-    """The innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it."""
-    pull, curve = slopes_by_block(fitted, columns)
+def left_out(fitted: Fit, columns: Floats, sums: tuple[Floats, Floats], penalty: Floats) -> Floats:
+    """The innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it.
+
+    Args:
+        fitted: What was fitted without the columns.
+        columns: Change of the innovations per unit of each weight.
+        sums: The blocks' slopes along the columns.
+        penalty: Curvature that pulls the weights to 0.
+    """
+    pull, curve = sums
     rest = curve.sum(axis=0) - curve + penalty
     moved = -np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
     own = np.repeat(moved[fitted.drives.block], 3, axis=0)

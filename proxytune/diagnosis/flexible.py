@@ -56,9 +56,13 @@ def _with_own_noise(fitted: Fit, curve: Curve, changes: Floats, plain: float) ->
 def _curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -> Curve:
     columns = fitted.whiten.whiten(changes)
     both = np.concatenate((fitted.slopes, columns), axis=1)
-    fits = [_ridge(fitted, both, columns.shape[1], ridge) for ridge in RIDGES]
+    size = np.sqrt((both**2).sum(axis=0)) + 1e-12
+    unit = both / size
+    sums = slopes_by_block(fitted, unit)
+    flexible = np.arange(both.shape[1]) >= fitted.slopes.shape[1]
+    fits = [_ridge(fitted, unit, sums, flexible * ridge) for ridge in RIDGES]
     gain, weights = max(fits, key=lambda found: found[0])
-    return Curve(group, gain - plain, weights)
+    return Curve(group, gain - plain, (weights / size)[flexible])
 
 
 def _columns(fitted: Fit, group: SignalGroup) -> Floats:
@@ -70,13 +74,10 @@ def _columns(fitted: Fit, group: SignalGroup) -> Floats:
     return np.stack([here - moved_by(drives, theta, twists + part) for part in parts], axis=-1)
 
 
-def _ridge(fitted: Fit, both: Floats, flexible: int, ridge: float) -> tuple[float, Floats]:
-    """The predictive log-likelihood with a ridge on the flexible weights, and those weights."""
-    scale = np.concatenate((np.zeros(both.shape[1] - flexible), np.ones(flexible)))
-    size = np.sqrt((both**2).sum(axis=0)) + 1e-12
-    unit = both / size
-    penalty = np.diag(scale * ridge + 1e-9)
-    pull, curve = slopes_by_block(fitted, unit)
+def _ridge(fitted: Fit, unit: Floats, sums: tuple[Floats, Floats], ridge: Floats) -> tuple[float, Floats]:
+    """The predictive log-likelihood with a ridge on each weight, and the weights."""
+    penalty = np.diag(ridge + 1e-9)
+    pull, curve = sums
     weights = -np.linalg.solve(curve.sum(axis=0) + penalty, pull.sum(axis=0))
-    loss = huber(left_out(fitted, unit, penalty)).sum() + fitted.whiten.log_determinant.sum()
-    return -float(loss), (weights / size)[-flexible:]
+    loss = huber(left_out(fitted, unit, sums, penalty)).sum() + fitted.whiten.log_determinant.sum()
+    return -float(loss), weights

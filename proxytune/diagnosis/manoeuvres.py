@@ -5,32 +5,38 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from proxytune.diagnosis.adoption import NATS_APART
 from proxytune.diagnosis.candidates import Candidate
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit, seen
-from proxytune.diagnosis.search import NATS_APART, Adopted, Found
+from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.visibility import trace_of
 
 SECONDS = 60.0
 
+REPEATS = 10
+"""A manoeuvre is repeated so often to tell noise."""
+
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A drive that tells rivals apart.
+    """A drive that tells rivals apart, or noise from what is missing if it is driven several times.
 
     Attributes:
         name: What it is called.
         description: How to drive it.
-        between: The two effects.
-        nats_per_minute: How clearly a minute of it speaks, ½ min_m ‖P(d_a − m·d_b)‖².
+        between: What it tells apart.
+        nats_per_minute: How clearly a minute of it speaks, ½ min_m ‖P(d_a − m·d_b)‖²; None of noise.
         duties: The commands, one per row of the log's rate (rows, 2).
+        times: How often to drive it from the same commands.
     """
 
     name: str
     description: str
     between: tuple[str, str]
-    nats_per_minute: float
+    nats_per_minute: float | None
     duties: Floats
+    times: int = 1
 
 
 def _figure_eight(t: Floats) -> Floats:
@@ -88,29 +94,50 @@ LIBRARY: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
 )
 
 
-def next_manoeuvre(found: Found) -> Manoeuvre | None:
-    """The manoeuvre that tells the adopted effect with a rival from that rival best, None where nothing would."""
+def next_manoeuvre(found: Found, *, again: bool = False) -> Manoeuvre | None:
+    """The manoeuvre that tells the adopted effect with a rival from that rival best, None where nothing would.
+
+    Args:
+        found: What the search came to.
+        again: Whether noise is to be told from what is missing too: it is then driven REPEATS times.
+    """
+    best = _best_offer(found)
+    if not again:
+        return best
+    return replace(best, times=REPEATS) if best else _repeated(found.model.drives)
+
+
+def _repeated(drives: Drives) -> Manoeuvre:
+    name, text, shape = LIBRARY[0]
+    return Manoeuvre(name, text, ("noise", "what is missing"), None, _driven(shape, drives), REPEATS)
+
+
+def _best_offer(found: Found) -> Manoeuvre | None:
     pairs = [(effect, rival) for effect in found.adopted for rival in effect.rivals]
     if not pairs:
         return None
-    offers = [_offer(found.model, name, text, shape, *pairs[0]) for name, text, shape in LIBRARY]
-    best = max(offers, key=lambda offer: offer.nats_per_minute)
-    return best if best.nats_per_minute > NATS_APART else None
+    offers = [(_clear(found.model, shape, *pairs[0]), name, text, shape) for name, text, shape in LIBRARY]
+    clear, name, text, shape = max(offers, key=lambda offer: offer[0])
+    if clear <= NATS_APART:
+        return None
+    between = (pairs[0][0].effect, pairs[0][1].effect)
+    return Manoeuvre(name, text, between, clear, _driven(shape, found.model.drives))
 
 
-def _offer(
-    model: Fit, name: str, text: str, shape: Callable[[Floats], Floats], effect: Adopted, rival: Candidate
-) -> Manoeuvre:
-    duties = shape(np.arange(round(SECONDS * model.drives.rate_hz)) / model.drives.rate_hz)
+def _driven(shape: Callable[[Floats], Floats], drives: Drives) -> Floats:
+    return shape(np.arange(round(SECONDS * drives.rate_hz)) / drives.rate_hz)
+
+
+def _clear(model: Fit, shape: Callable[[Floats], Floats], effect: Adopted, rival: Candidate) -> float:
+    """How clearly a minute of a manoeuvre tells an effect from its rival [nats]."""
     plain = {key: value for key, value in model.theta.items() if key not in effect.names}
     free = tuple(coordinate for coordinate in model.free if coordinate not in effect.free)
-    driven = seen(imagined(model.drives, duties), plain, free, model.noise)
+    driven = seen(imagined(model.drives, _driven(shape, model.drives)), plain, free, model.noise)
     size = np.array([model.theta[coordinate[0]] for coordinate in effect.free])
     own = Candidate(effect.effect, effect.form, effect.free, {n: model.theta[n] for n in effect.names}, (), ())
     one, other = trace_of(driven, own, tuple(size)), trace_of(driven, rival, rival.probes[len(rival.probes) // 2])
     alike = other * (one @ other) / max(other @ other, 1e-12)
-    clear = 0.5 * float(((one - alike) ** 2).sum()) * 60.0 / SECONDS
-    return Manoeuvre(name, text, (effect.effect, rival.effect), clear, duties)
+    return 0.5 * float(((one - alike) ** 2).sum()) * 60.0 / SECONDS
 
 
 def imagined(drives: Drives, duties: Floats) -> Drives:
@@ -122,6 +149,7 @@ def imagined(drives: Drives, duties: Floats) -> Drives:
     return replace(
         drives,
         duties=np.repeat(duties, ticks, axis=0)[None],
+        issued=(np.arange(rows * ticks) % ticks == 0)[None],
         rest=np.zeros((1, 2)),
         headings=np.zeros((1, rows * ticks)),
         episode=np.zeros(rows - 1, dtype=int),

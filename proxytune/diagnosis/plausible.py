@@ -1,8 +1,8 @@
-"""Whether a log can bear the question at all: is there motion, and do commands and poses share one clock?"""
+"""Whether a log can bear the question at all: is there motion, in the units and axes of the commands?"""
 
 import numpy as np
 
-from proxytune.diagnosis.drives import Drives, Floats, sum_by
+from proxytune.diagnosis.drives import Drives
 from proxytune.diagnosis.replay import increments
 from proxytune.errors import LogError
 from proxytune.space import Theta
@@ -16,16 +16,6 @@ MOST_TIMES = 6.0
 
 MOST_ASKEW_DEG = 60.0
 """A robot that drives further than this from its heading has another zero of the heading."""
-
-FURTHEST_S = 10.0
-"""Two clocks are looked for up to so far apart."""
-
-EARLY_S = 0.15
-LATE_S = 1.0
-"""Motion this much before its command is impossible; so much after it no delay accounts for it."""
-
-CLEARLY = 0.15
-"""Another offset must make the correlation better by so much."""
 
 
 def check_motion(name: str, drives: Drives) -> None:
@@ -76,45 +66,3 @@ def check_units(name: str, drives: Drives, theta: Theta) -> None:
         )
     if said[:, 2] @ seen[:, 2] < -0.5 * np.sqrt((said[:, 2] @ said[:, 2]) * (seen[:, 2] @ seen[:, 2])):
         raise LogError(f"{name}: the robot turns the other way than its commands say; check the signs, left and right")
-
-
-def check_clocks(name: str, drives: Drives, theta: Theta) -> None:
-    """Refuse a log whose poses come from another clock than its commands.
-
-    Raises:
-        LogError: With how far they are apart.
-    """
-    said, seen = (_rates(drives, values) for values in (increments(drives, theta), drives.measured))
-    step = 1.0 / drives.rate_hz
-    reach = round(FURTHEST_S / step)
-    shifts = np.arange(-reach, reach + 1)
-    agreement = np.array([_correlation(said, seen, int(shift)) for shift in shifts])
-    best = int(np.argmax(agreement))
-    apart = float(shifts[best] * step)
-    near = agreement[(shifts * step >= -EARLY_S) & (shifts * step <= LATE_S)].max()
-    if not -EARLY_S <= apart <= LATE_S and agreement[best] > near + CLEARLY:
-        raise LogError(
-            f"{name}: poses and commands fit best when the poses are taken {abs(apart):.2f} s "
-            f"{'earlier' if apart > 0 else 'later'}; they seem to come from two clocks: put them on one"
-        )
-
-
-def _rates(drives: Drives, steps: Floats) -> Floats:
-    """Forward motion and turn per row of the longest grid, scaled alike (E, rows, 2)."""
-    ticks = round(drives.tick_hz / drives.rate_hz)
-    rows = drives.duties.shape[1] // ticks
-    label = drives.episode * rows + (drives.last // ticks - 1)
-    grid = sum_by(label, steps[:, [0, 2]], len(drives.duties) * rows).reshape(len(drives.duties), rows, 2)
-    return np.asarray(grid / (grid.std(axis=(0, 1)) + 1e-12))
-
-
-def _correlation(said: Floats, seen: Floats, shift: int) -> float:
-    """How well motion measured `shift` rows later agrees with what was said."""
-    rows = said.shape[1] - abs(shift)
-    if rows < 10:
-        return -1.0
-    one = said[:, max(0, -shift) : max(0, -shift) + rows].reshape(-1, 2)
-    other = seen[:, max(0, shift) : max(0, shift) + rows].reshape(-1, 2)
-    one, other = one - one.mean(axis=0), other - other.mean(axis=0)
-    size = float(np.sqrt((one**2).sum() * (other**2).sum()))
-    return float((one * other).sum()) / size if size > 0.0 else -1.0

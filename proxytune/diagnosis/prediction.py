@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole, gather
 from proxytune.diagnosis.replay import window_paths
+from proxytune.diagnosis.windows import SHORTEST
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode
@@ -83,11 +85,31 @@ def _placed(start: Floats, walked: Floats) -> Floats:
     return np.stack((x, y, walked[..., 2] + turn), axis=-1)
 
 
-def agreement(table: pd.DataFrame, log: Log) -> tuple[float, float, int]:
+class Agreement(NamedTuple):
+    """How far predicted poses are from those measured, over windows of the horizon.
+
+    Attributes:
+        place: RMSE of position [m], 0 where nothing can be compared.
+        turn: RMSE of heading [rad], 0 where nothing can be compared.
+        poses: How many poses were compared.
+        windows: In how many windows.
+    """
+
+    place: float
+    turn: float
+    poses: int
+    windows: int
+
+
+def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:
     """How far predicted poses are from those measured after each window's start.
 
-    Returns:
-        RMSE of position [m] and heading [rad], 0 where nothing can be compared, and how many poses were.
+    Windows in which measured poses reach no further than a stub of the horizon are left out.
+
+    Args:
+        table: What `predict` says of the log.
+        log: The log.
+        horizon_s: Length of the windows [s].
     """
     measured = pd.concat(
         [
@@ -97,8 +119,11 @@ def agreement(table: pd.DataFrame, log: Log) -> tuple[float, float, int]:
     )
     both = table[table.time > table.start_time].merge(measured, on=["episode", "time"], suffixes=("", "_measured"))
     both = both.dropna()
+    window = both.groupby(["episode", "start_time"])
+    both = both[window.time.transform("max") - both.start_time >= SHORTEST * horizon_s - 1e-9]
     if both.empty:
-        return 0.0, 0.0, 0
+        return Agreement(0.0, 0.0, 0, 0)
     place = (both.x - both.x_measured) ** 2 + (both.y - both.y_measured) ** 2
     turn = both.heading - both.heading_measured
-    return float(np.sqrt(place.mean())), float(np.sqrt((turn**2).mean())), len(both)
+    count = len(both[["episode", "start_time"]].drop_duplicates())
+    return Agreement(float(np.sqrt(place.mean())), float(np.sqrt((turn**2).mean())), len(both), count)

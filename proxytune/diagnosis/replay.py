@@ -8,17 +8,21 @@ import numpy as np
 from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
 from proxytune.driving.drivetrain import Drivetrain, drivetrain
 from proxytune.driving.planar import integrate
-from proxytune.effects import PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.effects import CATALOGUE, PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.effects.learnt import Learnt
+from proxytune.effects.trace import Draws
 from proxytune.space import Theta
 
-RANDOM_EFFECTS = ("delay_jitter", "dropped_commands")
-"""Effects that draw; to first order they make commands late by their mean lateness."""
+RANDOM_EFFECTS: Mapping[str, Draws] = {
+    name: effect.trace.draws for name, effect in CATALOGUE.items() if effect.trace and effect.trace.draws
+}
+"""Effects that draw, each of one parameter; to first order they make commands late by their mean lateness."""
 
 
 def lateness(theta: Theta, rate_hz: float) -> float:
     """How late random effects make commands on average [s], at this many commands per second."""
-    lost = theta.get("dropped_commands", 0.0)
-    return theta.get("delay_jitter", 0.0) / 2.0 + lost / (1.0 - lost) / rate_hz
+    drawn = ((draws, theta.get(name, 0.0)) for name, draws in RANDOM_EFFECTS.items())
+    return sum((draws.lateness(value, rate_hz).mean_s for draws, value in drawn if value > 0.0), 0.0)
 
 
 def expected(theta: Theta, rate_hz: float) -> dict[str, float]:
@@ -86,20 +90,65 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
         begin: The increments at whose beginnings the windows start (W,).
         length: Ticks to go on for; commands after an episode's end are those at its end.
     """
-    train, measurement = _model(drives, theta)
+    return _seen(drives, window_twists(drives, theta, begin, length), _model(drives, theta)[1])
+
+
+def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
+    """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s]."""
+    train, _ = _model(drives, theta)
     setting = _setting(drives)
     memory = train.begin(setting)
     arrived = np.clip(train.command.apply(drives.duties, memory.command)[0], -1.0, 1.0)
     episode, start = drives.episode[begin], drives.first[begin]
     ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
+    whole = train.actuation.apply(arrived, memory.actuation)[0]
     if drives.wheels is None:
-        wheels = train.actuation.apply(arrived, memory.actuation)[0][episode[:, None], ticks]
+        wheels = whole[episode[:, None], ticks]
     else:
         turning = replace(setting, rest=drives.wheels[episode, start])
-        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.begin(turning).actuation)[0]
-    ahead = replace(setting, rest=np.zeros((len(begin), 2)), headings=drives.poses[begin, 0, 2:])
-    twists, _ = train.motion.apply(train.ideal(wheels), train.begin(ahead).motion)
-    return _seen(drives, twists, measurement)
+        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
+    ahead = _ahead(drives, begin, _before(drives, theta, train))
+    driven = replace(setting, rest=np.zeros((len(whole), 3)))
+    past = train.motion.begin_amid(ahead, driven, train.ideal(whole), episode, start)
+    return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
+
+
+def window_features(
+    drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
+) -> list[tuple[Floats, Floats]]:
+    """What each weight of a learnt effect beside a model adds to its motion in such windows, curve by curve.
+
+    Returns:
+        Features (W, length, knots) and the twist that one unit of them makes (3,).
+    """
+    whole = twists_of(drives, theta)
+    past = learnt.recall(_ahead(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
+    return learnt.features(window_twists(drives, theta, begin, length), past)
+
+
+def tracked(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+    """Measured poses, from the origin on, that twists lead to (W, length + 1, 3)."""
+    return _seen(drives, twists, _model(drives, theta)[1])
+
+
+def _ahead(drives: Drives, begin: Whole, before: Floats) -> Setting:
+    """What the motion effects of windows are told: the motion before each one, where it is, and how its wheels are."""
+    episode, start = drives.episode[begin], drives.first[begin]
+    return replace(
+        _setting(drives),
+        rest=before[episode, start],
+        headings=drives.poses[begin, 0, 2:],
+        places=drives.poses[begin, :1, :2],
+        angles=drives.angles[episode, start][:, None],
+    )
+
+
+def _before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:
+    """The motion in the tick before each (E, T, 3), as effects that remember it need it; none before the first."""
+    still = np.zeros((*drives.duties.shape[:2], 3))
+    if train.motion.effects:
+        still[:, 1:] = twists_of(drives, theta)[:, :-1]
+    return still
 
 
 def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
@@ -112,6 +161,15 @@ def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
     robot = drives.robot
     train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
     return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
+
+
+def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
+    """The paths (E, T + 1, 3) with random effects as one seed draws them, instead of as expected."""
+    robot = drives.robot
+    effects = effects_from({**robot.theta, **theta}, robot.figures)
+    train = drivetrain(robot, effects)
+    twists, _ = train.apply(drives.duties, train.begin(replace(_setting(drives), seed=seed)))
+    return _seen(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
 
 
 def _wheel_speeds(drives: Drives, train: Drivetrain, setting: Setting) -> Floats:
@@ -134,7 +192,8 @@ def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
 
 def _setting(drives: Drives) -> Setting:
     nominal: Mapping[str, float] = {**drives.robot.figures, "control_rate": drives.rate_hz}
-    return Setting(drives.tick_hz, drives.rest, nominal, headings=drives.headings)
+    setting = Setting(drives.tick_hz, drives.rest, nominal)
+    return replace(setting, headings=drives.headings, places=drives.places, angles=drives.angles)
 
 
 def _seen(drives: Drives, twists: Floats, measurement: Chain) -> Floats:

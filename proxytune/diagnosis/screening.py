@@ -7,10 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.candidates import Candidate
+from proxytune.diagnosis.dense import with_dense_probes
 from proxytune.diagnosis.drives import Drives, Floats, Whole, sum_by
 from proxytune.diagnosis.fitting import Fit, placed, predictive
 from proxytune.diagnosis.innovations import HUBER, clipped
 from proxytune.diagnosis.replay import increments
+from proxytune.effects import PARAMETERS
 
 FLIPS = 499
 """How often the null distribution is drawn."""
@@ -46,16 +48,17 @@ class Lead(NamedTuple):
 
 @dataclass(frozen=True)
 class _Probe:
-    """One probe of one form: the change of the innovations along each of its coordinates."""
+    """One probe of one form: where it sets out from, and the change of the innovations along each coordinate."""
 
     candidate: Candidate
+    begin: tuple[float, ...]
     values: tuple[float, ...]
     columns: Floats
 
 
 def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[Lead]:
     """The leads, best first, one for every form that changes anything in these drives."""
-    probes = [probe for form in forms for probe in _probes(base, form)]
+    probes = [probe for form in with_dense_probes(base, forms) for probe in _probes(base, form)]
     if not probes:
         return []
     weight = np.abs(base.innovations) < HUBER
@@ -94,18 +97,20 @@ def _probes(base: Fit, form: Candidate) -> list[_Probe]:
     here = increments(base.drives, base.theta)
     found = []
     for values in form.probes:
-        columns = np.stack(
-            [here - increments(base.drives, _alone(start, form, j, v)) for j, v in enumerate(values)], -1
-        )
+        begin = _begin(form, values)
+        moved = [placed(start, form.free, np.array((*begin[:j], v, *begin[j + 1 :]))) for j, v in enumerate(values)]
+        columns = np.stack([here - increments(base.drives, theta) for theta in moved], -1)
         if np.abs(columns).max() > 1e-9:
-            found.append(_Probe(form, values, base.whiten.whiten(columns)))
+            found.append(_Probe(form, begin, values, base.whiten.whiten(columns)))
     return found
 
 
-def _alone(start: dict[str, float], form: Candidate, which: int, value: float) -> dict[str, float]:
-    """θ with one coordinate of a form at its probe and the others where the model has them."""
-    at = np.array([value if j == which else neutral for j, neutral in enumerate(form.neutral)])
-    return placed(start, form.free, at)
+def _begin(form: Candidate, values: tuple[float, ...]) -> tuple[float, ...]:
+    """Where the model has a form's coordinates; what shapes an effect that is still to come may be at its probe."""
+    if values[0] == form.neutral[0]:
+        return form.neutral
+    pairs = zip(form.free, values, form.neutral, strict=True)
+    return tuple(value if PARAMETERS[first].shape else neutral for (first, *_), value, neutral in pairs)
 
 
 def without(slopes: Floats, columns: Floats, weight: Floats) -> Floats:
@@ -133,9 +138,9 @@ def _signs(count: int, seed: int) -> Floats:
 
 
 def _step(pull: Floats, curve: Floats) -> tuple[float, Floats]:
-    """The gain of the best step along the columns, and the step: forwards only where there is one column."""
+    """The gain of the best step along the columns, and the step: forwards only where one column moves anything."""
     best = -np.linalg.pinv(curve, hermitian=True) @ pull
-    if len(best) == 1:
+    if np.count_nonzero(curve.diagonal()) == 1:
         best = np.clip(best, 0.0, FURTHEST)
     return float(-(pull @ best + 0.5 * best @ curve @ best)), best
 
@@ -143,12 +148,12 @@ def _step(pull: Floats, curve: Floats) -> tuple[float, Floats]:
 def _gains(pulls: Floats, curve: Floats) -> Floats:
     """The same gain for many pulls (draws, columns)."""
     best = -pulls @ np.linalg.pinv(curve, hermitian=True)
-    if pulls.shape[1] == 1:
+    if np.count_nonzero(curve.diagonal()) == 1:
         best = np.clip(best, 0.0, FURTHEST)
     return np.asarray(-((pulls * best).sum(axis=1) + 0.5 * np.einsum("ni,ij,nj->n", best, curve, best)))
 
 
 def _landed(probe: _Probe, step: Floats) -> tuple[float, ...]:
-    """Where a step from neutral ends, the probes being one step long."""
-    pairs = zip(probe.candidate.neutral, probe.values, step, strict=True)
-    return tuple(float(neutral + m * (value - neutral)) for neutral, value, m in pairs)
+    """Where a step from the beginning ends, the probes being one step long."""
+    pairs = zip(probe.begin, probe.values, step, strict=True)
+    return tuple(float(begin + m * (value - begin)) for begin, value, m in pairs)

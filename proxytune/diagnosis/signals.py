@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.signal import lfilter
 
-from proxytune.diagnosis.drives import Drives, Floats, relative
+from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import Fit
 from proxytune.diagnosis.replay import arrived_commands, wheel_speeds
+from proxytune.effects import CATALOGUE, Cue
 
 KNOTS = 6
 """Corners of a curve over a signal."""
@@ -25,17 +26,20 @@ class SignalGroup:
 
     Attributes:
         name: What people call the signal.
-        effects: Effects that act through it.
         signal: The signal over time, for drawing (E, T).
         unit: Its unit.
         twists: Motion added to that of the model, per basis function (E, T, 3, columns): [m/s], [m/s], [rad/s].
     """
 
-    name: str
-    effects: tuple[str, ...]
+    name: Cue
     signal: Floats
     unit: str
     twists: Floats
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects that act through it."""
+        return tuple(name for name, effect in CATALOGUE.items() if effect.trace and self.name in effect.trace.cues)
 
 
 @dataclass(frozen=True)
@@ -63,8 +67,8 @@ def signal_groups(fitted: Fit) -> tuple[SignalGroup, ...]:
         _turning(motion),
         _heading(motion),
         _position(motion),
-        _wheel_angle(motion, 0, "left wheel angle"),
-        _wheel_angle(motion, 1, "right wheel angle"),
+        _wheel_angle(motion, 0, Cue.LEFT_ANGLE),
+        _wheel_angle(motion, 1, Cue.RIGHT_ANGLE),
         _direction(motion),
     ]
     return tuple(group for group in made if np.abs(group.twists).max() > 1e-9)
@@ -111,16 +115,13 @@ def _command_level(motion: _Motion) -> SignalGroup:
     full = motion.drives.robot.figures["full_speed"]
     lagged = [side / full for side in (motion.left, motion.right)]
     columns = [hats(side, 9) * full for side in lagged]
-    effects = ("dead_band", "saturation", "driver_map", "stiction", "wheel_gain", "command_quantisation", "motor_lag")
-    return SignalGroup("wheel command", effects, lagged[0], "duty", _of_wheels(motion, *columns))
+    return SignalGroup(Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns))
 
 
 def _wheel_difference(motion: _Motion) -> SignalGroup:
     signal = motion.commands[..., 1] - motion.commands[..., 0]
     columns = hats(signal)
-    return SignalGroup(
-        "difference of the wheel commands", ("yaw_scrub", "turn_slip"), signal, "duty", _twists(columns, yaw=columns)
-    )
+    return SignalGroup(Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns))
 
 
 def _transients(motion: _Motion) -> SignalGroup:
@@ -132,8 +133,7 @@ def _transients(motion: _Motion) -> SignalGroup:
         parts.append(np.stack([command - slow[0]] + [a - b for a, b in pairwise(slow)], axis=-1))
     full = motion.drives.robot.figures["full_speed"]
     signal = parts[0].sum(axis=-1)
-    effects = ("motor_lag", "delay", "delay_jitter", "dropped_commands", "backlash")
-    return SignalGroup("command transients", effects, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
+    return SignalGroup(Cue.TRANSIENTS, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
 
 
 def _smoothed(signal: Floats, ticks: float) -> Floats:
@@ -147,7 +147,7 @@ def _after_reversal(motion: _Motion) -> SignalGroup:
         gone = _since_reversal(speed) / motion.drives.tick_hz
         columns.append(np.stack([np.exp(-gone / reach) for reach in (0.005, 0.015, 0.04, 0.12)], -1) * speed[..., None])
     signal = _since_reversal(motion.left) / motion.drives.tick_hz
-    return SignalGroup("distance since reversal", ("backlash", "stiction"), signal, "m", _of_wheels(motion, *columns))
+    return SignalGroup(Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns))
 
 
 def _since_reversal(speed: Floats) -> Floats:
@@ -166,14 +166,14 @@ def _time(motion: _Motion) -> SignalGroup:
     signal = np.broadcast_to(np.arange(motion.left.shape[1]) / motion.drives.tick_hz, motion.left.shape)
     columns = hats(signal)[..., 1:]
     wheels = _of_wheels(motion, columns * motion.left[..., None], columns * motion.right[..., None])
-    return SignalGroup("time in the episode", ("battery_sag",), signal, "s", wheels)
+    return SignalGroup(Cue.TIME, signal, "s", wheels)
 
 
 def _use(motion: _Motion) -> SignalGroup:
     use = np.cumsum(np.abs(motion.commands).mean(axis=-1), axis=1) / motion.drives.tick_hz
     columns = hats(use)[..., 1:]
     twists = _twists(columns * motion.forward[..., None], yaw=columns * motion.yaw[..., None])
-    return SignalGroup("cumulated use", ("battery_sag",), use, "s at full duty", twists)
+    return SignalGroup(Cue.USE, use, "s at full duty", twists)
 
 
 def _turning(motion: _Motion) -> SignalGroup:
@@ -181,8 +181,7 @@ def _turning(motion: _Motion) -> SignalGroup:
     bend = hats(motion.forward * motion.yaw)
     sideways = np.concatenate((bend[..., :-1] - bend[..., 1:], columns), axis=-1)
     twists = _twists(columns * motion.forward[..., None], sideways, columns)
-    effects = ("turn_slip", "yaw_scrub", "lateral_slip", "marker_offset", "heading_offset")
-    return SignalGroup("turn rate", effects, motion.yaw, "rad/s", twists)
+    return SignalGroup(Cue.TURN_RATE, motion.yaw, "rad/s", twists)
 
 
 def _heading(motion: _Motion) -> SignalGroup:
@@ -190,15 +189,15 @@ def _heading(motion: _Motion) -> SignalGroup:
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1)
     moving = np.minimum(1.0, np.abs(motion.forward) / 0.02)[..., None]
     twists = _twists(waves * moving, waves * motion.forward[..., None], waves * np.abs(motion.forward)[..., None])
-    return SignalGroup("heading", ("floor_slope",), np.mod(angle, 2.0 * np.pi), "rad", twists)
+    return SignalGroup(Cue.HEADING, np.mod(angle, 2.0 * np.pi), "rad", twists)
 
 
 def _position(motion: _Motion) -> SignalGroup:
-    places = _places(motion.drives)
+    places = motion.drives.places
     columns = np.concatenate([_patches(places[..., axis]) for axis in range(2)], axis=-1)
     forward, yaw = columns * motion.forward[..., None], columns * motion.yaw[..., None]
     twists = _twists(forward, yaw=np.concatenate((yaw, columns * np.abs(motion.forward)[..., None]), axis=-1))
-    return SignalGroup("position", (), places[..., 0], "m", twists)
+    return SignalGroup(Cue.POSITION, places[..., 0], "m", twists)
 
 
 def _patches(signal: Floats) -> Floats:
@@ -208,12 +207,12 @@ def _patches(signal: Floats) -> Floats:
     return np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))[1:]], axis=-1)
 
 
-def _wheel_angle(motion: _Motion, side: int, name: str) -> SignalGroup:
-    angle = wheel_angles(motion.drives)[..., side]
+def _wheel_angle(motion: _Motion, side: int, name: Cue) -> SignalGroup:
+    angle = motion.drives.angles[..., side]
     speed = (motion.left, motion.right)[side]
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1) * speed[..., None]
     own: Mapping[int, Floats] = {side: waves}
-    return SignalGroup(name, (), np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
+    return SignalGroup(name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
 
 
 def _direction(motion: _Motion) -> SignalGroup:
@@ -221,31 +220,4 @@ def _direction(motion: _Motion) -> SignalGroup:
     twists = _twists(
         back * motion.forward[..., None], yaw=np.concatenate((back * motion.yaw[..., None], back), axis=-1)
     )
-    return SignalGroup("direction of travel", (), np.sign(motion.forward), "", twists)
-
-
-def _places(drives: Drives) -> Floats:
-    """Measured position at each tick (E, T, 2), interpolated."""
-    return _interpolated(drives, drives.poses[:, 0, :2])
-
-
-def wheel_angles(drives: Drives) -> Floats:
-    """How far each wheel has turned by the measured motion (E, T, 2) [rad], left and right."""
-    figures = drives.robot.figures
-    moved = relative(drives.poses[:, 0], drives.poses[:, 1])
-    turn = moved[:, 2] * figures["effective_baseline"] / 2.0
-    wheels = np.stack((moved[:, 0] - turn, moved[:, 0] + turn), axis=1) / figures["wheel_radius"]
-    total = np.cumsum(wheels, axis=0) - wheels
-    return _interpolated(drives, total)
-
-
-def _interpolated(drives: Drives, values: Floats) -> Floats:
-    """Values at the beginnings of the increments (N, channels) at every tick (E, T, channels)."""
-    length = drives.duties.shape[1]
-    out = np.zeros((len(drives.duties), length, values.shape[1]))
-    for episode in range(len(out)):
-        own = drives.episode == episode
-        if own.any():
-            for channel in range(values.shape[1]):
-                out[episode, :, channel] = np.interp(np.arange(length), drives.first[own], values[own, channel])
-    return out
+    return SignalGroup(Cue.DIRECTION, np.sign(motion.forward), "", twists)

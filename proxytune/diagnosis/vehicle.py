@@ -58,5 +58,5 @@ def _driven(log: Log) -> Floats:
         if len(known) > 1:
             between = slice(known[0] * every, known[-1] * every)
             way += float(np.hypot(*np.diff(places[known], axis=0).T).sum())
-            duty += float(np.abs(episode.commands[between].mean(axis=1)).sum()) / log.rate_hz
+            duty += float(np.abs(episode.held[between].mean(axis=1)).sum()) / log.rate_hz
     return np.array([way / duty if duty > 0.0 else 1e-3])

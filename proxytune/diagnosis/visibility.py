@@ -20,7 +20,8 @@ def unseen(model: Fit, taken: set[str]) -> tuple[str, ...]:
     """The motion effects that would have left fewer than CLEAR_NATS at the middle of their probes."""
     forms = candidates(model.drives.robot.figures, model.theta, taken)
     best: dict[str, float] = {}
-    for form in (form for form in forms if "wheel" not in form.form):
+    plain = {form.effect for form in forms if not form.form}
+    for form in (form for form in forms if not form.form or form.effect not in plain):
         best[form.effect] = max(best.get(form.effect, 0.0), _trace(model, form))
     strike = LOST_SHARE * float(responses(model, 1).size.sum()) / 2.0
     best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}

@@ -3,18 +3,15 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
-from proxytune.diagnosis.fitting import Fit
-from proxytune.diagnosis.replay import increments, window_paths
+from proxytune.diagnosis.replay import window_paths
 from proxytune.space import Theta
 
-SHORTEST = 0.6
-"""Windows that cover less of the horizon than this are left out."""
-
-DRAWS = 20
-"""How often the noise floor is drawn."""
+SHORTEST = 0.9
+"""Windows that cover less of the horizon are left out: poses seldom end exactly at it, but a stub is no window."""
 
 
 class Windows(NamedTuple):
@@ -40,69 +37,56 @@ def cut(drives: Drives, horizon_s: float) -> Windows:
     _, label = np.unique(run * (number.max() + 1) + number, return_inverse=True)
     begin = np.flatnonzero(np.concatenate(([True], label[1:] != label[:-1])))
     covered = np.maximum.reduceat(drives.last, begin) - drives.first[begin]
-    long = covered >= SHORTEST * ticks
-    kept = np.flatnonzero(long[label])
-    renumbered = np.cumsum(long) - 1
-    return Windows(begin[long], renumbered[label[kept]], kept)
+    long = covered >= SHORTEST * ticks - 1e-9
+    return chosen(Windows(begin, label, np.arange(len(label))), long)
+
+
+def chosen(windows: Windows, kept: NDArray[np.bool_]) -> Windows:
+    """Some of the windows (W,)."""
+    entries = kept[windows.window]
+    renumbered = np.cumsum(kept) - 1
+    return Windows(windows.begin[kept], renumbered[windows.window[entries]], windows.increment[entries])
+
+
+def blocks_of(drives: Drives, windows: Windows) -> Whole:
+    """The block that each compared pose belongs to (M,)."""
+    return np.asarray(drives.block[windows.begin][windows.window])
+
+
+def misses(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """By how much the model's motion since each window's beginning misses the measured one (M, 3): [m], [m], [rad]."""
+    begin = windows.begin
+    tick = drives.last[windows.increment] - drives.first[begin][windows.window]
+    walked = window_paths(drives, theta, begin, int(tick.max()))
+    return relative(walked[windows.window, 0], walked[windows.window, tick]) - measured_since(drives, windows)
 
 
 def strays(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """How far the model's pose is from the measured one (M, 2): distance [m], heading [rad]."""
-    begin = windows.begin
-    length = int((drives.last[windows.increment] - drives.first[begin][windows.window]).max())
-    walked = window_paths(drives, theta, begin, length)
-    tick = drives.last[windows.increment] - drives.first[begin][windows.window]
-    return _apart(relative(walked[windows.window, 0], walked[windows.window, tick]), _measured(drives, windows))
+    return _size(misses(drives, theta, windows))
 
 
 def strays_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
     """The same for paths that were driven in one go (E, T + 1, 3)."""
+    return _size(moved_along(drives, walked, windows) - measured_since(drives, windows))
+
+
+def moved_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
+    """Motion along such paths since each window's beginning (M, 3)."""
     begin = windows.begin[windows.window]
-    predicted = relative(
+    return relative(
         walked[drives.episode[begin], drives.first[begin]],
         walked[drives.episode[windows.increment], drives.last[windows.increment]],
     )
-    return _apart(predicted, _measured(drives, windows))
 
 
-def _measured(drives: Drives, windows: Windows) -> Floats:
+def measured_since(drives: Drives, windows: Windows) -> Floats:
     """Measured motion since each window's beginning (M, 3)."""
     return relative(drives.poses[windows.begin[windows.window], 0], drives.poses[windows.increment, 1])
 
 
-def _apart(one: Floats, other: Floats) -> Floats:
-    difference = one - other
+def _size(difference: Floats) -> Floats:
     return np.stack((np.hypot(difference[:, 0], difference[:, 1]), np.abs(difference[:, 2])), axis=1)
-
-
-def floor(fitted: Fit, windows: Windows, seed: int) -> tuple[float, float]:
-    """The error that a perfect model would have with the fitted noise: RMSE of position [m] and heading [rad]."""
-    said = increments(fitted.drives, fitted.theta)
-    random = np.random.default_rng(seed)
-    squares = [
-        _noise_alone(said, fitted.whiten.colour(random.standard_normal(said.size)), windows) ** 2 for _ in range(DRAWS)
-    ]
-    place, turn = np.sqrt(np.mean(squares, axis=(0, 1))).tolist()
-    return place, turn
-
-
-def _noise_alone(said: Floats, noise: Floats, windows: Windows) -> Floats:
-    still, moved = _chained(said), _chained(said + noise)
-    begin = windows.begin[windows.window]
-    return _apart(
-        relative(still[begin, 0], still[windows.increment, 1]), relative(moved[begin, 0], moved[windows.increment, 1])
-    )
-
-
-def _chained(steps: Floats) -> Floats:
-    """Poses before and after each increment when all are put one after another (N, 2, 3)."""
-    heading = np.cumsum(steps[:, 2])
-    before = heading - steps[:, 2]
-    cosine, sine = np.cos(before), np.sin(before)
-    x = np.cumsum(cosine * steps[:, 0] - sine * steps[:, 1])
-    y = np.cumsum(sine * steps[:, 0] + cosine * steps[:, 1])
-    after = np.stack((x, y, heading), axis=1)
-    return np.stack((np.concatenate((np.zeros((1, 3)), after[:-1])), after), axis=1)
 
 
 class Rmse(NamedTuple):

@@ -1,7 +1,7 @@
 """One episode: an agent drives a plant through the effects of a domain instance until time or luck runs out."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -150,7 +150,7 @@ def drive(
     """
     figures = instance.robot.figures
     hold = round(TICK_HZ / figures["control_rate"])
-    memory = instance.drivetrain.begin(Setting(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:]))
+    memory = instance.drivetrain.begin(_setting(figures, course))
     view = _View(instance, course.start, course.seed)
     remembered = _begin(driver, instance.robot)
     moved, crashed = course.start[None], False
@@ -165,6 +165,11 @@ def drive(
         if crashed or course.ended(float(moved[-1, 0]), float(moved[-1, 1])):
             break
     return Drive(np.concatenate(poses), np.array(commands), crashed, remembered)
+
+
+def _setting(figures: Mapping[str, float], course: Course) -> Setting:
+    """The start of an episode, from rest."""
+    return Setting(TICK_HZ, np.zeros(2), figures, course.seed, course.start[2:], course.start[None, :2])
 
 
 def measured(instance: Instance, poses: Signal, seed: int) -> Signal:

@@ -23,7 +23,7 @@ def follow(instance: Instance, plant: Plant, start: Signal, duties: Signal, seed
     figures = instance.robot.figures
     hold = round(TICK_HZ / figures["control_rate"])
     train = instance.drivetrain
-    memory = train.begin(Setting(TICK_HZ, np.zeros(2), figures, seed, start[2:]))
+    memory = train.begin(Setting(TICK_HZ, np.zeros(2), figures, seed, start[2:], start[None, :2]))
     poses = [start[None]]
     for command in duties[:-1]:
         twists, memory = train.apply(np.repeat(command[None], hold, axis=0), memory)

@@ -4,6 +4,7 @@ from proxytune.effects.catalogue import CATALOGUE, DECLARED, PARAMETERS, effect_
 from proxytune.effects.chain import Chain, stage_chain
 from proxytune.effects.effect import CHANNELS, Effect, Setting, Signal, Stage
 from proxytune.effects.model import Model, model_text, read_effects, read_model
+from proxytune.effects.trace import Cue, Form, Means, Panel, Trace, WheelCurve
 
 __all__ = [
     "CATALOGUE",
@@ -11,11 +12,17 @@ __all__ = [
     "DECLARED",
     "PARAMETERS",
     "Chain",
+    "Cue",
     "Effect",
+    "Form",
+    "Means",
     "Model",
+    "Panel",
     "Setting",
     "Signal",
     "Stage",
+    "Trace",
+    "WheelCurve",
     "effect_of",
     "effects_from",
     "model_text",

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from proxytune.effects.effect import Setting, Signal, Stage
-from proxytune.effects.wheels import SLIGHT_IMBALANCE, per_wheel
+from proxytune.effects.lag import Lag, follow, lag_of
+from proxytune.effects.trace import Cue, Form, Trace, WheelCurve
+from proxytune.effects.wheels import SLIGHT_IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
 
 
@@ -23,15 +24,16 @@ class DriverMap:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "offset",
-            "duty",
-            0.0,
-            0.4,
-            0.0,
-            (0.02, 0.04, 0.08, 0.15, 0.3),
-            "Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01",
+            name="offset",
+            unit="duty",
+            low=0.0,
+            high=0.4,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01",
         ),
     )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -52,15 +54,16 @@ class Trim:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "trim",
-            "",
-            -0.5,
-            0.5,
-            0.0,
-            (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
-            "31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3",
+            name="trim",
+            unit="",
+            low=-0.5,
+            high=0.5,
+            neutral=0.0,
+            probes=(-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
+            source="31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3",
         ),
     )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -79,8 +82,21 @@ class WheelGain:
     name: ClassVar[str] = "wheel_gain"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
-        Parameter(side, "", 0.3, 1.7, 1.0, (0.7, 0.85, 0.95, 1.05, 1.15, 1.3), "31 calibrated Duckiebots: 1.01 ± 0.14")
+        Parameter(
+            name=side,
+            unit="",
+            low=0.3,
+            high=1.7,
+            neutral=1.0,
+            probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
+            source="31 calibrated Duckiebots: 1.01 ± 0.14",
+        )
         for side in ("left", "right")
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND,),
+        shown=WheelCurve.STEADY,
+        forms=(Form((("left", "right"),)), Form((("left",),), "left wheel"), Form((("right",),), "right wheel")),
     )
 
     def begin(self, setting: Setting) -> None:
@@ -89,13 +105,6 @@ class WheelGain:
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale each wheel."""
         return signal * np.array((self.left, self.right)), None
-
-
-class Lag(NamedTuple):
-    """How much of a step is left after one sample, and on average over it."""
-
-    remainder: float
-    mean_remainder: float
 
 
 class Spin(NamedTuple):
@@ -115,15 +124,18 @@ class MotorLag:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "time_constant",
-            "s",
-            0.0,
-            1.0,
-            "motor_time_constant",
-            (0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
-            "gym-duckietown's dynamics fit: 0.20 s",
+            name="time_constant",
+            unit="s",
+            low=0.0,
+            high=1.0,
+            neutral="motor_time_constant",
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+            source="gym-duckietown's dynamics fit: 0.20 s",
         ),
         SLIGHT_IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP, forms=wheel_forms("time_constant")
     )
 
     def begin(self, setting: Setting) -> Spin:
@@ -131,32 +143,16 @@ class MotorLag:
         samples = per_wheel(self.time_constant * setting.rate_hz, self.imbalance)
         # One filter over both wheels is faster than one for each
         apart = samples if self.imbalance else samples[:1]
-        return Spin(np.asarray(setting.rest, dtype=float), tuple(_lag(value) for value in apart.tolist()))
+        return Spin(np.asarray(setting.rest, dtype=float), tuple(lag_of(value) for value in apart.tolist()))
 
     def apply(self, signal: Signal, memory: Spin) -> tuple[Signal, Spin]:
         """The mean speed over each sample, exact for a command that holds over it."""
         if len(memory.lags) == 1:
-            mean, speed = _follow(signal, memory.speed, memory.lags[0])
+            mean, speed = follow(signal, memory.speed, memory.lags[0])
             return mean, memory._replace(speed=speed)
         sides = [
-            _follow(signal[..., side : side + 1], memory.speed[..., side : side + 1], lag)
+            follow(signal[..., side : side + 1], memory.speed[..., side : side + 1], lag)
             for side, lag in enumerate(memory.lags)
         ]
         mean, speed = (np.concatenate(parts, axis=-1) for parts in zip(*sides, strict=True))
         return mean, memory._replace(speed=speed)
-
-
-def _lag(samples: float) -> Lag:
-    if samples == 0.0:
-        return Lag(0.0, 0.0)
-    remainder = float(np.exp(-1.0 / samples))
-    return Lag(remainder, samples * (1.0 - remainder))
-
-
-def _follow(signal: Signal, speed: Signal, lag: Lag) -> tuple[Signal, Signal]:
-    """Mean speed over each sample, and the speed after the last one."""
-    kept = lag.remainder
-    start = speed[..., None, :]
-    ends, _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-2, zi=kept * start)
-    starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)
-    return signal + lag.mean_remainder * (starts - signal), ends[..., -1, :]

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from proxytune.effects.effect import CHANNELS, Setting, Signal, Stage
+from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
 
 
@@ -24,15 +25,16 @@ class CameraPitch:
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "camera_pitch",
-            "deg",
-            0.0,
-            45.0,
-            "camera_pitch",
-            (10.0, 15.0, 17.0, 21.0, 24.0, 30.0),
-            "39 camera mounts: 21.9° ± 2.7°; box of the paper 3° to 35°",
+            name="camera_pitch",
+            unit="deg",
+            low=0.0,
+            high=45.0,
+            neutral="camera_pitch",
+            probes=(10.0, 15.0, 17.0, 21.0, 24.0, 30.0),
+            source="39 camera mounts: 21.9° ± 2.7°; box of the paper 3° to 35°",
         ),
     )
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -50,8 +52,17 @@ class CameraRoll:
     name: ClassVar[str] = "camera_roll"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("camera_roll", "deg", -10.0, 10.0, 0.0, (-5.0, -2.0, 2.0, 5.0), "a camera mount's play"),
+        Parameter(
+            name="camera_roll",
+            unit="deg",
+            low=-10.0,
+            high=10.0,
+            neutral=0.0,
+            probes=(-5.0, -2.0, 2.0, 5.0),
+            source="a camera mount's play",
+        ),
     )
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -69,8 +80,17 @@ class CameraYaw:
     name: ClassVar[str] = "camera_yaw"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("camera_yaw", "deg", -15.0, 15.0, 0.0, (-8.0, -4.0, 4.0, 8.0), "a camera mount's play"),
+        Parameter(
+            name="camera_yaw",
+            unit="deg",
+            low=-15.0,
+            high=15.0,
+            neutral=0.0,
+            probes=(-8.0, -4.0, 4.0, 8.0),
+            source="a camera mount's play",
+        ),
     )
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -89,15 +109,16 @@ class CameraHeight:
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "camera_height",
-            "m",
-            0.05,
-            0.20,
-            "camera_height",
-            (0.08, 0.095, 0.115, 0.13),
-            "39 camera mounts: 0.112 ± 0.008 m",
+            name="camera_height",
+            unit="m",
+            low=0.05,
+            high=0.20,
+            neutral="camera_height",
+            probes=(0.08, 0.095, 0.115, 0.13),
+            source="39 camera mounts: 0.112 ± 0.008 m",
         ),
     )
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -116,9 +137,16 @@ class FieldOfView:
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "field_of_view", "deg", 50.0, 100.0, "field_of_view", (65.0, 70.0, 80.0, 90.0), "lenses on the market"
+            name="field_of_view",
+            unit="deg",
+            low=50.0,
+            high=100.0,
+            neutral="field_of_view",
+            probes=(65.0, 70.0, 80.0, 90.0),
+            source="lenses on the market",
         ),
     )
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""
@@ -136,8 +164,17 @@ class LensDistortion:
     name: ClassVar[str] = "lens_distortion"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("k1", "", -0.4, 0.2, 0.0, (-0.3, -0.2, -0.1, 0.1), "Duckiebot calibrations: k1 about −0.27"),
+        Parameter(
+            name="k1",
+            unit="",
+            low=-0.4,
+            high=0.2,
+            neutral=0.0,
+            probes=(-0.3, -0.2, -0.1, 0.1),
+            source="Duckiebot calibrations: k1 about −0.27",
+        ),
     )
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""

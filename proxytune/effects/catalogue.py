@@ -7,12 +7,17 @@ from proxytune.effects.actuation import DriverMap, MotorLag, Trim, WheelGain
 from proxytune.effects.camera import CameraHeight, CameraPitch, CameraRoll, CameraYaw, FieldOfView, LensDistortion
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.effect import Effect
+from proxytune.effects.floor import FloorSlope, SlipperyPatch
 from proxytune.effects.friction import Backlash, DeadBand, Stiction
 from proxytune.effects.image import Blur
+from proxytune.effects.learnt_table import is_learnt, learnt_effect
+from proxytune.effects.load import SlewRate, ThermalFade
 from proxytune.effects.measurement import HeadingOffset, MarkerOffset
 from proxytune.effects.messages import DelayJitter, DroppedCommands
-from proxytune.effects.motion import FloorSlope, LateralSlip, TurnSlip, YawScrub
+from proxytune.effects.motion import LateralSlip, TurnSlip, YawScrub
 from proxytune.effects.power import BatterySag, Saturation
+from proxytune.effects.ripple import WheelRipple
+from proxytune.effects.turning import CrossCoupling, Understeer, YawLag
 from proxytune.errors import SettingsError
 from proxytune.settings import nearest
 from proxytune.space import Parameter, Theta
@@ -22,6 +27,7 @@ _ALL: tuple[type[Effect], ...] = (
     DroppedCommands,
     CommandQuantisation,
     Delay,
+    SlewRate,
     DriverMap,
     DeadBand,
     Stiction,
@@ -29,12 +35,18 @@ _ALL: tuple[type[Effect], ...] = (
     Trim,
     WheelGain,
     BatterySag,
+    ThermalFade,
     MotorLag,
     Backlash,
+    WheelRipple,
     YawScrub,
+    Understeer,
+    YawLag,
     TurnSlip,
     LateralSlip,
+    CrossCoupling,
     FloorSlope,
+    SlipperyPatch,
     MarkerOffset,
     HeadingOffset,
     CameraPitch,
@@ -64,6 +76,8 @@ def effect_of(theta_name: str) -> str:
     return theta_name.split(".")[0]
 
 
+_NAMED: Mapping[type[Effect], tuple[str, ...]] = {effect: theta_names(effect) for effect in _ALL}
+
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
     {name: parameter for effect in _ALL for name, parameter in zip(theta_names(effect), effect.parameters, strict=True)}
 )
@@ -73,18 +87,21 @@ PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
 def effects_from(theta: Theta, nominal: Mapping[str, float]) -> tuple[Effect, ...]:
     """The effects that θ names, in the catalogue's order; parameters of theirs that it leaves out are neutral.
 
+    What was learnt comes last: it looks at the motion that all named effects ask for.
+
     Raises:
         SettingsError: If a name is not a parameter of the catalogue or its value is out of bounds.
     """
     for name, value in theta.items():
-        _check(name, value)
-    chosen = []
-    for effect in _ALL:
-        names = theta_names(effect)
-        if any(name in theta for name in names):
+        if not is_learnt(name):
+            _check(name, value)
+    chosen: list[Effect] = []
+    for effect, names in _NAMED.items():
+        if not theta.keys().isdisjoint(names):
             pairs = zip(names, effect.parameters, strict=True)
             chosen.append(effect(*(float(theta.get(n, p.neutral_value(nominal))) for n, p in pairs)))
-    return tuple(chosen)
+    learnt = learnt_effect(theta)
+    return tuple(chosen) if learnt is None else (*chosen, learnt)
 
 
 def _check(name: str, value: float) -> None:

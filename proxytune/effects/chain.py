@@ -4,7 +4,7 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from proxytune.effects.effect import Effect, Memory, Setting, Signal, Stage
+from proxytune.effects.effect import Effect, Memory, Recalling, Setting, Signal, Stage
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,24 @@ class Chain:
         for effect in self.effects:
             own = replace(setting, seed=zlib.crc32(effect.name.encode(), setting.seed))
             memories.append(effect.begin(own))
+        return tuple(memories)
+
+    def begin_amid(self, setting: Setting, whole: Setting, signal: Signal, row: Signal, sample: Signal) -> Memory:
+        """The memories of windows that begin amid longer signals: what came before counts where an effect recalls it.
+
+        Args:
+            setting: Of the windows (W, …).
+            whole: Of the longer signals.
+            signal: Those signals from their start on (rows, time, channels).
+            row: The row of each window (W,).
+            sample: The sample of its row at which each window begins (W,).
+        """
+        memories = list(self.begin(setting))
+        recalling = [number for number, effect in enumerate(self.effects) if isinstance(effect, Recalling)]
+        for number, effect in enumerate(self.effects[: max(recalling, default=-1) + 1]):
+            if isinstance(effect, Recalling):
+                memories[number] = effect.recall(setting, signal, row, sample)
+            signal, _ = effect.apply(signal, effect.begin(whole))
         return tuple(memories)
 
     def apply(self, signal: Signal, memories: tuple[Memory, ...]) -> tuple[Signal, tuple[Memory, ...]]:

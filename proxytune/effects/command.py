@@ -6,6 +6,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.effects.trace import Cue, Trace, WheelCurve
 from proxytune.space import Parameter
 
 
@@ -29,15 +30,16 @@ class Delay:
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "delay",
-            "s",
-            0.0,
-            0.6,
-            0.0,
-            (0.02, 0.04, 0.08, 0.15, 0.3),
-            "Duckiebot image-to-motor latency about 0.14 s; box of the paper 0 to 0.30 s",
+            name="delay",
+            unit="s",
+            low=0.0,
+            high=0.6,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="Duckiebot image-to-motor latency about 0.14 s; box of the paper 0 to 0.30 s",
         ),
     )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP)
 
     def begin(self, setting: Setting) -> History:
         """As if the robot had been at rest for ever."""
@@ -63,15 +65,16 @@ class CommandQuantisation:
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "step",
-            "duty",
-            0.0,
-            0.5,
-            0.0,
-            (0.02, 0.05, 0.1, 0.2, 0.4),
-            "8 bits: 0.008; drivers with a few speed levels: 0.1 to 0.3",
+            name="step",
+            unit="duty",
+            low=0.0,
+            high=0.5,
+            neutral=0.0,
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4),
+            source="8 bits: 0.008; drivers with a few speed levels: 0.1 to 0.3",
         ),
     )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, stepwise=True)
 
     def begin(self, setting: Setting) -> None:
         """Nothing to remember."""

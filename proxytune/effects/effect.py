@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
 
 Signal = NDArray[Any]
@@ -49,6 +50,8 @@ class Setting:
         seed: Seed of everything random in the filter.
         headings: Headings known beforehand, sample by sample (…, n) [rad]: the starting heading alone (n = 1), or the
             measured ones.
+        places: Places known beforehand in the same way (…, n, 2) [m].
+        angles: Angles that the wheels have turned by, known beforehand in the same way (…, n, 2) [rad].
     """
 
     rate_hz: float
@@ -56,17 +59,20 @@ class Setting:
     nominal: Mapping[str, float]
     seed: int = 0
     headings: Signal = field(default_factory=lambda: np.zeros(1))
+    places: Signal = field(default_factory=lambda: np.zeros((1, 2)))
+    angles: Signal = field(default_factory=lambda: np.zeros((1, 2)))
 
 
 class Effect(Protocol):
     """A frozen bundle of parameter values with a pure filter.
 
-    Cutting a signal into chunks never changes the result.
+    Cutting a signal into chunks never changes the result. An effect that measured motion cannot show has no trace.
     """
 
     name: ClassVar[str]
     stage: ClassVar[Stage]
     parameters: ClassVar[tuple[Parameter, ...]]
+    trace: ClassVar[Trace | None]
 
     def begin(self, setting: Setting) -> Memory:
         """The memory before the first sample."""
@@ -74,4 +80,13 @@ class Effect(Protocol):
 
     def apply(self, signal: Signal, memory: Memory) -> tuple[Signal, Memory]:
         """Filter the next chunk, shape (…, time, channels), and give the memory for the one after."""
+        ...
+
+
+@runtime_checkable
+class Recalling(Protocol):
+    """An effect for which it matters what came before a window that begins amid a drive."""
+
+    def recall(self, setting: Setting, signal: Signal, row: Signal, sample: Signal) -> Memory:
+        """The memory as of a sample (W,) of a row (W,) of longer signals (rows, time, channels)."""
         ...

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.effects.effect import Setting, Signal, Stage
-from proxytune.effects.wheels import IMBALANCE, per_wheel
+from proxytune.effects.trace import Cue, Trace, WheelCurve
+from proxytune.effects.wheels import IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
 
 
@@ -22,15 +23,18 @@ class DeadBand:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "width",
-            "duty",
-            0.0,
-            0.5,
-            0.0,
-            (0.02, 0.04, 0.08, 0.15, 0.3),
-            "friction of small gear motors: 0.05 to 0.2 of full duty",
+            name="width",
+            unit="duty",
+            low=0.0,
+            high=0.5,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="friction of small gear motors: 0.05 to 0.2 of full duty",
         ),
         IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("width")
     )
 
     def begin(self, setting: Setting) -> Signal:
@@ -43,51 +47,70 @@ class DeadBand:
 
 
 class Grip(NamedTuple):
-    """The duty at which each wheel breaks away (2,), the newest sample, and whether the wheels move."""
+    """The duties at which each wheel breaks away and stops (2,), the newest sample, and whether the wheels move."""
 
     breakaway: Signal
+    stop: Signal
     sample: Signal
     moving: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Stiction:
-    """A resting wheel needs a duty of `breakaway` to start; a moving one goes on down to half of it.
+    """A resting wheel needs a duty of `breakaway` to start; a moving one goes on down to `release` times that.
 
     A wheel whose duty changes sign comes to rest on the way.
     """
 
     breakaway: float
     imbalance: float
+    release: float
     name: ClassVar[str] = "stiction"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "breakaway",
-            "duty",
-            0.0,
-            0.6,
-            0.0,
-            (0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
-            "small gear motors start at 0.1 to 0.3 of full duty",
+            name="breakaway",
+            unit="duty",
+            low=0.0,
+            high=0.6,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
+            source="small gear motors start at 0.1 to 0.3 of full duty",
         ),
         IMBALANCE,
+        Parameter(
+            name="release",
+            unit="",
+            low=0.0,
+            high=1.0,
+            neutral=0.5,
+            probes=(0.2, 0.35, 0.65, 0.8, 0.9, 1.0),
+            source="rolling friction by sticking friction: about half, nearly all where a driver cuts small duties",
+            shape=True,
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL),
+        shown=WheelCurve.STEADY,
+        forms=wheel_forms("breakaway", "release"),
+        stepwise=True,
     )
 
     def begin(self, setting: Setting) -> Grip:
         """A wheel moves from the start if its resting duty keeps a moving wheel going."""
         breakaway = per_wheel(self.breakaway, self.imbalance)
         rest = np.asarray(setting.rest, dtype=float)[..., None, :]
-        return Grip(breakaway, rest, np.abs(rest) >= breakaway / 2.0)
+        stop = self.release * breakaway
+        return Grip(breakaway, stop, rest, np.abs(rest) >= stop)
 
     def apply(self, signal: Signal, memory: Grip) -> tuple[Signal, Grip]:
         """A Schmitt trigger on each wheel's duty."""
         size = np.abs(signal)
         before = np.concatenate((memory.sample, signal[..., :-1, :]), axis=-2)
         starts = size >= memory.breakaway
-        stops = ~starts & ((size < memory.breakaway / 2.0) | (signal * before < 0.0))
+        stops = ~starts & ((size < memory.stop) | (signal * before < 0.0))
         moving = _latest(starts, stops, memory.moving)
-        return np.where(moving, signal, 0.0), Grip(memory.breakaway, signal[..., -1:, :], moving[..., -1:, :])
+        return np.where(moving, signal, 0.0), memory._replace(sample=signal[..., -1:, :], moving=moving[..., -1:, :])
 
 
 def _latest(on: NDArray[np.bool_], off: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -118,15 +141,18 @@ class Backlash:
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "gap",
-            "rad",
-            0.0,
-            1.5,
-            0.0,
-            (0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
-            "plastic gearboxes: some degrees, worn ones some tens",
+            name="gap",
+            unit="rad",
+            low=0.0,
+            high=1.5,
+            neutral=0.0,
+            probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
+            source="plastic gearboxes: some degrees, worn ones some tens",
         ),
         IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.REVERSAL, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL, forms=wheel_forms("gap")
     )
 
     def begin(self, setting: Setting) -> Play:

@@ -6,6 +6,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
 
 
@@ -27,8 +28,17 @@ class Blur:
     name: ClassVar[str] = "blur"
     stage: ClassVar[Stage] = Stage.IMAGE
     parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("blur", "s", 0.0, 0.2, 0.0, (0.0125, 0.025, 0.05, 0.1), "box of the paper 0 to 0.10 s"),
+        Parameter(
+            name="blur",
+            unit="s",
+            low=0.0,
+            high=0.2,
+            neutral=0.0,
+            probes=(0.0125, 0.025, 0.05, 0.1),
+            source="box of the paper 0 to 0.10 s",
+        ),
     )
+    trace: ClassVar[Trace | None] = None
 
     def begin(self, setting: Setting) -> Exposure:
         """As if the robot had stood before the first picture for ever."""

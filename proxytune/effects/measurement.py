@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.effects.trace import TURN, Cue, Means, Panel, Trace
 from proxytune.space import Parameter
 
 
@@ -19,15 +20,19 @@ class MarkerOffset:
     stage: ClassVar[Stage] = Stage.MEASUREMENT
     parameters: ClassVar[tuple[Parameter, ...]] = tuple(
         Parameter(
-            direction,
-            "m",
-            -0.3,
-            0.3,
-            0.0,
-            (-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
-            "a marker is anywhere on the robot: up to half its length",
+            name=direction,
+            unit="m",
+            low=-0.3,
+            high=0.3,
+            neutral=0.0,
+            probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
+            source="a marker is anywhere on the robot: up to half its length",
         )
         for direction in ("forward", "left")
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE,),
+        shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways"))),
     )
 
     def begin(self, setting: Setting) -> None:
@@ -51,14 +56,17 @@ class HeadingOffset:
     stage: ClassVar[Stage] = Stage.MEASUREMENT
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "angle",
-            "deg",
-            -45.0,
-            45.0,
-            0.0,
-            (-20.0, -8.0, -3.0, 3.0, 8.0, 20.0),
-            "a marker stuck on by hand: some degrees; more where its axes are another's",
+            name="angle",
+            unit="deg",
+            low=-45.0,
+            high=45.0,
+            neutral=0.0,
+            probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0),
+            source="a marker stuck on by hand: some degrees; more where its axes are another's",
         ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE,), shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "sideways"),))
     )
 
     def begin(self, setting: Setting) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.effects.effect import Setting, Signal, Stage
+from proxytune.effects.trace import Cue, Draws, Lateness, Trace, WheelCurve
 from proxytune.space import Parameter
 
 BLOCK = 256
@@ -54,6 +55,23 @@ def messages(setting: Setting) -> Messages:
     return Messages(setting.nominal["control_rate"] / setting.rate_hz, setting.seed)
 
 
+MOST_LOST = 4
+"""Commands lost in a row that are reckoned with."""
+
+
+def _jittered(spread: float, rate_hz: float) -> Lateness:
+    """Late by any time from 0 to the spread."""
+    commands = spread / (1.0 / rate_hz) * (np.linspace(0.0, 1.0, 9) - 0.5)
+    return Lateness(spread / 2.0, commands, np.full(len(commands), -np.log(len(commands))))
+
+
+def _lost(probability: float, rate_hz: float) -> Lateness:
+    """None lost, or one or more in a row."""
+    number = np.arange(MOST_LOST + 1)
+    mean = probability / (1.0 - probability)
+    return Lateness(mean / rate_hz, number - mean, np.log1p(-probability) + number * np.log(probability))
+
+
 class Mailbox(NamedTuple):
     """The number of the next sample, the newest past samples, and the greatest extra delay [samples]."""
 
@@ -84,14 +102,17 @@ class DelayJitter:
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "spread",
-            "s",
-            0.0,
-            0.3,
-            0.0,
-            (0.02, 0.04, 0.08, 0.15, 0.3),
-            "wireless links: tens of milliseconds, now and then some tenths of a second",
+            name="spread",
+            unit="s",
+            low=0.0,
+            high=0.3,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="wireless links: tens of milliseconds, now and then some tenths of a second",
         ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_jittered, (2e-3, 0.3))
     )
 
     def begin(self, setting: Setting) -> Mailbox:
@@ -145,14 +166,17 @@ class DroppedCommands:
     stage: ClassVar[Stage] = Stage.COMMAND
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            "probability",
-            "",
-            0.0,
-            0.9,
-            0.0,
-            (0.02, 0.05, 0.1, 0.2, 0.4, 0.7),
-            "wireless links: some in a hundred, in bad places half",
+            name="probability",
+            unit="",
+            low=0.0,
+            high=0.9,
+            neutral=0.0,
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.7),
+            source="wireless links: some in a hundred, in bad places half",
         ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_lost, (1e-3, 0.6))
     )
 
     def begin(self, setting: Setting) -> Held:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, theta_names
+from proxytune.effects.learnt import Learnt
+from proxytune.effects.learnt_table import learnt_text, read_learnt
 from proxytune.logs import GEOMETRY
 from proxytune.settings import Section, nearest, read_settings
 
@@ -64,8 +66,11 @@ def read_effects(section: Section) -> tuple[dict[str, float], dict[str, tuple[fl
     theta: dict[str, float] = {}
     intervals: dict[str, tuple[float, float]] = {}
     for effect in section.values:
+        if effect == Learnt.name:
+            theta |= read_learnt(section.section(effect))
+            continue
         if effect not in CATALOGUE:
-            raise section.error(effect, f"no such effect; {nearest(effect, CATALOGUE)}")
+            raise section.error(effect, f"no such effect; {nearest(effect, (*CATALOGUE, Learnt.name))}")
         known = [parameter.name for parameter in CATALOGUE[effect].parameters]
         table = section.section(effect)
         table.only(known)
@@ -104,4 +109,4 @@ def effects_table(theta: Mapping[str, float], intervals: Mapping[str, tuple[floa
             finite = interval is not None and interval[0] < interval[1] and all(map(math.isfinite, interval))
             bounds = f", interval = [{interval[0]!r}, {interval[1]!r}]" if interval and finite else ""
             lines.append(f'{parameter.name} = {{ value = {theta[name]!r}{bounds}, unit = "{parameter.unit}" }}')
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" + learnt_text(theta)

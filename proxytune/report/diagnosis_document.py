@@ -8,21 +8,18 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, HorizonError
-from proxytune.diagnosis.search import Adopted
+from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
+from proxytune.diagnosis.found import Adopted
+from proxytune.diagnosis.horizon_error import HorizonError
+from proxytune.diagnosis.materiality import Worth
+from proxytune.diagnosis.windows import Rmse
 from proxytune.driving.robot import robot_names
 from proxytune.effects import CATALOGUE, Model, model_text, theta_names
 from proxytune.logs import GEOMETRY
-
-HORIZON_S = 2.0
-"""The horizon of the one error that stands for all."""
-
-MEANINGS = {
-    "nothing missing": "what is left over is no more than noise",
-    "explained": "named effects explain what the declared model left over",
-    "partly explained": "named effects explain a part; the rest depends on something that no named effect accounts for",
-    "unexplained": "something is missing, and no named effect accounts for it",
-}
+from proxytune.report.clocks_document import clocks_document
+from proxytune.report.diagnosis_notes import decisive, headline, may_matter, notes, per_cent
+from proxytune.report.learnt_document import learnt_document
+from proxytune.report.likeness_document import unlike_document
 
 
 def document(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -32,7 +29,8 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "robot": diagnosis.robot.name,
         "verdict": diagnosis.verdict,
         "declared": {name: _estimate(estimate) for name, estimate in diagnosis.declared.items()},
-        "effects": [_effect(effect, diagnosis.theta) for effect in diagnosis.effects],
+        "effects": [_added(effect, diagnosis) for effect in diagnosis.effects],
+        "immaterial": [_immaterial(effect, diagnosis) for effect in diagnosis.immaterial],
         "extended": {name: _estimate(estimate) for name, estimate in diagnosis.theta.items()},
         "candidates": [
             {"name": tried.effect, "form": tried.form, "held_out_gain": tried.gain, "p_value": tried.p_value}
@@ -40,14 +38,18 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "signals": [{"name": curve.group.name, "held_out_gain": curve.gain} for curve in diagnosis.found.curves],
         "residual_depends_on": list(diagnosis.residual_depends_on),
-        "error": _error(_main_error(diagnosis)),
+        "error": _error(main_error(diagnosis.errors)),
+        "learnt": learnt_document(diagnosis.learning),
         "errors": [_error(error) for error in diagnosis.errors],
         "error_on_bullet": _error(diagnosis.confirmed) if diagnosis.confirmed else None,
+        "fitted_to_windows": _polish(diagnosis),
         "noise": {"drive": list(diagnosis.noise.drive), "pose": list(diagnosis.noise.pose)},
         "could_not_be_seen": list(diagnosis.could_not_be_seen),
         "next_manoeuvre": _manoeuvre(diagnosis),
         "fitted_s": diagnosis.parts.fitted.seconds,
         "tested_s": diagnosis.parts.tested.seconds,
+        "clocks": clocks_document(diagnosis.clocks),
+        "unlike_drives": unlike_document(diagnosis.unlike, diagnosis.drive_names),
     }
 
 
@@ -68,8 +70,38 @@ def _effect(effect: Adopted, theta: Mapping[str, Estimate]) -> dict[str, Any]:
     }
 
 
-def _main_error(diagnosis: Diagnosis) -> HorizonError:
-    return min(diagnosis.errors, key=lambda error: abs(error.horizon_s - HORIZON_S))
+def _added(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
+    worth = _worth(diagnosis.worth.get(effect.effect, {}))
+    return _effect(effect, diagnosis.theta) | {"worth": worth, "at_edge": list(diagnosis.at_edge(effect))}
+
+
+def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
+    """An effect that was dropped: `changes_error_by` is told at the horizon where it matters most."""
+    worth = diagnosis.worth.get(effect.effect, {})
+    horizon = decisive(worth) if worth else None
+    change = _percent(worth[horizon]) if horizon is not None else {"value": None, "interval": None, "unit": "%"}
+    told = {"nats": effect.gain, "changes_error_by": change["value"], "interval": change["interval"], "unit": "%"}
+    open_ = {"horizon_s": horizon, "may_matter": not worth or may_matter(worth), "worth": _worth(worth)}
+    return _effect(effect, diagnosis.dropped_values) | told | open_
+
+
+def _worth(worth: Worth) -> dict[str, Any]:
+    return {f"{horizon:g}": _percent(one) for horizon, one in worth.items()}
+
+
+def _percent(one: Rmse) -> dict[str, Any]:
+    value, interval = per_cent(one)
+    return {"value": value, "interval": list(interval), "unit": "%"}
+
+
+def _polish(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    polish = diagnosis.polish
+    if polish is None:
+        return None
+    return {
+        "horizon_s": polish.horizon_s,
+        "error_ratio": {f"{horizon:g}": _ratio(one) for horizon, one in polish.ratios.items()},
+    }
 
 
 def _error(error: HorizonError) -> dict[str, Any]:
@@ -82,7 +114,9 @@ def _error(error: HorizonError) -> dict[str, Any]:
         "after_interval": list(error.after.interval),
         "ratio": error.ratio.value,
         "ratio_interval": list(error.ratio.interval),
-        "noise_floor": error.noise_floor,
+        "noise_floor": error.floor.lower,
+        "noise_floor_upper": error.floor.upper,
+        "not_repeated": _ratio(error.floor.again.share) if error.floor.again else None,
         "removable_left": error.removable_left,
         "unit": "m",
         "heading": {
@@ -94,6 +128,10 @@ def _error(error: HorizonError) -> dict[str, Any]:
     }
 
 
+def _ratio(one: Rmse) -> dict[str, Any]:
+    return {"value": one.value, "interval": list(one.interval)}
+
+
 def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:
     found = diagnosis.manoeuvre
     if found is None:
@@ -103,12 +141,13 @@ def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:
         "description": found.description,
         "tells_apart": list(found.between),
         "nats_per_minute": found.nats_per_minute,
+        "times": found.times,
     }
 
 
 def model_file(diagnosis: Diagnosis) -> str:
     """The extended model as model.toml."""
-    theta = {name: estimate.value for name, estimate in diagnosis.theta.items()}
+    theta = {name: estimate.value for name, estimate in diagnosis.theta.items()} | dict(diagnosis.learning.theta)
     bounds = {name: estimate.interval for name, estimate in diagnosis.theta.items()}
     known = diagnosis.robot.name in robot_names()
     geometry = {} if known else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
@@ -119,9 +158,8 @@ def model_file(diagnosis: Diagnosis) -> str:
 
 def shown(diagnosis: Diagnosis) -> Group:
     """What a person reads."""
-    lines = [Text(f"{diagnosis.log}: {diagnosis.verdict}: {MEANINGS[diagnosis.verdict]}", style="bold")]
     parts = [_parameters(diagnosis), _errors(diagnosis), _candidates(diagnosis)]
-    return Group(*lines, *parts, *(Text(note) for note in _notes(diagnosis)))
+    return Group(Text(headline(diagnosis), style="bold"), *parts, *(Text(note) for note in notes(diagnosis)))
 
 
 def _parameters(diagnosis: Diagnosis) -> Table:
@@ -150,7 +188,7 @@ def _errors(diagnosis: Diagnosis) -> Table:
             _millimetres(error.before.value, error.before.interval, error.heading_before.value),
             _millimetres(error.after.value, error.after.interval, error.heading_after.value),
             f"{error.ratio.value:.2f} ({error.ratio.interval[0]:.2f} … {error.ratio.interval[1]:.2f})",
-            f"{1e3 * error.noise_floor:.1f} ({57.2958 * error.heading_floor:.2f})",
+            f"{1e3 * error.floor.lower:.1f} to {1e3 * error.floor.upper:.1f} ({57.2958 * error.heading_floor:.2f})",
         )
     return table
 
@@ -172,26 +210,3 @@ def _table(title: str, columns: tuple[str, ...]) -> Table:
         text = column in ("parameter", "unit", "window", "effect", "form")
         table.add_column(escape(column), justify="left" if text else "right")
     return table
-
-
-def _notes(diagnosis: Diagnosis) -> list[str]:
-    notes = []
-    for effect in diagnosis.effects:
-        rivals = ", ".join(rival.label for rival in effect.rivals)
-        beside = f"; these drives cannot tell it from {rivals}" if rivals else ""
-        form = f" ({effect.form})" if effect.form else ""
-        notes.append(f"added {effect.effect}{form}: {effect.gain:.0f} nats, p = {effect.p_value:.3f}{beside}")
-    worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
-    if worse:
-        notes.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; look at the heading")
-    if diagnosis.residual_depends_on:
-        notes.append(f"not explained by any named effect; it depends on: {', '.join(diagnosis.residual_depends_on)}")
-    if diagnosis.could_not_be_seen:
-        notes.append(f"could not have been seen in these drives: {', '.join(diagnosis.could_not_be_seen)}")
-    if diagnosis.manoeuvre is not None:
-        found = diagnosis.manoeuvre
-        apart = " from ".join(found.between)
-        notes.append(
-            f"to tell {apart}, drive {found.name} ({found.nats_per_minute:.0f} nats a minute): {found.description}"
-        )
-    return notes

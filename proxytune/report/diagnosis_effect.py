@@ -10,8 +10,10 @@ from matplotlib.figure import Figure
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.flexible import Curve
+from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, drawn_wheel_speeds, wheel_speeds
-from proxytune.report.diagnosis_means import ANY, GROUPS, MOTIONS, draw_means, means_figure, rates_of, retuned
+from proxytune.effects import CATALOGUE, Means, WheelCurve
+from proxytune.report.diagnosis_means import ANY, GROUPS, draw_means, means_figure, rates_of, retuned
 from proxytune.report.style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
 from proxytune.space import Theta
 
@@ -27,18 +29,6 @@ STEP_S, STEPS_S = 1.5, 3.0
 DRAWS = 40
 """Step responses that are drawn of a random effect."""
 
-STATIC = (
-    "trim",
-    "dead_band",
-    "saturation",
-    "driver_map",
-    "stiction",
-    "wheel_gain",
-    "battery_sag",
-    "command_quantisation",
-)
-TRANSIENT = ("delay", "motor_lag", "backlash", *RANDOM_EFFECTS)
-
 
 def effect_curve(diagnosis: Diagnosis) -> Figure | None:
     """Draw the first effect that was added, or the signal that explains more than any; nothing if there is neither.
@@ -50,12 +40,15 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
         best = next(iter(found.remainder), None)
         return None if best is None else means_figure(diagnosis, best, GROUPS[best.group.name])
     first = found.adopted[0]
-    if first.effect in TRANSIENT:
-        return _steps_figure(diagnosis)
-    if first.effect in STATIC and first.form != "fade":
-        return _wheels_figure(diagnosis)
-    name, panels = MOTIONS[first.effect]
-    return means_figure(diagnosis, _curve(found.curves, name), panels)
+    shown = _shown(first)
+    if isinstance(shown, Means):
+        return means_figure(diagnosis, _curve(found.curves, shown.cue), shown.panels)
+    return _wheels_figure(diagnosis) if shown is WheelCurve.STEADY else _steps_figure(diagnosis)
+
+
+def _shown(effect: Adopted) -> WheelCurve | Means:
+    trace = CATALOGUE[effect.effect].trace
+    return trace.shown_in(effect.form) if trace else WheelCurve.STEP
 
 
 def _curve(curves: Sequence[Curve], name: str) -> Curve | None:
@@ -110,9 +103,9 @@ def _steady(drives: Drives, theta: Theta, commands: Floats) -> Floats:
 
 
 def _driven(drives: Drives, duties: Floats) -> Drives:
-    """The same robot from rest under other commands (E, T, 2)."""
-    still = np.zeros((len(duties), 2))
-    return replace(drives, duties=duties, rest=still, headings=np.zeros(duties.shape[:2]), wheels=None)
+    """The same robot from rest under other commands (E, T, 2), nothing being measured."""
+    still, unmeasured = np.zeros((len(duties), 2)), drives.only(np.zeros(len(drives.episode), dtype=bool))
+    return replace(unmeasured, duties=duties, rest=still, headings=np.zeros(duties.shape[:2]), wheels=None)
 
 
 def _flexible(diagnosis: Diagnosis, curve: Curve, column: int) -> tuple[Floats, Floats]:
@@ -130,7 +123,7 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     found, drives = diagnosis.found, diagnosis.found.declared.drives
     figure = Figure(figsize=(5.2, 2.8), layout="constrained")
     axes = figure.subplots()
-    lasts = STEPS_S if any(one.effect == "backlash" for one in found.adopted) else STEP_S
+    lasts = STEPS_S if any(_shown(one) is WheelCurve.REVERSAL for one in found.adopted) else STEP_S
     times = np.arange(round(lasts * drives.tick_hz)) / drives.tick_hz
     size = min(0.5, float(np.abs(drives.duties).max()))
     duties = np.repeat(np.where(times < STEP_S, size, -size)[None, :, None], 2, axis=2)

@@ -7,11 +7,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.diagnosis import Diagnosis, HorizonError
-from proxytune.diagnosis.search import LEAST_GAIN, P_VALUE, Tried
+from proxytune.diagnosis.choice import P_VALUE
+from proxytune.diagnosis.diagnosis import Diagnosis
+from proxytune.diagnosis.found import Tried
+from proxytune.diagnosis.horizon_error import HorizonError
+from proxytune.diagnosis.round import LEAST_GAIN
 from proxytune.diagnosis.windows import Rmse
 from proxytune.report.diagnosis_effect import effect_curve
 from proxytune.report.diagnosis_residual import residual_map, residual_over_time, strayed
+from proxytune.report.learnt_figure import learnt_figure
 from proxytune.report.style import (
     BEFORE,
     BLUE,
@@ -54,7 +58,8 @@ SIGNAL = _Role("any curve over this signal", PURPLE, PURPLE)
 def diagnosis_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
     """Draw everything that a diagnosis has to show, by the name of the figure.
 
-    What has nothing to show is left out: the curve of an effect where none was added and no signal explains anything.
+    What has nothing to show is left out: the curve of an effect where none was added and no signal explains anything,
+    the learnt curves where none are used.
     """
     both = strayed(diagnosis)
     figures = {
@@ -62,6 +67,7 @@ def diagnosis_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
         "residual_map": residual_map(diagnosis.parts.tested, both),
         "ranking": _ranking(diagnosis),
         "effect_curve": effect_curve(diagnosis),
+        "learnt": learnt_figure(diagnosis.learning),
         "error": _errors(diagnosis),
     }
     return {name: figure for name, figure in figures.items() if figure is not None}
@@ -118,17 +124,14 @@ def _errors(diagnosis: Diagnosis) -> Figure:
     figure = Figure(figsize=(5.2, 2.7), layout="constrained")
     place, heading = figure.subplots(1, 2)
     errors = diagnosis.errors
-    floors = [(1e3 * error.noise_floor, np.degrees(error.heading_floor)) for error in errors]
+    floors = [(_bracket(error), (np.degrees(error.heading_floor),) * 2) for error in errors]
     pairs = [(BEFORE, VERMILLION, "o", -0.08), (after(diagnosis), BLUE, "s", 0.08)]
     for axes, factor, heads, column in ((place, 1e3, False, 0), (heading, 180.0 / np.pi, True, 1)):
         for number, (name, colour, marker, shift) in enumerate(pairs[: 2 if diagnosis.effects else 1]):
             shown = [_told(error, heads)[number] for error in errors]
             _estimates(axes, shown, factor, (colour, marker, name, shift))
         spots = range(len(errors))
-        level = [floor[column] for floor in floors]
-        axes.hlines(
-            level, [s - 0.25 for s in spots], [s + 0.25 for s in spots], color=GREEN, lw=1.4, label="noise floor"
-        )
+        _draw_floor(axes, [floor[column] for floor in floors])
         axes.set_xticks(spots, [f"{error.horizon_s:g}" for error in errors])
         axes.set_xlim(-0.5, len(errors) - 0.5)
         axes.set_xlabel("length of the prediction [s]", fontsize=8)
@@ -138,6 +141,18 @@ def _errors(diagnosis: Diagnosis) -> Figure:
     heading.set_ylabel("error of heading, RMS [deg]", fontsize=8)
     legend_below(figure, place)
     return figure
+
+
+def _bracket(error: HorizonError) -> tuple[float, float]:
+    """The noise floor of position, lower and upper end [mm]."""
+    return 1e3 * error.floor.lower, 1e3 * error.floor.upper
+
+
+def _draw_floor(axes: Axes, brackets: Sequence[tuple[float, float]]) -> None:
+    """A bar from the lower to the upper end, a line at the lower."""
+    spots, lower = np.arange(len(brackets)), [low for low, _ in brackets]
+    axes.bar(spots, [high - low for low, high in brackets], 0.5, lower, color=GREEN, alpha=0.2, zorder=0)
+    axes.hlines(lower, spots - 0.25, spots + 0.25, color=GREEN, lw=1.4, label="noise floor: poses alone, to upper end")
 
 
 def _told(error: HorizonError, heads: bool) -> tuple[Rmse, Rmse]:

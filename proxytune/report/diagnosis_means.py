@@ -13,6 +13,7 @@ from proxytune.diagnosis.fitting import Fit, placed, span
 from proxytune.diagnosis.flexible import Curve
 from proxytune.diagnosis.innovations import HUBER
 from proxytune.diagnosis.replay import disturbed, increments
+from proxytune.effects.trace import TURN, Panel
 from proxytune.report.style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
 from proxytune.space import Theta
 
@@ -24,23 +25,6 @@ MEASURED, ANY = "measured", "any curve over the signal"
 DEGREES = 180.0 / np.pi
 
 
-class Panel(NamedTuple):
-    """What is drawn against what.
-
-    Attributes:
-        signal: Along the axis; empty for that of the signal group.
-        label: Its label.
-        motion: Which motion is added: forward, sideways, turn, or the speed of the left or right wheel.
-        share: Whether as a share of that motion instead of in its unit.
-    """
-
-    signal: str
-    label: str
-    motion: str
-    share: bool = False
-
-
-TURN = "turn rate [deg/s]"
 GROUPS: Mapping[str, tuple[Panel, ...]] = {
     "wheel command": (
         Panel("left", "speed of the left wheel [m/s]", "left"),
@@ -67,17 +51,6 @@ GROUPS: Mapping[str, tuple[Panel, ...]] = {
     "direction of travel": tuple(Panel("", "direction of travel", m, True) for m in ("forward", "turn")),
 }
 """What is drawn for a signal group."""
-
-MOTIONS: Mapping[str, tuple[str, tuple[Panel, ...]]] = {
-    "turn_slip": ("turn rate", (Panel("turn", TURN, "forward", True),)),
-    "yaw_scrub": ("turn rate", (Panel("turn", TURN, "turn"),)),
-    "lateral_slip": ("turn rate", (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),)),
-    "marker_offset": ("turn rate", (Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways"))),
-    "heading_offset": ("turn rate", (Panel("forward", "forward speed [m/s]", "sideways"),)),
-    "floor_slope": ("heading", (Panel("heading", "heading [deg]", "forward"),)),
-    "battery_sag": ("cumulated use", (Panel("", "use so far [s at full duty]", "forward", True),)),
-}
-"""What is drawn for an effect, and the signal group that judges it."""
 
 NAMES = {
     "forward": "forward speed",
@@ -135,6 +108,8 @@ def _signal(drives: Drives, rates: Rates, curve: Curve | None, panel: Panel) -> 
         "y": drives.poses[:, 0, 1],
         "heading": np.degrees(np.mod(drives.poses[:, 0, 2], 2.0 * np.pi)),
         "turn": np.degrees(said["turn"]),
+        "left angle": np.mod(drives.angles[drives.episode, drives.first, 0], 2.0 * np.pi),
+        "right angle": np.mod(drives.angles[drives.episode, drives.first, 1], 2.0 * np.pi),
         "bend": said["forward"] * said["turn"],
     }
     if panel.signal:

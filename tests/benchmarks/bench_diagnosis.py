@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from proxytune.diagnosis.diagnosis import diagnose
+from proxytune.diagnosis.diagnose import diagnose
 from proxytune.diagnosis.drives import gather
 from proxytune.diagnosis.innovations import FIRST_GUESS, fit_noise, whitener
 from proxytune.diagnosis.replay import increments
-from proxytune.diagnosis.search import search
+from proxytune.diagnosis.search import fit_declared, search
 from proxytune.diagnosis.split import split
 from proxytune.driving.robot import read_robot
 
@@ -46,7 +46,9 @@ def test_fitting_their_noise(benchmark, drives):
 
 def test_searching_the_whole_catalogue(benchmark, log):
     parts = split(log, ROBOT, None)
-    benchmark.pedantic(lambda: search(parts.fitted, THETA, ("trim", "delay"), 1, lambda line: None), rounds=1)
+    benchmark.pedantic(
+        lambda: search(fit_declared(parts.fitted, THETA, ("trim", "delay")), 1, lambda line: None), rounds=1
+    )
 
 
 def test_the_whole_diagnosis_with_confirmation_on_bullet(benchmark, log):

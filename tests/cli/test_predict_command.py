@@ -101,8 +101,7 @@ def test_a_log_without_a_pose_to_compare_with_is_still_predicted(model, tmp_path
 
     folder = write_log(with_poses(log, sparse), tmp_path / "sparse")
     told = predicted(model(), folder, "--horizon", 1, "--output", tmp_path / "p.csv", capsys=capsys)
-    assert told["windows"] == 5
-    assert told["error"]["poses"] == 0
+    assert (told["windows"], told["error"]["poses"]) == (0, 0), "no window has a pose near its end"
 
 
 BAD = {

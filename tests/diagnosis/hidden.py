@@ -63,12 +63,23 @@ class Scene(NamedTuple):
     times: Array
 
 
-def make_log(case: Case, *, episodes: int = 12, seconds: float = 60.0, noiseless: bool = False) -> Log:
-    """What would have been measured of this robot, 20 rows per second, from rest."""
+def make_log(
+    case: Case,
+    *,
+    episodes: int = 12,
+    seconds: float = 60.0,
+    noiseless: bool = False,
+    late_s: Array | float = 0.0,
+) -> Log:
+    """What would have been measured of this robot, 20 rows per second, from rest.
+
+    Poses are stamped later than commands by `late_s`, which may differ between episodes and rows.
+    """
     rows = round(seconds * RATE_HZ)
     drives = make_drives(case.seed, episodes, rows)
     level = 0.0 if noiseless else LEVELS[case.noise]
-    poses = measured(true_poses(case, drives, level), case, level)
+    late = np.broadcast_to(np.asarray(late_s, dtype=float), (episodes, rows))
+    poses = measured(_stamped(fine_poses(case, drives, level), late), case, level)
     times = np.arange(rows) / RATE_HZ
     drives_measured = (LogEpisode(f"{e:02d}", times, drives.duties[e], poses[e], None) for e in range(episodes))
     return Log(case.name, "duckiebot", "duty", float(RATE_HZ), {}, tuple(drives_measured))
@@ -76,10 +87,22 @@ def make_log(case: Case, *, episodes: int = 12, seconds: float = 60.0, noiseless
 
 def true_poses(case: Case, drives: Drives, level: float) -> Array:
     """Poses (E, rows, 3) of the middle of the axle, with `level` times the normal disturbance of motion."""
+    return fine_poses(case, drives, level)[:, ::PER_ROW]
+
+
+def _stamped(poses: Array, late_s: Array) -> Array:
+    """Fine poses as rows (E, rows, 3) that are stamped so much too late (E, rows); NaN where the drive had ended."""
+    step = np.arange(late_s.shape[1]) * PER_ROW - np.rint(late_s * FINE_HZ).astype(int)
+    there = (step >= 0) & (step < poses.shape[1])
+    rows = poses[np.arange(len(poses))[:, None], np.clip(step, 0, poses.shape[1] - 1)]
+    return np.where(there[..., None], rows, np.nan)
+
+
+def fine_poses(case: Case, drives: Drives, level: float) -> Array:
+    """The same at every fine step."""
     twists = disturbed(wheel_twists(case, drives.duties), case, level)
     places = [(PLACES[name], figures) for name, figures in case.effects if name in PLACES]
-    poses = _stepped(twists, drives.starts, places) if places else _integrated(twists, drives.starts)
-    return poses[:, ::PER_ROW]
+    return _stepped(twists, drives.starts, places) if places else _integrated(twists, drives.starts)
 
 
 def wheel_twists(case: Case, messages: Array) -> Array:
@@ -196,6 +219,15 @@ def _sticking(duty: Array, breakaway: float, release: float) -> Array:
     return np.where(went > stopped, duty, 0.0)
 
 
+def _ramped(duty: Array, rise: float) -> Array:
+    """Duties that go from rest to full in `rise` seconds at best."""
+    now, ramped = np.zeros_like(duty[:, 0]), np.empty_like(duty)
+    for step in range(duty.shape[1]):
+        now = now + np.clip(duty[:, step] - now, -1.0 / (rise * FINE_HZ), 1.0 / (rise * FINE_HZ))
+        ramped[:, step] = now
+    return ramped
+
+
 DUTY: Stage = {  # duties (E, T, 2) at the motors; left and right say which wheels have the effect
     "dead_band": lambda u, s, width, left=1, right=1: _on(_shrunk(u, width), u, left, right),
     "dead_zone_that_jumps": lambda u, s, width: np.where(np.abs(u) > width, u, 0.0),
@@ -203,6 +235,7 @@ DUTY: Stage = {  # duties (E, T, 2) at the motors; left and right say which whee
     "smooth_saturation": lambda u, s, limit: limit * np.tanh(u / limit),
     "stiction": lambda u, s, breakaway, release=0.5: _sticking(u, breakaway, release),
     "driver_map": lambda u, s, offset: np.sign(u) * np.where(np.abs(u) < 0.01, 0.0, offset + (1 - offset) * np.abs(u)),
+    "slew_rate": lambda u, s, rise: _ramped(u, rise),
     "driver_curve": lambda u, s, power: np.sign(u) * np.abs(u) ** power,
 }
 
@@ -219,6 +252,8 @@ def _sagging(target: Array, load: Array, fade: float, drop: float) -> Array:
 TARGET: Stage = {  # target speeds of the wheels (E, T, 2)
     "wheel_gain": lambda w, s, left, right: w * (left, right),
     "battery_sag": lambda w, s, fade=0.0, load=0.0: _sagging(w, _load(s), fade, load),
+    "fading_with_time": lambda w, s, rate: w * np.exp(-rate * s.times[:, None] / 60.0),
+    "thermal_fade": lambda w, s, loss, time_constant: w * (1.0 - loss * _lagged(_load(s), time_constant)),
     "sag_with_time": lambda w, s, rate: w * (1.0 - rate * s.times[:, None] / 60.0),
     "sag_with_square_of_load": lambda w, s, load: w * (1.0 - load * _load(s) ** 2),
     "slipping_hub": lambda w, s, factor, after: _on(np.where(s.times[:, None] < after, w, factor * w), w, 1, 0),
@@ -266,6 +301,7 @@ def _played(speeds: Array, gap: float, passed: float) -> Array:
 WHEELS: Stage = {  # speeds of the wheels (E, T, 2)
     "backlash": lambda w, s, gap, passed=0.0: _played(w, gap, passed),
     "eccentric_wheel": lambda w, s, ripple: w * (1.0 + ripple * np.sin(_angles(w)) * (1.0, 0.0)),
+    "wheel_ripple": lambda w, s, left, right, ahead: w * (1.0 + np.array((left, right)) * np.sin(_angles(w) + ahead)),
 }
 
 TWIST: Stage = {  # twists (E, T, 3): forward, sideways [m/s], yaw rate [rad/s]
@@ -275,6 +311,11 @@ TWIST: Stage = {  # twists (E, T, 3): forward, sideways [m/s], yaw rate [rad/s]
     "turn_slip_with_square": lambda m, s, gain: m / (1.0 + (gain, 0.0, 0.0) * m[..., 2:] ** 2),
     "lateral_slip": lambda m, s, gain: m - (0.0, gain, 0.0) * (m[..., :1] * m[..., 2:]),
     "lateral_slip_with_square": lambda m, s, gain: m - (0, gain, 0) * (m[..., :1] * np.abs(m[..., :1]) * m[..., 2:]),
+    "cross_coupling": lambda m, s, forward=0.0, turn=0.0: (
+        m + forward * m[..., 2:] ** 2 * (1.0, 0.0, 0.0) + turn * np.abs(m[..., :1]) * (0.0, 0.0, 1.0)
+    ),
+    "understeer": lambda m, s, gain: m / (1.0 + (0.0, 0.0, gain) * np.abs(m[..., :1])),
+    "yaw_lag": lambda m, s, time_constant: _on(_lagged(m, time_constant), m, 0, 0, 1),
     "yaw_friction": lambda m, s, width: _on(_shrunk(m, width), m, 0, 0, 1),
 }
 
@@ -283,8 +324,20 @@ def _climb(pose: Array, x: float, y: float) -> Array:
     return np.array((1.0, 0.0, 0.0)) * (x * np.cos(pose[:, 2:]) + y * np.sin(pose[:, 2:]))
 
 
+def _across(pose: Array, x: float, y: float) -> Array:
+    return np.array((0.0, 1.0, 0.0)) * (x * np.sin(pose[:, 2:]) - y * np.cos(pose[:, 2:]))
+
+
+def _in_patch(pose: Array, x: float, y: float, radius: float) -> NDArray[np.bool_]:
+    return np.hypot(pose[:, :1] - x, pose[:, 1:2] - y) < radius
+
+
 PLACES: Stage = {  # twists (E, 3) at poses (E, 3)
     "floor_slope": lambda m, p, x, y: m - (np.abs(m[:, :1]) > 0.02) * _climb(p, x, y),
+    "sliding_slope": lambda m, p, x, y, push: (
+        m - (np.abs(m[:, :1]) > 0.02) * (_climb(p, x, y) - push * _across(p, x, y))
+    ),
+    "slippery_patch": lambda m, p, loss, x, y, radius: m * np.where(_in_patch(p, x, y, radius), 1.0 - loss, 1.0),
     "gradual_slope": lambda m, p, x, y: m - np.tanh(np.abs(m[:, :1]) / 0.1) * _climb(p, x, y),
     "carpet": lambda m, p, factor, beyond: m * np.where(p[:, :1] > beyond, factor, 1.0),
     "bent_floor": lambda m, p, gain, waves: m + (0.0, 0.0, gain) * (m[:, :1] * np.sin(waves * p[:, :1])),
@@ -338,6 +391,24 @@ IN_FORM: tuple[Case, ...] = (
     *_sized("delay_jitter", "spread", 0.05, 0.1, 0.2),
     *_sized("dropped_commands", "probability", 0.1, 0.2, 0.4),
     *_sized("command_quantisation", "step", 0.1, 0.2, 0.3),
+    *_sized("command_quantisation", "step", 0.137, 0.0655, 0.231),
+    *_sized("slew_rate", "rise", 0.4, 0.8, 1.6),
+    *_sized("thermal_fade", "loss", 0.3, 0.6, time_constant=5.0),
+    *_sized("cross_coupling", "forward", 0.008, 0.02, turn=0.1),
+    *_sized("cross_coupling", "turn", 0.3, 0.8),
+    *_sized("understeer", "gain", 0.2, 0.5, 1.2),
+    *_sized("yaw_lag", "time_constant", 0.05, 0.1, 0.25),
+    *_sized("wheel_ripple", "left", 0.1, 0.25, right=0.15, ahead=0.7),
+    *_sized("slippery_patch", "loss", 0.3, 0.6, x=0.4, y=-0.2, radius=0.7),
+    *(
+        _case(f"fading_with_time rate {rate:g}", ("fading_with_time", {"rate": rate}), right=(("battery_sag",),))
+        for rate in (0.15, 0.4)
+    ),
+    *(
+        _case(f"sliding_slope x {x:g}", ("sliding_slope", {"x": x, "y": 0.01, "push": 0.8}), right=(("floor_slope",),))
+        for x in (0.015, -0.04)
+    ),
+    *_sized("stiction", "breakaway", 0.12, 0.2, release=0.8),
 )
 """Effects of the catalogue's own form, small to large."""
 
@@ -353,13 +424,14 @@ OTHER_FORM: tuple[Case, ...] = tuple(
         ("stiction that releases late", {"breakaway": 0.15, "release": 0.85}, ("stiction",)),
         ("backlash that passes a third", {"gap": 0.6, "passed": 0.33}, ("backlash",)),
         ("driver_curve", {"power": 0.75}, ("driver_map",)),
-        ("scrub_with_speed", {"gain": 0.5}, ("yaw_scrub",)),
+        ("scrub_with_speed", {"gain": 0.5}, ("understeer", "yaw_scrub")),
         ("turn_slip_with_square", {"gain": 0.05}, ("turn_slip",)),
         ("lateral_slip_with_square", {"gain": 0.25}, ("lateral_slip",)),
         ("gradual_slope", {"x": 0.02, "y": 0.02}, ("floor_slope",)),
         ("gaussian_jitter", {"spread": 0.08}, ("delay_jitter",)),
         ("overtaking_jitter", {"spread": 0.2}, ("delay_jitter",)),
         ("dropped_bursts", {"rate": 0.06, "length": 4}, ("dropped_commands",)),
+        ("eccentric_wheel", {"ripple": 0.25}, ("wheel_ripple",)),
         ("truncated_commands", {"step": 0.15}, ("command_quantisation",)),
     )
 )
@@ -386,7 +458,6 @@ PAIRS: tuple[Case, ...] = tuple(
 OUTSIDE: tuple[Case, ...] = tuple(
     _case(effect, (effect, figures), right=(), depends_on=signal)
     for effect, figures, signal in (
-        ("eccentric_wheel", {"ripple": 0.25}, "left wheel angle"),
         ("carpet", {"factor": 0.8, "beyond": 0.0}, "position x"),
         ("bent_floor", {"gain": 1.0, "waves": 4.0}, "position x"),
         ("slipping_hub", {"factor": 0.85, "after": 30.0}, "time in log"),

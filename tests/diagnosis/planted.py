@@ -26,6 +26,9 @@ TICKS = 3
 TICK_HZ = float(TICKS * RATE_HZ)
 ROBOT = read_robot("duckiebot")
 NOISE = Noise((0.02, 0.01, 0.08), (0.002, 0.005))
+CALM = Noise((0.002, 0.001, 0.008), (0.002, 0.005))
+"""Drives so even that the noise of their poses is all that is left."""
+
 DECLARED = (("trim",), ("delay",))
 TRUTH = {"trim": 0.03, "delay": 0.12}
 
@@ -56,7 +59,7 @@ def driven_log(theta: Theta, duties: Array, starts: Array, *, seed: int = 1, noi
 def _twists(theta: Theta, duties: Array, starts: Array) -> Array:
     train = drivetrain(ROBOT, effects_from({**ROBOT.theta, **theta}, ROBOT.figures))
     nominal = {**ROBOT.figures, "control_rate": float(RATE_HZ)}
-    setting = Setting(TICK_HZ, np.zeros((len(duties), 2)), nominal, headings=starts[:, 2:])
+    setting = Setting(TICK_HZ, np.zeros((len(duties), 2)), nominal, headings=starts[:, 2:], places=starts[:, None, :2])
     return train.apply(np.repeat(duties, TICKS, axis=1), train.begin(setting))[0]
 
 

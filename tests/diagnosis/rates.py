@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from unittest import mock
 
 import numpy as np
-from bullet_truth import BULLET, BulletCase, make_bullet_log
-from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, Case, make_log
+from bullet_truth import BulletCase, make_bullet_log
+from rate_jobs import GENERATORS, Job
 
-import proxytune.diagnosis.diagnosis as diagnosing
-import proxytune.diagnosis.search as searching
+import proxytune.diagnosis.diagnose as diagnosing
+import proxytune.diagnosis.round as looking
 from proxytune.diagnosis.candidates import Candidate, candidates
-from proxytune.diagnosis.diagnosis import Diagnosis, declared_effects, diagnose
+from proxytune.diagnosis.diagnose import declared_effects, diagnose
+from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.drives import Drives, relative
 from proxytune.diagnosis.events import RandomEffect, random_effects
 from proxytune.diagnosis.fitting import Fit
@@ -31,20 +32,6 @@ FLAGGED = ("partly explained", "unexplained")
 
 
 @dataclass(frozen=True)
-class Job:
-    """A case to diagnose; `without` is taken out of the catalogue."""
-
-    kind: str
-    case: Case | BulletCase
-    without: str = ""
-
-    @property
-    def right(self) -> tuple[tuple[str, ...], ...]:
-        """For every hidden effect, the names that count as right."""
-        return getattr(self.case, "right", ())
-
-
-@dataclass(frozen=True)
 class Row:
     """What was said of a case.
 
@@ -56,8 +43,10 @@ class Row:
         evidence: Of the hidden effects, that of the weakest [nats]; the best of all effects where none is hidden.
         before: Error with what is declared [m].
         after: Error with what was added [m].
+        learnt: Error with what was learnt besides [m], NaN where nothing is.
         true: Error of the model that is right [m], NaN where there is none.
-        floor: The noise floor that was told [m].
+        floor: The noise floor that was told, its lower and upper end [m].
+        immaterial: Effects that were found and do not matter.
         problem: What went wrong, empty as a rule.
     """
 
@@ -68,14 +57,21 @@ class Row:
     evidence: float = 0.0
     before: float = np.nan
     after: float = np.nan
+    learnt: float = np.nan
     true: float = np.nan
-    floor: float = np.nan
+    floor: tuple[float, float] = (np.nan, np.nan)
+    immaterial: tuple[str, ...] = ()
     problem: str = ""
 
     @property
     def flagged(self) -> bool:
         """Whether it was said that something is left over."""
         return self.verdict in FLAGGED
+
+    @property
+    def calm(self) -> bool:
+        """Whether it was said that nothing is left over."""
+        return self.verdict in ("explained", "nothing missing")
 
     @property
     def right(self) -> bool:
@@ -93,32 +89,14 @@ class Row:
     def text(self) -> str:
         """One line of the table."""
         added = " + ".join(f"{names[0]}({'/'.join(names[1:])})" if names[1:] else names[0] for names in self.adopted)
-        errors = " ".join(f"{1e3 * value:.1f}" for value in (self.before, self.after, self.true, self.floor))
+        errors = " ".join(
+            f"{1e3 * value:.1f}" for value in (self.before, self.after, self.learnt, self.true, *self.floor)
+        )
         name = self.job.case.name + (f" without {self.job.without}" if self.job.without else "")
+        added += f"; immaterial: {', '.join(self.immaterial)}" if self.immaterial else ""
         rest = f" rest: {', '.join(self.depends_on)}" if self.depends_on else ""
         head = f"{self.job.kind:11s} {name:44s} {self.verdict:16s}"
         return f"{head} [{added}]{rest} {self.evidence:.0f} nats, mm: {errors} {self.problem}".rstrip()
-
-
-def all_jobs(every: int = 1) -> tuple[Job, ...]:
-    """Every n-th case of each kind, the kinds mixed so that any beginning has a share of each."""
-    whole = {
-        "in form": [Job("in form", case) for case in IN_FORM],
-        "other form": [Job("other form", case) for case in OTHER_FORM],
-        "pair": [Job("pair", case) for case in PAIRS],
-        "outside": [Job("outside", case) for case in OUTSIDE],
-        "taken out": [Job("taken out", case, case.right[0][0]) for case in IN_FORM],
-        "clean": [Job("clean", case) for case in CLEAN],
-        "bullet": [Job("bullet", case) for case in BULLET],
-    }
-    chosen = [_shuffled(jobs[::every]) for jobs in whole.values()]
-    placed = [((n + 0.5) / len(jobs), k, job) for k, jobs in enumerate(chosen) for n, job in enumerate(jobs)]
-    return tuple(job for _, _, job in sorted(placed, key=lambda entry: entry[:2]))
-
-
-def _shuffled(jobs: list[Job]) -> list[Job]:
-    """In an order of their own, so that neighbours do not hide the same effect."""
-    return [jobs[number] for number in np.random.default_rng(1).permutation(len(jobs))]
 
 
 def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
@@ -139,15 +117,19 @@ def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
         evidence=_evidence(job, found),
         before=error.before.value,
         after=error.after.value,
+        learnt=_learnt_error(found),
         true=_true_error(job, found.parts.tested, episodes, seconds),
-        floor=error.noise_floor,
+        floor=error.floor[:2],
+        immaterial=tuple(one.effect for one in found.immaterial),
     )
 
 
-def _log(job: Job, episodes: int, seconds: float) -> Log:
+def _log(job: Job, episodes: int, seconds: float, noiseless: bool = False) -> Log:
     if isinstance(job.case, BulletCase):
-        return make_bullet_log(job.case, episodes=episodes, seconds=seconds)
-    return make_log(job.case, episodes=episodes, seconds=seconds)
+        return make_bullet_log(job.case, episodes=episodes, seconds=seconds, noiseless=noiseless)
+    make_log = GENERATORS[job.generator].make_log
+    log: Log = make_log(job.case, episodes=episodes, seconds=seconds, noiseless=noiseless)
+    return log
 
 
 @contextmanager
@@ -161,8 +143,8 @@ def _without(effect: str) -> Iterator[None]:
         return tuple(found for found in random_effects(model, seed) if found.effect != effect)
 
     with (
-        mock.patch.object(searching, "candidates", forms),
-        mock.patch.object(searching, "random_effects", chancy),
+        mock.patch.object(looking, "candidates", forms),
+        mock.patch.object(looking, "random_effects", chancy),
         mock.patch.object(diagnosing, "has_body", return_value=False),
     ):
         yield
@@ -176,11 +158,16 @@ def _evidence(job: Job, found: Diagnosis) -> float:
     return min(max(gains.get(name, 0.0) for name in names) for names in job.right)
 
 
+def _learnt_error(found: Diagnosis) -> float:
+    errors = found.learning.errors
+    return min(errors, key=lambda one: abs(one.horizon_s - HORIZON_S)).after.value if errors else float("nan")
+
+
 def _true_error(job: Job, tested: Drives, episodes: int, seconds: float) -> float:
     """The error of the same windows when the hidden robot itself predicts, undisturbed; NaN where it draws."""
     if isinstance(job.case, BulletCase) or {name for names in job.right for name in names} & set(RANDOM_EFFECTS):
         return float("nan")
-    quiet = make_log(job.case, episodes=episodes, seconds=seconds, noiseless=True)
+    quiet = _log(job, episodes, seconds, noiseless=True)
     poses = np.stack([episode.poses for episode in quiet.episodes])[2::3]
     windows = cut(tested, HORIZON_S)
     ticks = round(tested.tick_hz / tested.rate_hz)
@@ -221,12 +208,18 @@ def rates(rows: Sequence[Row]) -> dict[str, Rate]:
         "in form wrong without a flag": _rate(by_kind.get("in form", []), lambda row: row.wrong),
         "pairs both named": _rate(pairs, lambda row: row.right),
         "pairs wrong without a flag": _rate(pairs, lambda row: row.wrong),
-        "clean false alarms": _rate(by_kind.get("clean", []), lambda row: row.verdict != "nothing missing"),
+        "clean false alarms": _rate(by_kind.get("clean", []), lambda row: bool(row.adopted) or row.flagged),
         "taken out flagged": _rate(lost, lambda row: row.flagged),
         "outside flagged": _rate(by_kind.get("outside", []), lambda row: row.flagged),
         "other form right or flagged": _rate(other, lambda row: row.right or row.flagged),
         "other form right": _rate(other, lambda row: row.right),
         "other form wrong without a flag": _rate(other, lambda row: row.wrong),
+        "explained beyond 1.3 x the true floor": _rate(
+            [row for row in rows if np.isfinite(row.true)], lambda row: row.calm and row.after > 1.3 * row.true
+        ),
+        "floor bracket holds the true one": _rate(
+            [row for row in rows if np.isfinite(row.true)], lambda row: row.floor[0] <= row.true <= row.floor[1]
+        ),
         "error after within 5 % of the true model's": Rate(sum(value < 1.05 for value in near), len(near)),
         "error after within 10 % of the true model's": Rate(sum(value < 1.10 for value in near), len(near)),
         "failed": _rate(rows, lambda row: bool(row.problem)),

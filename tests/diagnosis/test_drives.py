@@ -11,7 +11,8 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import ROBOT, planted_drives
 
-from proxytune.diagnosis.drives import duties_of, gather, number_of, relative, sum_by
+from proxytune.diagnosis.commands import duties_of
+from proxytune.diagnosis.drives import gather, number_of, relative, sum_by
 from proxytune.driving.robot import read_robot
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode
@@ -188,3 +189,31 @@ def test_the_other_robots_commands_are_scaled_by_their_own_figures(name):
     full = other.figures["full_speed"] / other.figures["wheel_radius"]
     speeds = duties_of(log(command="wheel_speed"), other, np.array([[full, -full]]))
     np.testing.assert_allclose(speeds, [[1.0, -1.0]])
+
+
+def at_own_times(issued, commands, rows=4, wheels=None):
+    drive = replace(episode([0.1 * k for k in range(rows)], wheels=wheels), commands=np.array(commands, dtype=float))
+    return gathered(replace(drive, issued=np.array(issued)))
+
+
+def test_a_command_is_held_from_its_own_time_as_the_mean_over_each_tick():
+    drives = at_own_times([0.025, 0.1], [[0.6, 0.3], [0.0, 0.2]])
+    np.testing.assert_allclose(drives.duties[0, :8, 0], [0, 0.3, 0.6, 0.6, 0.6, 0.6, 0, 0], atol=1e-12)
+    assert np.flatnonzero(drives.issued[0]).tolist() == [1, 6]
+    assert drives.rate_hz == pytest.approx(1.0 / 0.075)
+
+
+def test_a_command_from_before_the_first_sample_is_in_force_already():
+    drives = at_own_times([-0.4, -0.2, 0.05], [[0.9, 0.9], [0.6, 0.3], [0.0, 0.2]])
+    np.testing.assert_allclose(drives.rest, [[0.6, 0.3]])
+    np.testing.assert_allclose(drives.duties[0, :4, 1], [0.3, 0.3, 0.3, 0.2])
+    assert np.flatnonzero(drives.issued[0]).tolist() == [3]
+
+
+def test_commands_at_the_samples_times_are_the_commands_of_the_samples():
+    rows = [[0.1, 0.2], [0.3, 0.1], [0.0, 0.0], [0.5, 0.5]]
+    plain = gathered(episode([0.0, 0.1, 0.2, 0.3], commands=rows))
+    own = at_own_times([0.0, 0.05, 0.1, 0.15], rows)
+    np.testing.assert_allclose(own.duties, plain.duties, atol=1e-12)
+    np.testing.assert_array_equal(own.issued, plain.issued)
+    assert own.rate_hz == pytest.approx(plain.rate_hz)

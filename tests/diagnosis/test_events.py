@@ -9,11 +9,19 @@ import pytest
 
 sys.path.append(str(Path(__file__).parent))
 
-from planted import TRUTH, fitted, planted_drives
+from own_times import own_times_log
+from planted import TRUTH, drives_of, fitted, planted_drives
 
-from proxytune.diagnosis.events import SHIFTS, _jitter, _lost, random_effects, responses
+from proxytune.diagnosis.events import SHIFTS, _changed, _mixture, _without, random_effects, responses
+from proxytune.diagnosis.replay import RANDOM_EFFECTS
 
 SHORT = {"episodes": 4, "seconds": 25.0}
+
+
+def ratio(effect, size, pull, energy):
+    """The log-likelihood ratio of each command, one command per second."""
+    late = RANDOM_EFFECTS[effect].lateness(size, 1.0)
+    return _mixture(late.commands, late.log_weights, pull, energy)
 
 
 def weighed(theta, seed=1):
@@ -84,17 +92,46 @@ def test_a_robot_whose_command_never_changes_has_no_responses():
     assert random_effects(base, 1) == ()
 
 
-@pytest.mark.parametrize(("ratio", "size"), [(_lost, 0.05), (_lost, 0.2), (_jitter, 0.3), (_jitter, 2.0)])
-def test_mean_lateness_speaks_for_nothing_since_the_delay_has_it_already(ratio, size):
+@pytest.mark.parametrize(
+    ("effect", "size"),
+    [("dropped_commands", 0.05), ("dropped_commands", 0.2), ("delay_jitter", 0.3), ("delay_jitter", 2.0)],
+)
+def test_mean_lateness_speaks_for_nothing_since_the_delay_has_it_already(effect, size):
     pull = np.array([-1e-4, 0.0, 1e-4])
-    said = ratio(size, pull, np.zeros(3))
+    said = ratio(effect, size, pull, np.zeros(3))
     np.testing.assert_allclose(said - said[1], 0.0, atol=2e-6)
     assert said[1] == pytest.approx(0.0, abs=1e-3)
 
 
-@pytest.mark.parametrize(("ratio", "size"), [(_lost, 0.2), (_jitter, 1.5)])
-def test_what_points_against_a_loss_of_no_consequence_costs(ratio, size):
-    gains = ratio(size, np.array([-8.0, 0.0, 0.0]), np.array([8.0, 8.0, 1e-9]))
+@pytest.mark.parametrize(("effect", "size"), [("dropped_commands", 0.2), ("delay_jitter", 1.5)])
+def test_what_points_against_a_loss_of_no_consequence_costs(effect, size):
+    gains = ratio(effect, size, np.array([-8.0, 0.0, 0.0]), np.array([8.0, 8.0, 1e-9]))
     assert gains[0] > 1.0
     assert gains[1] < 0.0
     assert gains[2] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_commands_at_times_of_their_own_are_no_jitter_of_the_robot_but_on_a_grid_they_look_like_it(seed):
+    gains = {}
+    for gridded in (False, True):
+        log = own_times_log(seed, episodes=4, seconds=30.0, gridded=gridded)
+        found = {effect.effect: effect for effect in random_effects(fitted(drives_of(log)), 1)}
+        gains[gridded] = found["delay_jitter"].gain
+    assert gains[False] < 5.0
+    assert gains[True] > 30.0
+
+
+def test_a_command_that_is_lost_is_lost_until_the_next_one():
+    drives = drives_of(own_times_log(1, episodes=1, seconds=20.0, gridded=False))
+    changed, phase = _changed(drives)
+    lost = changed[phase == phase[5]]
+    duties = _without(drives, lost)
+    issued = np.flatnonzero(drives.issued[0])
+    for _, tick in lost:
+        following = issued[issued > tick][0]
+        np.testing.assert_array_equal(
+            duties[0, tick:following], np.tile(drives.duties[0, tick - 1], (following - tick, 1))
+        )
+    assert np.any(duties != drives.duties)
+    assert np.diff(lost[:, 1]).min() > 2.0 * drives.tick_hz

@@ -14,27 +14,14 @@ sys.path.append(str(Path(__file__).parent))
 import hidden
 from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives
 
+from proxytune.diagnosis.candidates import MOTION_EFFECTS
 from proxytune.diagnosis.drives import gather
 from proxytune.diagnosis.flexible import curves
-from proxytune.diagnosis.search import LEAST_GAIN
-from proxytune.diagnosis.signals import hats, signal_groups, wheel_angles
-from proxytune.effects import CATALOGUE
+from proxytune.diagnosis.round import LEAST_GAIN
+from proxytune.diagnosis.signals import hats, signal_groups
+from proxytune.effects import CATALOGUE, Cue
 
 SHORT = {"episodes": 3, "seconds": 30.0}
-NAMES = {
-    "wheel command",
-    "difference of the wheel commands",
-    "command transients",
-    "distance since reversal",
-    "time in the episode",
-    "cumulated use",
-    "turn rate",
-    "heading",
-    "position",
-    "left wheel angle",
-    "right wheel angle",
-    "direction of travel",
-}
 
 
 @settings(derandomize=True, deadline=None, max_examples=50)
@@ -66,11 +53,12 @@ def clean():
 
 def test_every_signal_has_motion_on_every_tick_and_effects_of_the_catalogue(clean):
     groups = signal_groups(clean)
-    assert {group.name for group in groups} == NAMES
+    assert {group.name for group in groups} == set(Cue)
+    assert {name for group in groups for name in group.effects} == set(MOTION_EFFECTS)
     for group in groups:
         assert group.twists.shape[:3] == (*clean.drives.duties.shape[:2], 3)
         assert np.isfinite(group.twists).all()
-        assert set(group.effects) <= set(CATALOGUE)
+        assert all(group.name in CATALOGUE[name].trace.cues for name in group.effects)
         assert group.signal.shape == clean.drives.duties.shape[:2]
 
 
@@ -103,7 +91,7 @@ def test_curves_come_best_first(clean):
 def test_a_wheel_has_turned_as_far_as_it_rolled():
     log = hidden.make_log(hidden.Case("plain", (), "normal", 5, 0.0, 0.0), episodes=2, seconds=10.0, noiseless=True)
     drives = gather(log, ROBOT, log.episodes)
-    angles = wheel_angles(drives)
+    angles = drives.angles
     way = np.stack([np.hypot(*np.diff(e.poses[:, :2], axis=0).T).sum() for e in log.episodes])
     rolled = np.abs(np.diff(angles, axis=1)).sum(axis=1).mean(axis=-1) * 0.0318
     assert (rolled > 0.9 * way).all()

@@ -10,11 +10,12 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, ROBOT, TRUTH, driven_log, drives_of
 
+from proxytune.diagnosis.adoption import NATS_APART
 from proxytune.diagnosis.candidates import candidates
 from proxytune.diagnosis.fitting import seen
+from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.manoeuvres import LIBRARY, imagined, next_manoeuvre
 from proxytune.diagnosis.replay import increments
-from proxytune.diagnosis.search import NATS_APART, Adopted, Found
 
 SIZES = {
     "dead_band": {"dead_band.width": 0.08, "dead_band.imbalance": 0.0},
@@ -42,6 +43,16 @@ def found(drives, effect, *rivals):
 
 def test_without_rivals_there_is_nothing_to_tell_apart(drives):
     assert next_manoeuvre(found(drives, "dead_band")) is None
+
+
+def test_where_noise_is_not_known_what_is_driven_is_driven_ten_times(drives):
+    alone = next_manoeuvre(found(drives, "dead_band"), again=True)
+    assert (alone.times, alone.nats_per_minute) == (10, None)
+    assert alone.duties.shape == (1200, 2)
+    rivals = next_manoeuvre(found(drives, "dead_band", "stiction"), again=True)
+    assert rivals.times == 10
+    assert next_manoeuvre(found(drives, "dead_band", "stiction")).times == 1
+    assert rivals.between == ("dead_band", "stiction")
 
 
 @pytest.mark.parametrize(

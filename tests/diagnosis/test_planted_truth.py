@@ -38,6 +38,30 @@ def test_a_hidden_effect_is_named_and_nothing_else(name):
         assert row.after < 1.15 * row.true < 0.9 * row.before
 
 
+LATER = [
+    "command_quantisation step 0.137",
+    "slew_rate rise 0.8",
+    "thermal_fade loss 0.6",
+    "cross_coupling forward 0.02",
+    "cross_coupling turn 0.3",
+    "understeer gain 0.5",
+    "yaw_lag time_constant 0.1",
+    "wheel_ripple left 0.25",
+    "slippery_patch loss 0.6",
+    "fading_with_time rate 0.4",
+    "sliding_slope x -0.04",
+    "stiction breakaway 0.2",
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LATER)
+def test_an_effect_that_joined_the_catalogue_later_is_named(name):
+    row = said_of(name, "in form")
+    assert row.right, row.text
+    assert row.evidence > rates.CLEAR
+
+
 def test_what_no_catalogue_has_is_flagged():
     row = said_of("carpet", "outside")
     assert row.flagged, row.text

@@ -9,6 +9,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parent))
 
+from learnt_truth import MANY, TURNING
 from planted import ROBOT, TRUTH, planted_log
 
 from proxytune.diagnosis.prediction import agreement, predict
@@ -33,16 +34,36 @@ def test_windows_follow_one_another_and_cover_every_row(log):
 
 
 def test_a_model_agrees_with_its_own_noiseless_log(log):
-    place, turn, poses = agreement(predict(log, ROBOT, TRUTH, 2.0), log)
-    assert place < 1e-9
-    assert turn < 1e-9
-    assert poses == 2 * 199
+    found = agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0)
+    assert found.place < 1e-9
+    assert found.turn < 1e-9
+    assert (found.poses, found.windows) == (2 * 199, 10)
+
+
+def test_a_stub_at_a_drives_end_is_not_counted_as_a_window(log):
+    table = predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 1.9)
+    found = agreement(table, log, 1.9)
+    ends = table.groupby(["episode", "start_time"]).time.max().reset_index()
+    assert (ends.time - ends.start_time).min() < 0.5
+    assert found.windows == 2 * 5
+    assert found.poses == found.windows * 38
+    whole = table[table.start_time < 9.0]
+    assert agreement(whole, log, 1.9) == found
+
+
+@pytest.mark.parametrize("extra", [TURNING, MANY], ids=["turning", "many"])
+def test_learnt_motion_is_predicted_with_its_past_before_each_window(log, extra):
+    driven = planted_log({**TRUTH, **extra}, episodes=2, seconds=10.0, noise=None)
+    assert agreement(predict(driven, ROBOT, TRUTH, 2.0), driven, 2.0).place > 0.005
+    found = agreement(predict(driven, ROBOT, {**TRUTH, **extra}, 2.0), driven, 2.0)
+    assert found.place < 1e-9
+    assert found.turn < 1e-9
 
 
 def test_another_model_does_not(log):
-    place, turn, _ = agreement(predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 2.0), log)
-    assert place > 0.005
-    assert turn > 0.02
+    found = agreement(predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 2.0), log, 2.0)
+    assert found.place > 0.005
+    assert found.turn > 0.02
 
 
 def test_each_window_starts_from_the_measured_pose(log):
@@ -65,8 +86,8 @@ def test_headings_go_on_over_a_whole_turn(log):
 def test_a_slope_is_predicted_exactly_whatever_the_heading():
     theta = {**TRUTH, "floor_slope.x": 0.04, "floor_slope.y": -0.02}
     log = planted_log(theta, episodes=3, seconds=10.0, noise=None)
-    assert agreement(predict(log, ROBOT, theta, 2.0), log)[0] < 1e-6
-    assert agreement(predict(log, ROBOT, TRUTH, 2.0), log)[0] > 0.01
+    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
+    assert agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0).place > 0.01
 
 
 def test_a_marker_is_predicted_exactly():
@@ -80,7 +101,7 @@ def test_a_marker_is_predicted_exactly():
         return out
 
     log = replace(plain, episodes=tuple(replace(e, poses=seen(e.poses)) for e in plain.episodes))
-    assert agreement(predict(log, ROBOT, theta, 2.0), log)[0] < 1e-6
+    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
 
 
 def test_a_window_begins_at_the_first_measured_pose_after_the_one_before(log):
@@ -98,7 +119,7 @@ def test_poses_that_were_not_measured_are_not_compared(log):
     poses = first.poses.copy()
     poses[50:60] = np.nan
     broken = replace(log, episodes=(replace(first, poses=poses),))
-    assert agreement(predict(broken, ROBOT, TRUTH, 2.0), broken)[2] < 190
+    assert agreement(predict(broken, ROBOT, TRUTH, 2.0), broken, 2.0).poses < 190
 
 
 @pytest.mark.parametrize("horizon", [0.0, 0.04, -1.0, float("nan")])
@@ -125,4 +146,4 @@ def test_an_episode_with_a_pose_or_two_is_predicted_from_it(log, known):
 
 def test_random_effects_are_predicted_by_their_mean(log):
     late = predict(log, ROBOT, {"trim": 0.03, "delay": 0.07, "delay_jitter": 0.1}, 2.0)
-    assert agreement(late, log)[0] < 1e-9
+    assert agreement(late, log, 2.0).place < 1e-9

@@ -9,7 +9,10 @@ from joblib import Parallel, delayed
 
 sys.path.append(str(Path(__file__).parent))
 
+import rate_rows
 import rates
+from hidden import Case
+from rate_jobs import Job, all_jobs
 
 EVERY = 24
 """Every so many-th case of each kind: twelve one-minute logs take about half a minute of processor time a case."""
@@ -17,7 +20,7 @@ EVERY = 24
 
 @pytest.mark.slow
 def test_what_is_hidden_is_named_and_what_cannot_be_named_is_flagged(capsys):
-    jobs = rates.all_jobs(EVERY)
+    jobs = all_jobs(EVERY)
     rows = Parallel(n_jobs=2)(delayed(rates.diagnosed)(job) for job in jobs)
     counted = rates.rates(rows)
     with capsys.disabled():
@@ -36,9 +39,9 @@ def test_what_is_hidden_is_named_and_what_cannot_be_named_is_flagged(capsys):
 
 
 def row(kind, verdict, *adopted, right=(), **more):
-    case = rates.Case("case", (), "normal", 1, 0.0, 0.0, right)
+    case = Case("case", (), "normal", 1, 0.0, 0.0, right)
     without = "dead_band" if kind == "taken out" else ""
-    return rates.Row(rates.Job(kind, case, without), verdict, adopted, **more)
+    return rates.Row(Job(kind, case, without), verdict, adopted, **more)
 
 
 def test_a_hidden_effect_counts_as_named_if_it_or_its_rival_was_added():
@@ -77,18 +80,18 @@ def test_rates_count_what_they_say():
 
 
 def test_every_kind_has_a_share_of_any_beginning():
-    kinds = {job.kind for job in rates.all_jobs()[:60]}
+    kinds = {job.kind for job in all_jobs()[:60]}
     assert kinds == {"in form", "other form", "pair", "outside", "taken out", "clean", "bullet"}
-    names = [(job.kind, job.case.name) for job in rates.all_jobs()]
+    names = [(job.kind, job.case.name) for job in all_jobs()]
     assert len(names) == len(set(names)) > 200
 
 
 def test_an_effect_taken_out_is_not_found():
     with rates._without("dead_band"):
-        forms = rates.searching.candidates(rates.read_robot("duckiebot").figures, {}, ())
+        forms = rates.looking.candidates(rates.read_robot("duckiebot").figures, {}, ())
     assert "stiction" in {form.effect for form in forms}
     assert "dead_band" not in {form.effect for form in forms}
-    assert rates.searching.candidates is rates.candidates
+    assert rates.looking.candidates is rates.candidates
 
 
 def test_a_row_tells_its_case_in_one_line():
@@ -97,3 +100,41 @@ def test_a_row_tells_its_case_in_one_line():
     assert "[stiction(backlash)] rest: heading" in text
     assert "\n" not in text
     assert np.isnan(row("clean", "nothing missing").true)
+
+
+@pytest.mark.parametrize("generator", ["first", "second"])
+def test_a_row_comes_back_from_json_as_it_was(generator):
+    for job in all_jobs(every=20, generator=generator):
+        told = rates.Row(job, "explained", (("dead_band", "stiction"),), ("heading",), 12.5, floor=(0.001, np.nan))
+        line = rate_rows.to_json(told)
+        back = rate_rows.from_json(line)
+        assert "\n" not in line
+        assert "NaN" not in line
+        assert repr(back) == repr(told)
+        assert back.job.generator == generator
+
+
+def test_a_file_of_rows_goes_on_after_a_line_that_was_cut_off(tmp_path):
+    file, jobs = tmp_path / "rows.jsonl", all_jobs(generator="second")[:3]
+    assert rate_rows.read_rows(file) == []
+    rate_rows.append(file, rates.Row(jobs[0], "nothing missing"))
+    file.write_text(file.read_text() + rate_rows.to_json(rates.Row(jobs[1], "explained"))[:40])
+    rate_rows.append(file, rates.Row(jobs[2], "failed", problem="ValueError: none"))
+    assert [row.job for row in rate_rows.read_rows(file)] == [jobs[0], jobs[2]]
+
+
+def test_the_second_generator_has_cases_of_every_kind_but_the_bullet_plant():
+    jobs = all_jobs(generator="second")
+    assert {job.kind for job in jobs[:60]} == {"in form", "other form", "pair", "outside", "taken out", "clean"}
+    assert {job.generator for job in jobs} == {"second"}
+    assert len({rate_rows.key(job) for job in (*jobs, *all_jobs())}) == len(jobs) + len(all_jobs())
+
+
+@pytest.mark.parametrize("generator", ["first", "second"])
+def test_a_job_is_measured_by_its_own_generator_from_the_same_starts_with_noise_or_without(generator):
+    job = all_jobs(every=30, generator=generator)[0]
+    loud, quiet = (rates._log(job, 2, 4.0, noiseless) for noiseless in (False, True))
+    assert loud.name == quiet.name == job.case.name
+    for one, other in zip(loud.episodes, quiet.episodes, strict=True):
+        np.testing.assert_array_equal(one.commands, other.commands)
+        assert 0.0 < np.abs(one.poses - other.poses)[0].max() < 0.1

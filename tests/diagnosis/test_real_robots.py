@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from proxytune.diagnosis.diagnosis import declared_effects, diagnose
+from proxytune.diagnosis.diagnose import declared_effects, diagnose
 from proxytune.diagnosis.vehicle import robot_of
 from proxytune.logs import read_log
 

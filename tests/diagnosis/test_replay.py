@@ -150,3 +150,14 @@ def test_wheels_and_arrived_commands_have_the_shape_of_duties(drives):
 def test_a_value_out_of_bounds_is_refused(drives):
     with pytest.raises(SettingsError, match="delay: must be between"):
         increments(drives, {"delay": PARAMETERS["delay"].high + 0.1})
+
+
+def test_windows_with_measured_wheels_are_told_where_they_point(drives):
+    theta = {**TRUTH, "floor_slope.x": 0.05, "floor_slope.y": 0.02}
+    begin = np.flatnonzero(drives.first % 60 == 0)[2:9]
+    assert len(begin) != len(drives.duties)
+    measured = replace(drives, wheels=wheel_speeds(drives, theta))
+    plain, known = (window_paths(one, theta, begin, 60) for one in (drives, measured))
+    np.testing.assert_allclose(known, plain, atol=0.02)
+    level = window_paths(measured, TRUTH, begin, 60)
+    assert np.abs(level - known).max() > 0.02

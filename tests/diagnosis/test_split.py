@@ -8,7 +8,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parent))
 
-from planted import ROBOT, TRUTH, planted_log
+from planted import ROBOT, TRUTH, planted_log, with_poses
 
 from proxytune.diagnosis.split import BLOCK_S, BLOCKS, split
 from proxytune.errors import LogError
@@ -57,3 +57,14 @@ def test_there_are_enough_blocks_to_leave_out_and_none_is_tiny(episodes, seconds
             assert len(np.unique(drives.episode[own])) == 1
             assert (drives.last[own].max() - drives.first[own].min()) / drives.tick_hz > 0.9 * BLOCK_S
             assert not drives.linked[own][0]
+
+
+def test_half_of_the_measured_motion_not_of_the_time_is_fitted():
+    def lost(poses):
+        poses = poses.copy()
+        poses[400:1400] = np.nan
+        return poses
+
+    fitted, tested = split(with_poses(planted_log(TRUTH, episodes=1, seconds=120.0), lost), ROBOT, None)
+    assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2)
+    assert len(np.unique(fitted.block)) >= 6

@@ -103,9 +103,11 @@ def strongest(theta_name):
 
 def theta_of(theta_name):
     """Without a value and with it: an imbalance is one of something that is there."""
-    effect, *parameter = theta_name.split(".")
+    effect = theta_name.split(".")[0]
     main = theta_names(CATALOGUE[effect])[0]
-    there = {main: strongest(main)} if parameter == ["imbalance"] else {}
+    there = {main: strongest(main)} if PARAMETERS[theta_name].shape else {}
+    if CATALOGUE[effect].trace and CATALOGUE[effect].trace.placed:
+        there |= {f"{effect}.x": 1.58, f"{effect}.y": 0.70, f"{effect}.radius": 0.6}
     weakest_is_felt = effect != "stiction"  # it is below every duty of the agent
     probe = PARAMETERS[theta_name].probes[0] if weakest_is_felt else strongest(theta_name)
     return there, {**there, theta_name: probe}
@@ -258,3 +260,24 @@ def test_the_same_commands_look_different_through_another_camera(tmp_path):
 
 def test_camera_effects_are_those_of_the_camera_stage():
     assert sum(effect.stage is Stage.CAMERA for effect in CATALOGUE.values()) == 6
+
+
+LEARNT = """
+format = 1
+robot = "duckiebot"
+[effects.learnt.range]
+forward = [-0.6, 0.6]
+yaw = [-4, 4]
+[effects.learnt.wheel_speed]
+knots = [0.2, 0.5]
+left = [-0.05, -0.1]
+"""
+
+
+@pytest.mark.parametrize("plant", ["bullet", "planar"])
+def test_a_proxy_drives_what_its_model_has_learnt(tmp_path, plant):
+    model = tmp_path / "model.toml"
+    model.write_text(LEARNT)
+    plain, learnt = (family(tmp_path, plant=plant, seconds=1.5, model=one) for one in (None, model))
+    assert learnt.identity != plain.identity
+    assert np.hypot(*(poses(learnt)[-1] - poses(plain)[-1])[:2]) > 0.01

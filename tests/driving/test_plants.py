@@ -27,14 +27,14 @@ def values_to_agree_on():
         main = effect.parameters[0]
         there = {} if isinstance(main.neutral, str) else {theta_names(effect)[0]: main.probes[len(main.probes) // 2]}
         for theta_name, parameter in zip(theta_names(effect), effect.parameters, strict=True):
-            uneven = parameter.name == "imbalance"
-            for probe in parameter.probes[1:3] if uneven else parameter.probes[-2:-1]:
-                yield pytest.param(name, {**(there if uneven else {}), theta_name: probe}, id=f"{theta_name}={probe}")
+            shape = parameter.shape
+            for probe in parameter.probes[1:3] if shape else parameter.probes[-2:-1]:
+                yield pytest.param(name, {**(there if shape else {}), theta_name: probe}, id=f"{theta_name}={probe}")
 
 
 def twists_for(duties, **theta):
     train = drivetrain(ROBOT, effects_from({**ROBOT.theta, "delay": 0.0, **theta}, ROBOT.figures))
-    return train.apply(duties, train.begin(Setting(60.0, np.zeros(2), ROBOT.figures, 3, START[2:])))[0]
+    return train.apply(duties, train.begin(Setting(60.0, np.zeros(2), ROBOT.figures, 3, START[2:], START[None, :2])))[0]
 
 
 def poses_for(plant, duties, **theta):
@@ -157,3 +157,18 @@ def test_two_robots_at_once_do_not_disturb_each_other():
         twists = twists_for(held(0.5, 0.6, 1.0))
         both = [(one.move(twists[i : i + 3])[0], two.move(-twists[i : i + 3])[0]) for i in range(0, len(twists), 3)]
     np.testing.assert_array_equal(np.concatenate([first for first, _ in both]), alone)
+
+
+LEARNT = {
+    **{"learnt.range.forward@low": -0.6, "learnt.range.forward@high": 0.6},
+    **{"learnt.range.yaw@low": -4.0, "learnt.range.yaw@high": 4.0},
+    **{"learnt.turn_rate.yaw@-2.0": 0.4, "learnt.turn_rate.yaw@2.0": -0.4, "learnt.time.left@3.0": -0.2},
+}
+
+
+def test_both_plants_drive_what_was_learnt():
+    duties = held(0.3, 0.5, seconds=4.0)
+    moved = [np.hypot(*(poses_for(plant, duties, **LEARNT) - poses_for(plant, duties))[-1, :2]) for plant in PLANTS]
+    assert min(moved) > 0.05
+    bullet, planar = (poses_for(plant, duties, **LEARNT)[-1] for plant in PLANTS)
+    np.testing.assert_allclose(bullet, planar, atol=0.04)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from proxytune.driving.robot import read_robot
 from proxytune.effects import CATALOGUE, CHANNELS, PARAMETERS, Setting, Stage, effects_from, theta_names
+from proxytune.space import Parameter
 
 ROBOT = read_robot("duckiebot")
 RATE_HZ = 60.0
@@ -21,14 +22,14 @@ PROBE_VALUES = [
 PROBES = [pytest.param(*probe, id=f"{probe[1]}={probe[2]}") for probe in PROBE_VALUES]
 
 
-IMBALANCED = [name for name, effect in CATALOGUE.items() if effect.parameters[-1].name == "imbalance"]
+IMBALANCED = [name for name, effect in CATALOGUE.items() if f"{name}.imbalance" in PARAMETERS]
 FLAT = [name for name, effect in CATALOGUE.items() if effect.stage not in (Stage.CAMERA, Stage.IMAGE)]
 
 
 def at(name, theta_name, value):
-    """An effect with one value of its own; an imbalance is one of an effect that is there."""
+    """An effect with one value of its own; what only shapes an effect is of one that is there."""
     main = CATALOGUE[name].parameters[0]
-    there = {theta_names(CATALOGUE[name])[0]: main.probes[2]} if theta_name.endswith(".imbalance") else {}
+    there = {theta_names(CATALOGUE[name])[0]: main.probes[2]} if PARAMETERS[theta_name].shape else {}
     (effect,) = effects_from({**there, theta_name: value}, ROBOT.figures)
     return effect
 
@@ -43,9 +44,25 @@ def a_signal(stage: Stage, seed: int, length: int = 90) -> np.ndarray:
     return np.repeat(random.uniform(-1.0, 1.0, (length // 3, len(CHANNELS[stage]))), 3, axis=0)
 
 
+def everywhere():
+    """Places along both axes that reach beyond every patch, nearest first, one after another and to and fro."""
+    way = np.repeat(np.linspace(0.0, 21.0, 225), 2) * np.tile((1.0, -1.0), 225)
+    along = np.stack((way, np.zeros_like(way)), axis=-1)
+    return np.stack((along, along[:, ::-1]), axis=1).reshape(-1, 2)
+
+
+EVERYWHERE = everywhere()
+
+
+def setting_for(effect, rest, seed=7):
+    """An effect of a place is shown one everywhere."""
+    known = {"places": EVERYWHERE, "headings": np.zeros(len(EVERYWHERE))}
+    return Setting(RATE_HZ, rest, ROBOT.figures, seed=seed, **(known if effect.trace and effect.trace.placed else {}))
+
+
 def run(effect, signal, cuts=(), seed=7):
     rest = signal[0] if effect.stage in (Stage.IMAGE, Stage.CAMERA) else np.zeros(signal.shape[-1])
-    memory = effect.begin(Setting(RATE_HZ, rest, ROBOT.figures, seed=seed))
+    memory = effect.begin(setting_for(effect, rest, seed))
     out = []
     for chunk in np.split(signal, sorted(cuts)):
         if len(chunk):
@@ -151,7 +168,7 @@ def test_only_effects_that_draw_depend_on_the_seed(name):
     effect = at(name, theta_names(CATALOGUE[name])[0], CATALOGUE[name].parameters[0].probes[-1])
     signal = a_signal(effect.stage, 4)
     differ = not np.array_equal(run(effect, signal, seed=7), run(effect, signal, seed=8))
-    assert differ == (name in ("delay_jitter", "dropped_commands"))
+    assert differ == bool(CATALOGUE[name].trace.draws)
 
 
 @pytest.mark.parametrize("name", FLAT)
@@ -172,7 +189,7 @@ def test_memories_are_never_changed_in_place(name):
 def test_a_batch_is_filtered_like_its_members(name, theta_name, value):
     effect = at(name, theta_name, value)
     batch = np.stack([a_signal(effect.stage, seed) for seed in range(6)]).reshape(2, 3, 90, -1)
-    memory = effect.begin(Setting(RATE_HZ, np.zeros((2, 3, batch.shape[-1])), ROBOT.figures, seed=7))
+    memory = effect.begin(setting_for(effect, np.zeros((2, 3, batch.shape[-1]))))
     first, memory = effect.apply(batch[..., :50, :], memory)
     second, _ = effect.apply(batch[..., 50:, :], memory)
     together = np.concatenate((first, second), axis=-2)
@@ -187,3 +204,38 @@ def test_every_parameter_has_bounds_around_its_neutral_value_and_a_source(name):
         assert parameter.source
         assert len(parameter.probes) >= 4
         assert all(parameter.low <= probe <= parameter.high for probe in parameter.probes)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_an_effect_leaves_a_trace_in_motion_unless_it_bends_pictures_alone(name):
+    assert (CATALOGUE[name].trace is None) == (name not in FLAT)
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_the_forms_of_an_effect_name_its_own_parameters_and_no_form_twice(name):
+    known = {parameter.name for parameter in CATALOGUE[name].parameters}
+    forms = CATALOGUE[name].trace.forms
+    assert len({form.name for form in forms}) == len(forms)
+    for form in forms:
+        free = {parameter for coordinate in form.free for parameter in coordinate}
+        assert free <= known
+        assert set(form.fixed) <= known - free
+        assert set(form.moved) <= free
+    assert CATALOGUE[name].trace.cues
+
+
+@pytest.mark.parametrize("name", [name for name in FLAT if CATALOGUE[name].trace.draws])
+def test_an_effect_that_draws_tells_how_late_commands_are_about_their_mean(name):
+    (parameter,) = CATALOGUE[name].parameters
+    draws = CATALOGUE[name].trace.draws
+    assert parameter.low < draws.sizes[0] < draws.sizes[1] <= parameter.high
+    late = draws.lateness(draws.sizes[0] * 5.0, 20.0)
+    weights = np.exp(late.log_weights)
+    assert late.mean_s > 0.0
+    assert weights.sum() == pytest.approx(1.0, abs=1e-3)
+    assert weights @ late.commands == pytest.approx(0.0, abs=1e-3)
+
+
+def test_parameters_are_given_by_keyword():
+    with pytest.raises(TypeError, match="positional"):
+        Parameter("trim", "", -0.5, 0.5, 0.0)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
+from proxytune.effects.floor import FloorSlope
 from proxytune.effects.measurement import HeadingOffset, MarkerOffset
-from proxytune.effects.motion import FloorSlope, LateralSlip, TurnSlip, YawScrub
+from proxytune.effects.motion import LateralSlip, TurnSlip, YawScrub
 
 NOMINAL = {"effective_baseline": 0.16}
 RATE_HZ = 10.0
@@ -45,7 +46,7 @@ def test_a_robot_slides_outwards_in_a_bend(forward, yaw, sideways):
     ],
 )
 def test_uphill_is_slower_and_a_robot_at_rest_stays(heading, forward, slowed):
-    twist = run(FloorSlope(0.1, -0.05), [[forward, 0.2, 0.3]], headings=(heading,))
+    twist = run(FloorSlope(0.1, -0.05, 0.0), [[forward, 0.2, 0.3]], headings=(heading,))
     np.testing.assert_allclose(twist, [[slowed, 0.2, 0.3]], atol=1e-12)
 
 
@@ -58,13 +59,13 @@ LOST = {"start": [1.0, 1.5, 2.0, 2.5, 3.0, 3.5], "some": [1.0, 1.1, 1.2, 1.7, 2.
     ("headings", "used"), [([1.0], "start"), ([1.0, 1.1, 1.2], "some"), ([0.1] * 6, "all"), ([0.1] * 9, "all")]
 )
 def test_headings_known_beforehand_are_used_and_beyond_them_the_robot_turns_on(headings, used, cut):
-    slowed = run(FloorSlope(0.1, 0.0), TURNING, headings=headings, cut=cut)[:, 0]
+    slowed = run(FloorSlope(0.1, 0.0, 0.0), TURNING, headings=headings, cut=cut)[:, 0]
     np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos(LOST[used]), atol=1e-12)
 
 
 def test_each_member_of_a_batch_has_headings_of_its_own():
     batch = np.stack((TURNING, TURNING))
-    slowed = run(FloorSlope(0.1, 0.0), batch, headings=[[1.0, 1.1, 1.2], [0.0, 0.0, 0.0]])[..., 0]
+    slowed = run(FloorSlope(0.1, 0.0, 0.0), batch, headings=[[1.0, 1.1, 1.2], [0.0, 0.0, 0.0]])[..., 0]
     expected = [LOST["some"], [0.0, 0.0, 0.0, 0.5, 1.0, 1.5]]
     np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos(expected), atol=1e-12)
 

@@ -25,7 +25,7 @@ class PartlyDead:
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        return {name: Parameter(name, "", low, 1.0, 0.0) for name, low in NAMES.items()}
+        return {name: Parameter(name=name, unit="", low=low, high=1.0, neutral=0.0) for name, low in NAMES.items()}
 
     @property
     def starts(self) -> int:
@@ -58,7 +58,7 @@ class Ordered(PartlyDead):
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        return {name: Parameter(name, "", 0.0, 1.0, 0.5) for name in ("first", "second")}
+        return {name: Parameter(name=name, unit="", low=0.0, high=1.0, neutral=0.5) for name in ("first", "second")}
 
     def run(self, episode: Episode) -> Mapping[str, float]:
         theta = dict(episode.theta)

@@ -16,7 +16,10 @@ from proxytune.space import Parameter
 
 AGENTS = tuple(f"agent{number}" for number in range(6))
 PARAMETERS = MappingProxyType(
-    {"trim": Parameter("trim", "", -0.3, 0.3, 0.0), "delay": Parameter("delay", "s", 0.0, 0.3, 0.0)}
+    {
+        "trim": Parameter(name="trim", unit="", low=-0.3, high=0.3, neutral=0.0),
+        "delay": Parameter(name="delay", unit="s", low=0.0, high=0.3, neutral=0.0),
+    }
 )
 
 

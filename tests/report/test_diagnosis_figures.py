@@ -5,24 +5,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.container import ErrorbarContainer
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
 import hidden
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS, candidates
-from proxytune.diagnosis.diagnosis import diagnose
+from proxytune.diagnosis.diagnose import diagnose
+from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.innovations import huber
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, disturbed, increments
-from proxytune.diagnosis.search import LEAST_GAIN, Adopted
+from proxytune.diagnosis.round import LEAST_GAIN
 from proxytune.diagnosis.signals import signal_groups
 from proxytune.diagnosis.windows import cut, strays
 from proxytune.driving.robot import read_robot
-from proxytune.effects import theta_names
+from proxytune.effects import Means, theta_names
 from proxytune.effects.catalogue import CATALOGUE
-from proxytune.report.diagnosis_effect import STATIC, TRANSIENT, effect_curve
+from proxytune.report.diagnosis_effect import effect_curve
 from proxytune.report.diagnosis_figures import SHOWN, diagnosis_figures
-from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, MOTIONS, retuned
+from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, retuned
 from proxytune.report.diagnosis_residual import MANY_WINDOWS, residual_map, residual_over_time, strayed
 from proxytune.report.style import BEFORE
 
@@ -109,20 +111,25 @@ def test_the_error_figure_holds_the_errors_in_millimetres_and_degrees(diagnosis,
         (place, 1e3, ("before", "after")),
         (heading, 180.0 / np.pi, ("heading_before", "heading_after")),
     ):
-        for container, kind in zip(axes.containers, kinds, strict=True):
+        drawn = [one for one in axes.containers if isinstance(one, ErrorbarContainer)]
+        for container, kind in zip(drawn, kinds, strict=True):
             told = [getattr(error, kind) for error in diagnosis.errors]
             points, _, (bars,) = container
             assert points.get_ydata() == pytest.approx([factor * one.value for one in told])
             ends = [sorted(segment[:, 1]) for segment in bars.get_segments()]
             assert np.ravel(ends) == pytest.approx(factor * np.ravel([one.interval for one in told]))
     floors = [segment[0, 1] for segment in place.collections[-1].get_segments()]
-    assert floors == pytest.approx([1e3 * error.noise_floor for error in diagnosis.errors])
+    assert floors == pytest.approx([1e3 * error.floor.lower for error in diagnosis.errors])
+    bars = [(bar.get_y(), bar.get_y() + bar.get_height()) for bar in place.patches]
+    assert np.ravel(bars) == pytest.approx(
+        np.ravel([(1e3 * error.floor.lower, 1e3 * error.floor.upper) for error in diagnosis.errors])
+    )
 
 
 def test_an_interval_without_end_is_not_drawn(diagnosis):
     endless = [replace(e, before=e.before._replace(interval=(0.0, np.inf))) for e in diagnosis.errors]
     figure = diagnosis_figures(replace(diagnosis, errors=tuple(endless)))["error"]
-    _, _, (bars,) = figure.axes[0].containers[0]
+    _, _, (bars,) = next(one for one in figure.axes[0].containers if isinstance(one, ErrorbarContainer))
     assert all(np.ptp(segment[:, 1]) == 0.0 for segment in bars.get_segments())
 
 
@@ -270,9 +277,12 @@ def test_declared_parameters_give_way_to_the_curve_that_was_fitted_with_them(dia
     assert retuned(declared, idle) == pytest.approx(dict(declared.theta), abs=0.02)
 
 
-def test_every_motion_effect_has_a_curve():
-    assert set(MOTION_EFFECTS) == {*STATIC, *TRANSIENT, *MOTIONS}
-    assert all(name in GROUPS for name, _ in MOTIONS.values())
+def test_means_are_drawn_over_a_signal_that_has_a_figure_of_its_own():
+    forms = [(CATALOGUE[name].trace, form.form) for name in MOTION_EFFECTS for form in EVERY if form.effect == name]
+    shown = [trace.shown_in(form) for trace, form in forms]
+    means = [one for one in shown if isinstance(one, Means)]
+    assert len(means) >= 6
+    assert all(one.cue in GROUPS and one.panels for one in means)
 
 
 EVERY = candidates(read_robot("duckiebot").figures, {}, ("trim", "delay"))
@@ -310,7 +320,7 @@ def test_a_random_effect_shows_single_draws_that_differ(diagnosis, effect):
 def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
     figures = diagnosis_figures(clean)
     assert "effect_curve" not in figures
-    assert len(figures["error"].axes[0].containers) == 1
+    assert len([one for one in figures["error"].axes[0].containers if isinstance(one, ErrorbarContainer)]) == 1
     assert len(figures["residual_map"].axes) == 2
     assert {one.get_color() for one in figures["residual_over_time"].axes[0].get_lines()} == {"#D55E00"}
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from proxytune.errors import LogError
 from proxytune.logs import COMMANDS, read_log
 
-DATA = Path(__file__).resolve().parents[1] / "../shared/data/logs"
+DATA = Path(__file__).resolve().parents[2] / "../shared/data/logs"
 TWIST = 'format = 1\nname = "yard"\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
 HEADER = "episode,time,v,omega,x,y,heading\n"
 GOOD = HEADER + "a,0.0,0.5,0.1,1,2,0.5\na,0.1,0.6,0.2,1.05,2,0.51\nb,3.0,0,0,0,0,0\nb,3.1,0.1,0,0,0,0\n"

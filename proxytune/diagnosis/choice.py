@@ -1,0 +1,80 @@
+"""Which of the effects that were looked at is adopted next, if any."""
+
+from typing import NamedTuple
+
+from proxytune.diagnosis.events import RandomEffect
+from proxytune.diagnosis.fitting import Fit, fit
+from proxytune.diagnosis.replay import lateness
+from proxytune.diagnosis.round import Round
+from proxytune.diagnosis.screening import Lead
+from proxytune.diagnosis.windows import cut, ratio, strays
+
+CLEAR_GAIN = 30.0
+"""Nats that a random effect must gain: its chance is drawn from shifted innovations, which is rough."""
+
+P_VALUE = 0.01
+"""Chance must gain as much as rarely as this."""
+
+PLAIN_SHARE = 0.8
+"""An effect of both wheels is preferred to one of a single wheel if it gains this share."""
+
+ERROR_HORIZON_S = 2.0
+ERROR_FACTOR = 1.05
+"""A model predicts worse if its error over windows of this horizon is shown to be larger by more than this factor: such
+an effect is not adopted, whatever the evidence of single steps."""
+
+
+class Choice(NamedTuple):
+    """An effect that may be adopted: one that draws (`random`) or another (`lead`), and the model with it.
+
+    Attributes:
+        gain: Evidence for it [nats].
+        fitted: The model with it.
+        lead: Where it was seen, None for one that draws.
+        random: What it draws, None for any other.
+    """
+
+    gain: float
+    fitted: Fit
+    lead: Lead | None = None
+    random: RandomEffect | None = None
+
+
+def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
+    """The effect with most evidence, if that is more than chance and predicts no worse."""
+    named = [Choice(gain, fitted, lead) for lead, fitted, gain in looked.fits.values() if lead.p_value <= P_VALUE]
+    clear = [effect for effect in looked.random if effect.p_value <= P_VALUE and effect.gain >= CLEAR_GAIN]
+    chancy = [Choice(effect.gain, _drawing(model, effect), random=effect) for effect in clear]
+    ranked = sorted(named + chancy, key=lambda choice: -choice.gain)
+    enough = (choice for choice in ranked if choice.gain >= least)
+    best = next((choice for choice in enough if no_worse(choice.fitted, model)), None)
+    if best is None:
+        return None
+    plain = [choice for choice in named if _is_plain_form_of(choice, best)]
+    return plain[0] if plain else best
+
+
+def _is_plain_form_of(choice: Choice, best: Choice) -> bool:
+    """Whether it says the same of both wheels what the best says of one, at little loss."""
+    if choice.lead is None or best.lead is None or choice is best or choice.lead.candidate.form:
+        return False
+    same = choice.lead.candidate.effect == best.lead.candidate.effect
+    return same and choice.gain > PLAIN_SHARE * best.gain
+
+
+def _drawing(model: Fit, effect: RandomEffect) -> Fit:
+    """The model with an effect that draws; its mean lateness has so far passed for a part of the delay."""
+    theta = {**model.theta, effect.parameter: effect.value}
+    late = lateness(theta, model.drives.rate_hz) - lateness(model.theta, model.drives.rate_hz)
+    theta["delay"] = max(0.0, model.theta["delay"] - late)
+    return fit(model.drives, theta, model.free, model.noise)
+
+
+def no_worse(one: Fit, other: Fit) -> bool:
+    """Whether one model's error over windows is not shown to be larger than the other's by more than ERROR_FACTOR."""
+    windows = cut(other.drives, ERROR_HORIZON_S)
+    if len(windows.begin) < 2:
+        return True
+    squares = [strays(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
+    blocks = other.drives.block[windows.begin][windows.window]
+    return ratio(squares[0], squares[1], blocks).interval[0] <= ERROR_FACTOR

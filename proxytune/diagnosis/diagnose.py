@@ -1,0 +1,172 @@
+"""From a log to a verdict: what the declared model leaves over, which effect explains it, and what that is worth."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from proxytune.diagnosis.candidates import MOTION_EFFECTS
+from proxytune.diagnosis.clocks import Clocks, in_step, read_clocks
+from proxytune.diagnosis.confirmation import bullet_strays, has_body
+from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
+from proxytune.diagnosis.drives import gather
+from proxytune.diagnosis.fitting import Fit, intervals
+from proxytune.diagnosis.floor import pose_noise
+from proxytune.diagnosis.found import Adopted, Dropped, Found, Variant
+from proxytune.diagnosis.horizon_error import HorizonError, KeptAside, horizon_error
+from proxytune.diagnosis.learning import Learning, learn
+from proxytune.diagnosis.likeness import two_robots
+from proxytune.diagnosis.manoeuvres import next_manoeuvre
+from proxytune.diagnosis.materiality import Worth, worth
+from proxytune.diagnosis.naming import name_effects
+from proxytune.diagnosis.plausible import check_motion, check_units
+from proxytune.diagnosis.polish import HORIZONS_S, Polish, polished
+from proxytune.diagnosis.rests import without_long_rests
+from proxytune.diagnosis.search import Told, fit_declared
+from proxytune.diagnosis.split import Parts, all_drives, split
+from proxytune.diagnosis.verdict import verdict
+from proxytune.diagnosis.visibility import unseen
+from proxytune.driving.robot import Robot
+from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, effect_of, theta_names
+from proxytune.errors import LogError
+from proxytune.logs import Log
+from proxytune.settings import nearest
+
+CONFIRMED_S = 2.0
+"""The horizon at which errors are confirmed on the bullet plant."""
+
+
+def diagnose(
+    log: Log,
+    robot: Robot,
+    declared: Iterable[str],
+    *,
+    test: Log | None = None,
+    seed: int = 1,
+    told: Told = lambda _: None,
+) -> Diagnosis:
+    """Tune what is declared, find what is missing, and test both on drives kept aside.
+
+    Args:
+        log: Measured drives.
+        robot: The robot that drove.
+        declared: Effects whose parameters are tuned in any case.
+        test: Another log to test on; without it a part of the drives is kept.
+        seed: Of the null distributions.
+        told: Hears of progress.
+
+    Raises:
+        LogError: If the log cannot bear the question: too short, no motion, other units.
+        SettingsError: If a declared effect is unknown or does not act on motion.
+    """
+    names = declared_parameters(declared)
+    start = {name: robot.theta.get(name, PARAMETERS[name].neutral_value(robot.figures)) for name in names}
+    log, test = without_long_rests(log), without_long_rests(test) if test is not None else None
+    own = read_clocks(log, robot)
+    clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
+    if any(one.offset.value for one in clocks) and "delay" not in names:
+        names, start = (*names, "delay"), {**start, "delay": own.assumed_delay_s}
+    parts = split(log, robot, test, clocks)
+    check_motion(log.name, parts.fitted)
+    check_units(log.name, parts.fitted, start)
+    told("fitting what is declared")
+    found = name_effects(fit_declared(parts.fitted, start, names), seed, told)
+    told("fitting to windows of prediction")
+    found, polishes = _polished(found)
+    told("learning what no named effect explains")
+    learning = learn(found, parts.tested, HORIZONS_S)
+    told("testing on drives kept aside")
+    tested = _tested(test or log, parts, found, clocks[-1])
+    errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h, learning.theta)) is not None)
+    if not errors:
+        raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
+    answer = _verdict(found, learning, main_error(errors))
+    return Diagnosis(
+        log=log.name,
+        robot=robot,
+        verdict=answer,
+        declared=estimates(found.declared, (), polishes[0]),
+        theta=estimates(found.model, found.adopted, polishes[1]),
+        effects=found.adopted,
+        immaterial=tuple(dropped.effect for dropped in found.immaterial),
+        worth=_worth(found, parts, seed),
+        polish=polishes[1],
+        residual_depends_on=learning.depends_on(curve.group.name for curve in found.remainder),
+        errors=errors,
+        confirmed=_confirmed(found, tested, told),
+        could_not_be_seen=_unseen(found, names),
+        manoeuvre=next_manoeuvre(found, again=answer == "cannot be told"),
+        parts=parts,
+        found=found,
+        clocks=clocks,
+        unlike=two_robots(all_drives(log, robot, own), found.model),
+        drive_names=tuple(episode.name for episode in log.episodes),
+        learning=learning,
+    )
+
+
+def declared_effects(robot: Robot) -> tuple[str, ...]:
+    """The effects that are declared where nobody says: those of θ that act on motion and that the robot has."""
+    return tuple(name for name in DECLARED if name in MOTION_EFFECTS and name in robot.theta)
+
+
+def declared_parameters(effects: Iterable[str]) -> tuple[str, ...]:
+    """The names in θ of declared effects' parameters.
+
+    Raises:
+        LogError: If an effect is unknown or does not act on motion.
+    """
+    names: list[str] = []
+    for effect in effects:
+        if effect not in MOTION_EFFECTS:
+            raise LogError(f"--declared {effect}: no effect on motion has this name; {nearest(effect, MOTION_EFFECTS)}")
+        names += [name for name in theta_names(CATALOGUE[effect]) if not name.endswith(".imbalance")]
+    return tuple(dict.fromkeys(names))
+
+
+def estimates(fitted: Fit, adopted: Iterable[Adopted], polish: Polish | None) -> dict[str, Estimate]:
+    """Every value of a fitted model with its interval; fixed ones have none to speak of."""
+    known = dict(polish.intervals) if polish else intervals(fitted)
+    for effect in adopted:
+        if effect.interval is not None:
+            known[effect.names[0]] = effect.interval
+    return {
+        name: Estimate(value, known.get(name, (value, value)), PARAMETERS[name].unit)
+        for name, value in fitted.theta.items()
+    }
+
+
+def _polished(found: Found) -> tuple[Found, tuple[Polish | None, Polish | None]]:
+    """Both models with parameters fitted to windows, where that helps: before and after are compared on equal terms."""
+    declared, before = polished(found.declared)
+    if not found.adopted and not found.immaterial:
+        return replace(found, declared=declared, model=declared), (before, before)
+    model, after = polished(found.model)
+    return replace(found, declared=declared, model=model), (before, after)
+
+
+def _unseen(found: Found, declared: Iterable[str]) -> tuple[str, ...]:
+    seen = {effect.effect for effect in (*found.adopted, *(dropped.effect for dropped in found.immaterial))}
+    return unseen(found.model, set(map(effect_of, declared)) | seen)
+
+
+def _tested(log: Log, parts: Parts, found: Found, clocks: Clocks) -> KeptAside:
+    whole = in_step(gather(log, parts.tested.robot, log.episodes), clocks, range(len(log.episodes)))
+    return KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
+
+
+def _verdict(found: Found, learning: Learning, error: HorizonError) -> str:
+    unnamed = bool(found.remainder) or learning.remainder.used
+    return verdict(error.after.value, error.floor, named=bool(found.adopted), unnamed=unnamed)
+
+
+def _confirmed(found: Found, tested: KeptAside, told: Told) -> HorizonError | None:
+    if not has_body(tested.drives):
+        return None
+    told("confirming on the bullet plant")
+    return horizon_error(found, tested, CONFIRMED_S, {}, bullet_strays)
+
+
+def _worth(found: Found, parts: Parts, seed: int) -> dict[str, Worth]:
+    """What every effect is worth on the drives kept aside, those that were dropped again too."""
+    model = Variant(found.model.theta, found.model.free)
+    weighed = [Dropped(effect, model) for effect in found.adopted] + list(found.immaterial)
+    return {effect.effect: worth(parts.fitted, parts.tested, beside, effect, seed) for effect, beside, _ in weighed}

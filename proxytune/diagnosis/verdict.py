@@ -1,0 +1,79 @@
+"""The verdict: what the error that is left says, against what noise alone would leave."""
+
+from typing import NamedTuple
+
+from proxytune.diagnosis.repeats import Repeated
+
+AT_FLOOR = 1.15
+"""An error of no more than so many times the floor is at it."""
+
+WIDE = 1.5
+"""A bracket whose upper end is no more than so many times its lower is narrow enough to say that all is explained."""
+
+LOWERS = 0.95
+"""A model lowers the error if it brings it to this share."""
+
+
+ALIKE = 1.3
+"""What was driven again speaks for all drives if the error is no more than so many times what it does not repeat: a
+manoeuvre that never meets what is missing is repeated well, too."""
+
+
+class Bracket(NamedTuple):
+    """Between which errors that of a model that is right lies.
+
+    Attributes:
+        lower: What the noise of measured poses alone makes [m].
+        upper: The lowest error that any model reached, or what drives do not repeat where that is less [m].
+        reached: The lowest error that any model reached [m].
+        again: What drives from the same commands say; None where too few were driven.
+    """
+
+    lower: float
+    upper: float
+    reached: float
+    again: Repeated | None
+
+
+def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
+    """The bracket; its lower end is an estimate too, and never above what a model reached.
+
+    Args:
+        lower: What the noise of poses makes [m].
+        reached: The lowest error of any model [m].
+        again: What drives from the same commands say.
+    """
+    upper = reached * min(1.0, again.share.interval[1]) if again else reached
+    return Bracket(min(lower, reached), max(upper, min(lower, reached)), reached, again)
+
+
+def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:
+    """One of five answers; none says that all is explained where the error is beyond the floor.
+
+    Args:
+        after: The error that is left [m].
+        floor: The floor's bracket at the same horizon.
+        named: Whether effects were added.
+        unnamed: Whether a signal explains more of the rest than any named effect.
+    """
+    if at_floor(after, floor, unnamed=unnamed):
+        return "explained" if named else "nothing missing"
+    if unnamed or _beyond(floor):
+        return "partly explained" if named else "unexplained"
+    return "cannot be told"
+
+
+def at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
+    """Whether an error is no more than noise: of poses, or of what drives do not repeat, or nothing lowers it."""
+    if after <= AT_FLOOR * floor.lower:
+        return True
+    if unnamed or floor.reached < LOWERS * after:
+        return False
+    if floor.again is not None:
+        return floor.again.share.value >= 1.0 / AT_FLOOR and after <= ALIKE * floor.again.apart
+    return floor.upper < WIDE * floor.lower
+
+
+def _beyond(floor: Bracket) -> bool:
+    """Whether drives repeat more than the model predicts."""
+    return floor.again is not None and floor.again.share.interval[1] < 1.0 / AT_FLOOR

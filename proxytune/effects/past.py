@@ -1,0 +1,35 @@
+"""What a signal was like before: low-passes of it, and how far a wheel has rolled since it last turned."""
+
+import numpy as np
+from scipy.signal import lfilter
+
+from proxytune.effects.effect import Signal
+from proxytune.effects.features import Knots
+
+
+def low_passes(signal: Signal, slow: Signal, constants: Knots, rate_hz: float) -> Signal:
+    """First-order low-passes of a signal (…, time), one for each time constant [s] (…, time, constants)."""
+    out = np.empty((*signal.shape, len(constants)))
+    for number, constant in enumerate(constants):
+        kept = float(np.exp(-1.0 / (np.asarray(constant) * rate_hz)))
+        start = kept * slow[..., number][..., None]
+        out[..., number], _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=start)
+    return out
+
+
+def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
+    """How far a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
+
+    Args:
+        speed: Its speed [m/s] (…, time).
+        before: How far it had rolled so before the first sample (…,), 0 where it has not moved yet.
+        rate_hz: Samples per second.
+    """
+    sign = np.concatenate((np.sign(before)[..., None], np.sign(speed)), axis=-1)
+    place = np.arange(sign.shape[-1])
+    newest = np.maximum.accumulate(np.where(sign != 0.0, place, 0), axis=-1)
+    course = np.take_along_axis(sign, newest, axis=-1)
+    way = np.concatenate((np.abs(before)[..., None], np.abs(speed) / rate_hz), axis=-1).cumsum(axis=-1)
+    turned = course[..., 1:] != course[..., :-1]
+    since = np.maximum.accumulate(np.where(turned, way[..., :-1], 0.0), axis=-1)
+    return np.asarray(course[..., 1:] * (way[..., 1:] - since))

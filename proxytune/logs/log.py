@@ -1,0 +1,80 @@
+"""What a log holds: a robot's drives, commands and measured poses."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "duty": ("left", "right"),
+        "twist": ("v", "omega"),
+        "wheel_speed": ("wheel_command_left", "wheel_command_right"),
+        "none": (),
+    }
+)
+"""The columns of each kind of command: duties in [−1, 1], a speed [m/s] and yaw rate [rad/s], wheel speeds [rad/s]."""
+
+POSE = ("x", "y", "heading")
+WHEELS = ("wheel_left", "wheel_right")
+
+GEOMETRY: Mapping[str, str] = MappingProxyType(
+    {"wheel_radius_m": "wheel_radius", "baseline_m": "effective_baseline", "full_speed_m_s": "full_speed"}
+)
+"""What log.toml may say of a robot, and what a robot.toml calls it."""
+
+
+@dataclass(frozen=True)
+class LogEpisode:
+    """One drive: poses on a regular grid of times, commands on the same or at times of their own.
+
+    Attributes:
+        name: What the column `episode` says.
+        times: Times of the samples (rows,) [s], 1 / rate_hz apart.
+        commands: What was commanded (rows, 2), in the units of the log's command kind, held until the next row; or
+            (M, 2) where commands have times of their own.
+        poses: Measured poses (rows, 3): x [m], y [m], heading [rad, unwrapped]; NaN where there is none.
+        wheels: Measured wheel speeds (rows, 2), left and right [rad/s], or None.
+        issued: When each command was issued (M,) [s], held until the next; None where they go with the samples.
+    """
+
+    name: str
+    times: Floats
+    commands: Floats
+    poses: Floats
+    wheels: Floats | None
+    issued: Floats | None = None
+
+    @property
+    def held(self) -> Floats:
+        """The command in force at each sample (rows, 2); none before the first is zero."""
+        if self.issued is None:
+            return self.commands
+        newest = np.searchsorted(self.issued, self.times + 1e-9, side="right")
+        return np.concatenate((np.zeros_like(self.commands[:1]), self.commands))[newest]
+
+
+@dataclass(frozen=True)
+class Log:
+    """A robot's drives.
+
+    Attributes:
+        name: What the log is called.
+        robot: Name of the robot.
+        command: Kind of the commands, one of COMMANDS; "none" for still frames, whose commands are (rows, 0).
+        rate_hz: Samples per second; 0 for still frames that state none, whose times are as in the file.
+        geometry: Figures that log.toml states itself: wheel_radius, effective_baseline [m], full_speed [m/s].
+        episodes: The drives.
+    """
+
+    name: str
+    robot: str
+    command: str
+    rate_hz: float
+    geometry: dict[str, float]
+    episodes: tuple[LogEpisode, ...]

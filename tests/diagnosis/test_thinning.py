@@ -1,0 +1,70 @@
+"""Long drives are made short, in the same blocks, without a pose that was not measured."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parent))
+
+from planted import TRUTH, planted_drives
+
+from proxytune.diagnosis import thinning
+from proxytune.diagnosis.replay import increments
+from proxytune.diagnosis.split import in_blocks
+from proxytune.diagnosis.thinning import joined, thinned
+from proxytune.diagnosis.windows import cut
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return in_blocks(planted_drives(TRUTH, episodes=4, seconds=20.0, noise=None))
+
+
+def test_short_drives_stay_as_they_are(drives):
+    assert thinned(drives) is drives
+    assert joined(drives, 1) is drives
+
+
+@pytest.mark.parametrize("times", [2, 3, 7])
+def test_joined_increments_lead_from_the_first_pose_to_the_last(drives, times):
+    few = joined(drives, times)
+    assert (few.last - few.first).sum() == (drives.last - drives.first).sum()
+    assert set(map(tuple, few.poses.reshape(-1, 3))) <= set(map(tuple, drives.poses.reshape(-1, 3)))
+    assert few.travel.sum(axis=0) == pytest.approx(drives.travel.sum(axis=0))
+    assert set(few.block) == set(drives.block)
+    assert (~few.linked).sum() == (~drives.linked).sum()
+
+
+def test_a_right_model_predicts_joined_increments_too(drives):
+    few = joined(drives, 3)
+    assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9
+
+
+def test_a_block_is_shortened_and_none_is_lost(drives, monkeypatch):
+    monkeypatch.setattr(thinning, "MOST", 300)
+    monkeypatch.setattr(thinning, "STRETCH_S", 1.0)
+    few = thinned(drives)
+    assert 250 <= len(few.episode) <= 300 + len(set(drives.block))
+    assert set(few.block) == set(drives.block)
+    usual = float(np.median(few.last - few.first)) / few.tick_hz
+    assert usual == pytest.approx(thinning.JOINED_S)
+    sizes = np.bincount(few.block)
+    assert sizes.max() <= 2 * sizes.min()
+    assert len(set(few.first[~few.linked])) > 1, "not always a block's beginning"
+
+
+def test_drives_of_two_seconds_stay_whole_and_fewer_are_taken(monkeypatch):
+    monkeypatch.setattr(thinning, "MOST", 300)
+    drives = in_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None))
+    few = thinned(drives)
+    assert thinning.FEWEST_BLOCKS <= len(set(few.block)) < 60
+    assert len(cut(few, 2.0).begin) == len(set(few.block))
+
+
+def test_poses_that_are_missing_stay_missing(drives):
+    gaps = drives.only(np.arange(len(drives.episode)) % 50 > 4)
+    few = joined(gaps, 4)
+    assert (few.last - few.first).max() <= 4 * (drives.last - drives.first).max()
+    assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9

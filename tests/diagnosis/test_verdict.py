@@ -1,0 +1,69 @@
+"""The verdict follows from the error that is left, against the bracket of the noise floor."""
+
+import pytest
+
+from proxytune.diagnosis.repeats import Repeated
+from proxytune.diagnosis.verdict import bracket, verdict
+from proxytune.diagnosis.windows import Rmse
+
+KNOWN = Repeated(Rmse(0.97, (0.9, 1.05)), 0.0116)
+BEYOND = Repeated(Rmse(0.5, (0.4, 0.6)), 0.006)
+UNSURE = Repeated(Rmse(0.75, (0.5, 1.1)), 0.009)
+
+
+def said(after, lower, *, reached=None, repeated=None, named=True, unnamed=False):
+    floor = bracket(lower, after if reached is None else reached, repeated)
+    return verdict(after, floor, named=named, unnamed=unnamed)
+
+
+@pytest.mark.parametrize("unnamed", [True, False])
+def test_an_error_at_the_noise_of_the_poses_is_explained(unnamed):
+    assert said(0.0045, 0.004, unnamed=unnamed) == "explained"
+    assert said(0.0045, 0.004, unnamed=unnamed, named=False) == "nothing missing"
+
+
+def test_an_error_that_nothing_lowers_within_a_narrow_bracket_is_explained():
+    assert said(0.0055, 0.004) == "explained"
+    assert said(0.0065, 0.004) == "cannot be told"
+    assert said(0.0055, 0.004, reached=0.005) == "cannot be told"
+
+
+def test_an_error_that_drives_do_not_repeat_is_explained():
+    assert said(0.012, 0.004, repeated=KNOWN) == "explained"
+    assert said(0.012, 0.004, repeated=KNOWN, named=False) == "nothing missing"
+
+
+def test_repeats_of_a_manoeuvre_that_never_meets_what_is_missing_explain_nothing():
+    assert said(0.029, 0.004, repeated=KNOWN) == "cannot be told"
+
+
+def test_nothing_is_explained_while_a_named_effect_lowers_the_error():
+    assert said(0.012, 0.004, repeated=KNOWN, reached=0.0105) == "cannot be told"
+
+
+@pytest.mark.parametrize(("named", "answer"), [(True, "partly explained"), (False, "unexplained")])
+def test_an_error_that_drives_repeat_or_a_signal_explains_is_not_explained(named, answer):
+    assert said(0.012, 0.004, repeated=BEYOND, named=named) == answer
+    assert said(0.012, 0.004, unnamed=True, named=named) == answer
+    assert said(0.012, 0.004, repeated=KNOWN, unnamed=True, named=named) == answer
+
+
+def test_what_the_noise_is_cannot_be_told_from_few_repeats_or_none():
+    assert said(0.012, 0.004) == "cannot be told"
+    assert said(0.012, 0.004, repeated=UNSURE) == "cannot be told"
+
+
+def test_a_narrow_bracket_does_not_explain_what_drives_repeat():
+    assert said(0.0055, 0.004, repeated=BEYOND) == "partly explained"
+
+
+def test_the_floor_lies_between_the_noise_of_poses_and_what_a_model_reached():
+    floor = bracket(0.004, 0.012, None)
+    assert (floor.lower, floor.upper) == (0.004, 0.012)
+    assert bracket(0.013, 0.012, None).lower == 0.012
+
+
+def test_repeats_lower_the_upper_end_but_not_beneath_the_lower():
+    assert bracket(0.004, 0.012, BEYOND).upper == pytest.approx(0.0072)
+    assert bracket(0.004, 0.012, KNOWN).upper == 0.012
+    assert bracket(0.010, 0.012, BEYOND).upper == 0.010

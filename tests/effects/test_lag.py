@@ -1,0 +1,19 @@
+"""A first-order lag, exact for what holds over each sample."""
+
+import numpy as np
+import pytest
+
+from proxytune.effects.lag import follow, lag_of
+
+
+def test_no_time_constant_follows_at_once():
+    signal = np.array([[1.0], [-2.0]])
+    mean, end = follow(signal, np.array([5.0]), lag_of(0.0))
+    np.testing.assert_array_equal(mean, signal)
+    np.testing.assert_array_equal(end, [-2.0])
+
+
+def test_after_one_time_constant_63_percent_of_a_step_are_done():
+    mean, end = follow(np.ones((10, 1)), np.zeros(1), lag_of(10.0))
+    assert end[0] == pytest.approx(1.0 - np.exp(-1.0))
+    assert mean.sum() == pytest.approx(10.0 - 10.0 * (1.0 - np.exp(-1.0)))

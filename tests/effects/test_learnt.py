@@ -1,0 +1,186 @@
+"""What is learnt is an effect like any other, and harmless where nothing was seen."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune.driving.robot import read_robot
+from proxytune.effects import Setting, effects_from
+from proxytune.effects.features import GROUPS
+from proxytune.effects.learnt import Curve, Learnt, Seen
+
+ROBOT = read_robot("duckiebot")
+RATE_HZ = 60.0
+SEEN = Seen((-0.4, 0.5), (-4.0, 3.0))
+KNOTS = {
+    "wheel_speed": (-0.5, -0.2, 0.1, 0.3, 0.6),
+    "turn_rate": (-3.0, -1.0, 0.5, 2.0),
+    "speed_and_turn": ((-0.3, -1.0), (-0.3, 0.0), (0.0, 2.0), (0.2, -1.0), (0.4, 2.0)),
+    "transients": (0.04, 0.2, 1.0),
+    "reversal": (0.01, 0.05),
+    "direction": (-1.0,),
+    "time": (0.3, 0.8, 1.4),
+    "use": (0.002, 0.006),
+    "load": (0.5, 4.0),
+    "heading": (1.0, 2.0),
+}
+
+
+def effect_of(*groups, size=0.3, seed=3):
+    random = np.random.default_rng(seed)
+    curves = [
+        Curve(group, channel, KNOTS[group], tuple(size * random.uniform(0.5, 1.0, len(KNOTS[group]))))
+        for group in groups
+        for channel in GROUPS[group].channels
+    ]
+    return Learnt(SEEN, tuple(curves))
+
+
+ALL = effect_of(*GROUPS)
+EFFECTS = [pytest.param(effect_of(group), id=group) for group in GROUPS] + [pytest.param(ALL, id="all")]
+
+
+def a_signal(seed, length=90):
+    random = np.random.default_rng(seed)
+    held = np.repeat(random.uniform(-1.0, 1.0, (length // 3, 3)), 3, axis=0)
+    return held * (0.6, 0.0, 5.0)
+
+
+def begin(effect, batch=(), headings=0.4):
+    return effect.begin(Setting(RATE_HZ, np.zeros((*batch, 3)), ROBOT.figures, headings=np.array([headings])))
+
+
+def run(effect, signal, cuts=()):
+    memory, out = begin(effect), []
+    for chunk in np.split(signal, sorted(cuts)):
+        if len(chunk):
+            moved, memory = effect.apply(chunk, memory)
+            out.append(moved)
+    return np.concatenate(out)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_every_group_changes_the_motion(effect):
+    signal = a_signal(2)
+    assert np.abs(run(effect, signal) - signal).max() > 1e-3
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_weights_of_nothing_change_nothing(effect):
+    still = Learnt(SEEN, tuple(curve._replace(weights=(0.0,) * len(curve.knots)) for curve in effect.curves))
+    np.testing.assert_array_equal(run(still, a_signal(1)), a_signal(1))
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+@given(cuts=st.lists(st.integers(1, 89), max_size=6), seed=st.integers(0, 99))
+@settings(max_examples=8, derandomize=True, deadline=None)
+def test_cutting_the_motion_into_chunks_never_changes_the_result(effect, cuts, seed):
+    signal = a_signal(seed)
+    np.testing.assert_allclose(run(effect, signal, cuts), run(effect, signal), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_what_is_added_never_depends_on_what_comes_later(effect):
+    signal = a_signal(3)
+    other = signal.copy()
+    other[45:] = other[45:] * 0.5 + 0.1
+    np.testing.assert_array_equal(run(effect, signal)[:45], run(effect, other)[:45])
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_a_batch_is_filtered_like_its_members(effect):
+    batch = np.stack([a_signal(seed) for seed in range(6)]).reshape(2, 3, 90, 3)
+    first, memory = effect.apply(batch[..., :50, :], begin(effect, (2, 3)))
+    second, _ = effect.apply(batch[..., 50:, :], memory)
+    alone = [[run(effect, one) for one in row] for row in batch]
+    np.testing.assert_allclose(np.concatenate((first, second), axis=-2), alone, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_memories_are_never_changed_in_place(effect):
+    signal, memory = a_signal(4), begin(effect)
+    kept = signal.copy()
+    first, middle = effect.apply(signal, memory)
+    second, _ = effect.apply(signal, middle)
+    np.testing.assert_array_equal(effect.apply(signal, memory)[0], first)
+    np.testing.assert_array_equal(effect.apply(signal, middle)[0], second)
+    np.testing.assert_array_equal(signal, kept)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_a_robot_that_stands_for_long_enough_stays_where_it_is(effect):
+    signal = np.concatenate((a_signal(5), np.zeros((1800, 3))))
+    np.testing.assert_allclose(run(effect, signal)[-60:], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_a_robot_that_has_not_moved_stays_where_it_is(effect):
+    np.testing.assert_array_equal(run(effect, np.zeros((600, 3))), 0.0)
+
+
+@pytest.mark.parametrize("group", [group for group in GROUPS if group != "heading"])
+def test_beyond_what_was_seen_what_is_added_is_what_it_was_at_the_edge(group):
+    effect, edge = effect_of(group), np.tile((SEEN.forward[1], 0.0, SEEN.yaw[0]), (90, 1))
+    beyond = edge * (3.0, 0.0, 2.0)
+    np.testing.assert_allclose(run(effect, beyond) - beyond, run(effect, edge) - edge, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("group", ["time", "use"])
+def test_beyond_the_last_knot_of_time_or_use_a_curve_is_level(group):
+    steady = np.tile((0.3, 0.0, 0.5), (6000, 1))
+    added = run(effect_of(group), steady) - steady
+    np.testing.assert_allclose(added[3000:], added[-1:].repeat(3000, axis=0), rtol=0, atol=1e-12)
+    assert np.abs(added[5] - added[-1]).max() > 1e-3
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_features_times_weights_are_what_is_added_where_headings_are_known(effect):
+    signal = a_signal(6)[None]
+    known = np.linspace(0.0, 3.0, 91)
+    memory = effect.begin(Setting(RATE_HZ, np.zeros((1, 3)), ROBOT.figures, headings=known))
+    parts = effect.features(signal, memory)
+    total = sum(
+        (basis @ np.array(curve.weights))[..., None] * unit
+        for (basis, unit), curve in zip(parts, effect.curves, strict=True)
+    )
+    np.testing.assert_allclose(effect.apply(signal, memory)[0] - signal, total, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("sample", [0, 1, 40])
+def test_a_window_amid_a_drive_goes_on_as_the_drive_does(effect, sample):
+    drives = np.stack([a_signal(seed) for seed in (7, 8)])
+    drives[..., 1] = 0.0
+    row, samples = np.array([1, 0, 1]), np.full(3, sample)
+    whole = [run(effect, drive) for drive in drives]
+    so_far = [0.4 + np.concatenate(([0.0], np.cumsum(one[:, 2]))) / RATE_HZ for one in whole]
+    turned = np.array([so_far[r][sample] for r in row])
+    setting = Setting(RATE_HZ, np.zeros((3, 3)), ROBOT.figures, headings=turned[:, None])
+    moved, _ = effect.apply(drives[row][:, sample:], effect.recall(setting, drives, row, samples))
+    np.testing.assert_allclose(moved, np.stack([whole[r][sample:] for r in row]), rtol=0, atol=1e-9)
+
+
+def test_a_curve_over_wheel_speed_adds_to_that_wheel():
+    baseline = ROBOT.figures["effective_baseline"]
+    effect = Learnt(SEEN, (Curve("wheel_speed", "right", (0.2, 0.4), (0.05, 0.01)),))
+    straight = np.tile((0.3, 0.0, 0.0), (5, 1))
+    added = run(effect, straight) - straight
+    np.testing.assert_allclose(added[-1], (0.015, 0.0, 0.03 / baseline))
+
+
+def test_a_transient_fades_with_its_time_constant():
+    effect = Learnt(SEEN, (Curve("transients", "left", (0.5,), (1.0,)), Curve("transients", "right", (0.5,), (1.0,))))
+    step = np.tile((0.2, 0.0, 0.0), (120, 1))
+    added = (run(effect, step) - step)[:, 0]
+    np.testing.assert_allclose(added, 0.2 * np.exp(-np.arange(1, 121) / (0.5 * RATE_HZ)), rtol=1e-9)
+    assert all(later < earlier for earlier, later in pairwise(added))
+
+
+def test_a_learnt_effect_comes_after_all_named_ones():
+    theta = {"learnt.range.forward@low": -1.0, "learnt.range.forward@high": 1.0}
+    theta |= {"learnt.range.yaw@low": -1.0, "learnt.range.yaw@high": 1.0, "learnt.turn_rate.yaw@1.0": 0.1}
+    names = [effect.name for effect in effects_from({**theta, "floor_slope.x": 0.1, "trim": 0.0}, ROBOT.figures)]
+    assert names == ["trim", "floor_slope", "learnt"]

@@ -1,0 +1,34 @@
+"""What was before is remembered the same, however a signal is cut."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune.effects.past import low_passes, rolled_since
+
+RATE_HZ = 10.0
+
+
+def test_a_low_pass_goes_most_of_the_way_in_its_time_constant():
+    slow = low_passes(np.ones(10), np.zeros(1), (1.0,), RATE_HZ)
+    assert slow[-1, 0] == pytest.approx(1.0 - np.exp(-1.0))
+
+
+def test_the_way_is_counted_from_where_a_wheel_turns_the_other_way():
+    speed = np.array([1.0, 1.0, 0.0, 1.0, -2.0, -2.0, 0.0, -2.0, 1.0])
+    way = rolled_since(speed, np.zeros(()), RATE_HZ)
+    np.testing.assert_allclose(way, [0.1, 0.2, 0.2, 0.3, -0.2, -0.4, -0.4, -0.6, 0.1])
+
+
+def test_a_wheel_that_has_not_moved_has_no_way_behind_it():
+    np.testing.assert_array_equal(rolled_since(np.zeros(3), np.zeros(()), RATE_HZ), np.zeros(3))
+
+
+@settings(max_examples=50, derandomize=True, deadline=None)
+@given(speed=st.lists(st.sampled_from((-0.5, 0.0, 0.2, 1.0)), min_size=2, max_size=20), cut=st.integers(1, 19))
+def test_cutting_a_signal_changes_nothing(speed, cut):
+    whole = rolled_since(np.array(speed), np.zeros(()), RATE_HZ)
+    first = rolled_since(np.array(speed[:cut]), np.zeros(()), RATE_HZ)
+    rest = rolled_since(np.array(speed[cut:]), first[-1], RATE_HZ) if speed[cut:] else np.empty(0)
+    np.testing.assert_allclose(np.concatenate((first, rest)), whole, atol=1e-12)

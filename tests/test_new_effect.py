@@ -1,0 +1,102 @@
+"""An effect that is added beside the others is taken up everywhere, and refused where it is not documented."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+EFFECT = '''
+
+@dataclass(frozen=True)
+class WeakReverse:
+    """The robot is slower backwards than forwards."""
+
+    loss: float
+    name: ClassVar[str] = "weak_reverse"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="loss", unit="", low=0.0, high=0.9, neutral=0.0,
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), source="made up",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.DIRECTION,),
+        shown=Means(Cue.DIRECTION, (Panel("forward", "forward speed [m/s]", "forward"),)),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Slow down what is backwards."""
+        forward = signal[..., 0]
+        slowed = np.where(forward < 0.0, (1.0 - self.loss) * forward, forward)
+        return _moved(slowed, signal[..., 1], signal[..., 2]), None
+'''
+
+DIAGNOSE = """
+import sys
+from pathlib import Path
+sys.path.append(sys.argv[1])
+from planted import TRUTH, planted_log, write_log
+from proxytune.cli.main import main
+log = write_log(planted_log({**TRUTH, "weak_reverse": 0.3}, episodes=6, seconds=20.0), Path("log"))
+sys.exit(main(["diagnose", str(log), "--json", "--output", "found"]))
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A copy of the project whose room of effects has one more class, and its name in the catalogue."""
+    folder = tmp_path_factory.mktemp("project")
+    for part in ("proxytune", "robots", "studies", "tests"):
+        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.png", "study.db"))
+    for document in ("README.md", "pyproject.toml"):
+        shutil.copy(ROOT / document, folder)
+    motion = folder / "proxytune" / "effects" / "motion.py"
+    motion.write_text(motion.read_text(encoding="utf-8") + EFFECT, encoding="utf-8")
+    catalogue = folder / "proxytune" / "effects" / "catalogue.py"
+    text = catalogue.read_text(encoding="utf-8")
+    text = text.replace("    FloorSlope,\n", "    WeakReverse,\n    FloorSlope,\n", 1)
+    text = text.replace("motion import ", "motion import WeakReverse, ", 1)
+    catalogue.write_text(text, encoding="utf-8")
+    return folder
+
+
+def run(folder, *arguments):
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def test_an_effect_that_is_added_in_one_place_is_found_fitted_and_drawn(folder):
+    answer = run(folder, "-c", DIAGNOSE, str(folder / "tests" / "diagnosis"))
+    assert answer.returncode == 0, answer.stderr
+    found = json.loads(answer.stdout)
+    assert [effect["name"] for effect in found["effects"]] == ["weak_reverse"]
+    loss = found["effects"][0]["parameters"]["loss"]
+    assert loss["value"] == pytest.approx(0.3, abs=0.03)
+    assert loss["interval"][0] < loss["value"] < loss["interval"][1]
+    assert any(name.endswith("effect_curve.png") for name in found["files"])
+
+
+def test_an_effect_that_is_added_in_one_place_is_listed(folder):
+    rows = json.loads(run(folder, "-m", "proxytune", "list", "effects", "--json").stdout)["effects"]
+    (row,) = [row for row in rows if row["effect"] == "weak_reverse"]
+    assert (row["parameter"], row["stage"], row["source"]) == ("weak_reverse", "motion", "made up")
+
+
+def test_an_effect_without_a_row_in_the_documents_is_refused_in_words(folder):
+    answer = run(
+        folder, "-m", "pytest", "tests/test_documents.py", "-k", "every_effect_and_its_parameters and weak_reverse"
+    )
+    assert answer.returncode == 1
+    assert "studies/README.md has no row for the effect 'weak_reverse'" in answer.stdout

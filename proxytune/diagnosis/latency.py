@@ -196,12 +196,14 @@ def _squares(said: _Said, speeds: Speeds, robot: Reaction, latency_s: float) -> 
 def likeliest(squares: Floats, latencies: Floats) -> Latency:
     """The latency at which squares summed over blocks (blocks, latencies) are least.
 
-    Its deviation is that of the blocks' slopes there over the curvature; infinite where nothing tells it.
+    Its deviation is that of the blocks' slopes there over the curvature; infinite where nothing tells it, as at either
+    end: a robot that is stuck is as if its commands came long after.
     """
     total = squares.sum(axis=0)
-    middle = int(np.clip(total.argmin(), 1, len(total) - 2))
+    least = int(total.argmin())
+    middle = int(np.clip(least, 1, len(total) - 2))
     curve = float(total[middle - 1] - 2.0 * total[middle] + total[middle + 1])
-    if curve <= 0.0:
+    if curve <= 0.0 or least != middle:
         return Latency(float(latencies[middle]), float("inf"))
     slopes = (squares[:, middle + 1] - squares[:, middle - 1]) / 2.0
     step = float(latencies[1] - latencies[0])

@@ -13,6 +13,7 @@ from planted import ROBOT, driven_log, planted_log
 
 from proxytune.diagnosis.clocks import in_step, read_clocks
 from proxytune.diagnosis.drives import gather
+from proxytune.diagnosis.stretches import Blocks, stretches
 from proxytune.logs import read_log
 
 LOGS = Path(__file__).resolve().parents[2] / "../shared/data/logs"
@@ -86,6 +87,16 @@ def test_a_drive_that_repeats_itself_is_no_clock_problem():
     turn = 0.2 * np.sin(2.0 * np.pi * times / 6.0)
     duties = np.tile(np.stack((0.5 - turn, 0.5 + turn), axis=1), (4, 1, 1))
     assert not read_clocks(driven_log({}, duties, np.zeros((4, 3))), ROBOT).differ
+
+
+def test_a_robot_that_is_stuck_at_first_is_no_clock_problem():
+    latencies = np.arange(-40, 41) * 0.25
+    moving = np.minimum((latencies - 0.25) ** 2, 4.0)
+    stuck = np.where(latencies < 9.0, 4.0, 4.0 * (10.0 - latencies))
+    log = planted_log({}, episodes=1, seconds=60.0)
+    squares = np.concatenate((np.tile(stuck, (11, 1)), np.tile(moving, (19, 1))))
+    blocks = Blocks(np.zeros(30, dtype=int), np.arange(30), squares)
+    assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
 
 
 def test_drives_put_in_step_are_those_of_one_clock():

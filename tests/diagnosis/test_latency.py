@@ -61,3 +61,9 @@ def test_the_vertex_between_steps_is_found_with_its_deviation():
 
 def test_squares_that_do_not_depend_on_the_latency_tell_none():
     assert likeliest(np.ones((4, 9)), np.arange(9.0)).deviation == np.inf
+
+
+def test_squares_that_fall_to_the_end_of_what_was_tried_tell_none():
+    latencies = np.arange(-4, 5) * 0.5
+    for end in (-2.0, 2.0, 7.0):
+        assert likeliest((latencies - end) ** 2 * np.ones((6, 1)), latencies).deviation == np.inf

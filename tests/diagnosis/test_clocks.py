@@ -92,7 +92,7 @@ def test_a_drive_that_repeats_itself_is_no_clock_problem():
 def test_a_robot_that_is_stuck_at_first_is_no_clock_problem():
     latencies = np.arange(-40, 41) * 0.25
     moving = np.minimum((latencies - 0.25) ** 2, 4.0)
-    stuck = np.where(latencies < 9.0, 4.0, 4.0 * (10.0 - latencies))
+    stuck = np.minimum((10.0 - latencies) ** 2, 1.0) * 4.0
     log = planted_log({}, episodes=1, seconds=60.0)
     squares = np.concatenate((np.tile(stuck, (11, 1)), np.tile(moving, (19, 1))))
     blocks = Blocks(np.zeros(30, dtype=int), np.arange(30), squares)

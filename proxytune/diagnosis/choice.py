@@ -2,12 +2,15 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from proxytune.diagnosis.events import RandomEffect
-from proxytune.diagnosis.fitting import Fit, fit
+from proxytune.diagnosis.fitting import Fit, at_edge, fit
 from proxytune.diagnosis.replay import lateness
 from proxytune.diagnosis.round import Round
 from proxytune.diagnosis.screening import Lead
 from proxytune.diagnosis.windows import cut, ratio, strays
+from proxytune.effects import CATALOGUE, theta_names
 
 CLEAR_GAIN = 30.0
 """Nats that a random effect must gain: its chance is drawn from shifted innovations, which is rough."""
@@ -17,6 +20,12 @@ P_VALUE = 0.01
 
 PLAIN_SHARE = 0.8
 """An effect of both wheels is preferred to one of a single wheel if it gains this share."""
+
+WITHIN_SHARE = 0.8
+"""An effect within its range is preferred to one at an end of it if it gains this share and predicts no worse."""
+
+MOST_PLACES = 0.7
+"""A part of the map that holds more of the drives than this is no part."""
 
 ERROR_HORIZON_S = 2.0
 ERROR_FACTOR = 1.05
@@ -42,7 +51,8 @@ class Choice(NamedTuple):
 
 def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
     """The effect with most evidence, if that is more than chance and predicts no worse."""
-    named = [Choice(gain, fitted, lead) for lead, fitted, gain in looked.fits.values() if lead.p_value <= P_VALUE]
+    fits = [Choice(gain, fitted, lead) for lead, fitted, gain in looked.fits.values() if lead.p_value <= P_VALUE]
+    named = [choice for choice in fits if not _is_everywhere(choice)]
     clear = [effect for effect in looked.random if effect.p_value <= P_VALUE and effect.gain >= CLEAR_GAIN]
     chancy = [Choice(effect.gain, _drawing(model, effect), random=effect) for effect in clear]
     ranked = sorted(named + chancy, key=lambda choice: -choice.gain)
@@ -51,7 +61,26 @@ def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
     if best is None:
         return None
     plain = [choice for choice in named if _is_plain_form_of(choice, best)]
-    return plain[0] if plain else best
+    best = plain[0] if plain else best
+    within = [choice for choice in ranked if choice.gain > WITHIN_SHARE * best.gain and not _is_at_edge(choice)]
+    return within[0] if within and no_worse(within[0].fitted, best.fitted) else best
+
+
+def _is_everywhere(choice: Choice) -> bool:
+    """Whether it acts in a part of the map that holds most of the drives: then it is no matter of place."""
+    effect = CATALOGUE[choice.lead.candidate.effect] if choice.lead else None
+    if effect is None or effect.trace is None or not effect.trace.placed:
+        return False
+    _, x, y, radius = (choice.fitted.theta[name] for name in theta_names(effect))
+    places = choice.fitted.drives.poses[:, 0, :2]
+    return float((np.hypot(*(places - (x, y)).T) < radius).mean()) > MOST_PLACES
+
+
+def _is_at_edge(choice: Choice) -> bool:
+    """Whether a value of it was fitted to an end of its range: it then stands for something else."""
+    free = choice.lead.candidate.free if choice.lead else ()
+    figures = choice.fitted.drives.robot.figures
+    return any(at_edge(name, choice.fitted.theta[name], figures) for names in free for name in names)
 
 
 def _is_plain_form_of(choice: Choice, best: Choice) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from proxytune.diagnosis.clocks import Clocks
+from proxytune.diagnosis.fitting import at_edge
 from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.horizon_error import HorizonError
 from proxytune.diagnosis.innovations import Noise
@@ -18,10 +19,6 @@ from proxytune.effects import PARAMETERS
 
 MAIN_S = 2.0
 """The horizon of the one error that stands for all."""
-
-
-EDGE = 0.01
-"""A value this near to an end of its range, as a share of the range, is at the end."""
 
 
 @dataclass(frozen=True)
@@ -96,13 +93,8 @@ class Diagnosis:
         The effect then stands for something else.
         """
         fitted = {name for coordinate in effect.free for name in coordinate}
-        return tuple(name for name in effect.names if name in fitted & set(self.theta) and self._at_edge(name))
-
-    def _at_edge(self, name: str) -> bool:
-        parameter, value = PARAMETERS[name], self.theta[name].value
-        reach = EDGE * (parameter.high - parameter.low)
-        ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(self.robot.figures)]
-        return any(abs(value - end) <= reach for end in ends)
+        known = [name for name in effect.names if name in fitted and name in self.theta]
+        return tuple(name for name in known if at_edge(name, self.theta[name].value, self.robot.figures))
 
     @property
     def noise(self) -> Noise:

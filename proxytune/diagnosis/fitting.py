@@ -27,6 +27,9 @@ ROUNDS = 3
 STEP = 1e-3
 """Finite differences step by this fraction of a coordinate's range."""
 
+EDGE = 0.01
+"""A value this near to an end of its range, as a share of the range, is at the end."""
+
 KEPT_SOLVABLE = 1e-6
 """Added to the curvature of the loss, so that a coordinate without a slope does no harm."""
 
@@ -63,6 +66,14 @@ class Fit:
 def span(coordinate: Coordinate) -> tuple[float, float]:
     """Lowest and highest value of a coordinate."""
     return PARAMETERS[coordinate[0]].low, PARAMETERS[coordinate[0]].high
+
+
+def at_edge(name: str, value: float, figures: Mapping[str, float]) -> bool:
+    """Whether a value lies at an end of its parameter's range that is not neutral."""
+    parameter = PARAMETERS[name]
+    reach = EDGE * (parameter.high - parameter.low)
+    ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(figures)]
+    return any(abs(value - end) <= reach for end in ends)
 
 
 def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise = FIRST_GUESS) -> Fit:

@@ -25,7 +25,7 @@ JITTER = np.array((1e-5, 1e-5, 1e-5)) ** 2
 """Smallest variance of an increment [m², m², rad²]: keeps noise-free logs solvable."""
 
 THINNED = 2400
-RUN = 60
+RUN = 12
 """Noise is fitted to about so many increments, in runs of so many: more hardly sharpen five values, and cost most."""
 
 HUBER = 3.0

@@ -1,0 +1,68 @@
+"""Of what was looked at, what has most evidence is chosen, unless it stands for something else."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parent))
+
+from planted import DECLARED, NOISE, TRUTH, planted_drives
+
+from proxytune.diagnosis.candidates import candidates
+from proxytune.diagnosis.choice import best_of
+from proxytune.diagnosis.fitting import at_edge, seen
+from proxytune.diagnosis.round import Round
+from proxytune.diagnosis.screening import Lead
+from proxytune.driving.robot import read_robot
+
+FIGURES = read_robot("duckiebot").figures
+FORMS = {one.label: one for one in reversed(candidates(FIGURES, TRUTH, ()))}
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives(TRUTH, episodes=4, seconds=12.0)
+
+
+def chosen(drives, *tried):
+    """What is chosen of effects, each with its values and its gain."""
+    model = seen(drives, TRUTH, DECLARED, NOISE)
+    fits = {}
+    for label, values, gain in tried:
+        form = FORMS[label]
+        lead = Lead(form, form.probes[0], form.probes[0], gain, gain, 0.002, np.ones(3))
+        fits[label] = (lead, seen(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
+    best = best_of(model, Round([], fits, (), []), 15.0)
+    return best and best.lead.candidate.effect
+
+
+def patch(radius):
+    values = {"loss": 0.001, "x": 0.0, "y": 0.0, "radius": radius}
+    return {f"slippery_patch.{name}": value for name, value in values.items()}
+
+
+def test_most_evidence_is_chosen_and_little_is_not(drives):
+    slip, scrub = ("lateral_slip", {"lateral_slip": 1e-4}, 90.0), ("yaw_scrub", {"yaw_scrub": 0.1601}, 80.0)
+    assert chosen(drives, slip, scrub) == "lateral_slip"
+    assert chosen(drives, ("yaw_scrub", {"yaw_scrub": 0.1601}, 10.0)) is None
+
+
+def test_a_part_of_the_map_that_holds_all_drives_is_no_part(drives):
+    scrub = ("yaw_scrub", {"yaw_scrub": 0.1601}, 50.0)
+    assert chosen(drives, ("slippery_patch", patch(0.1), 90.0), scrub) == "slippery_patch"
+    assert chosen(drives, ("slippery_patch", patch(5.0), 90.0), scrub) == "yaw_scrub"
+
+
+@pytest.mark.parametrize(("gain", "wanted"), [(85.0, "yaw_scrub"), (40.0, "motor_lag")])
+def test_an_effect_within_its_range_is_preferred_to_one_at_its_end(drives, gain, wanted, monkeypatch):
+    monkeypatch.setattr("proxytune.diagnosis.choice.no_worse", lambda one, other: True)
+    lag = ("motor_lag", {"motor_lag.time_constant": 1.0, "motor_lag.imbalance": 0.0}, 90.0)
+    assert chosen(drives, lag, ("yaw_scrub", {"yaw_scrub": 0.1601}, gain)) == wanted
+
+
+def test_only_an_end_that_is_not_neutral_is_an_edge():
+    assert at_edge("motor_lag.time_constant", 1.0, FIGURES)
+    assert not at_edge("dead_band.width", 0.0, FIGURES)
+    assert not at_edge("motor_lag.time_constant", 0.5, FIGURES)

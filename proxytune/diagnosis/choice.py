@@ -24,7 +24,7 @@ PLAIN_SHARE = 0.8
 WITHIN_SHARE = 0.8
 """An effect within its range is preferred to one at an end of it if it gains this share and predicts no worse."""
 
-MOST_PLACES = 0.7
+MOST_PLACES = 0.9
 """A part of the map that holds more of the drives than this is no part."""
 
 ERROR_HORIZON_S = 2.0

@@ -38,6 +38,9 @@ EARLIEST_S = 0.02
 ASSUMED_DELAY_S = 0.05
 """The delay that is left to a robot whose nominal delay nobody states, once an offset is taken out."""
 
+RARE = 0.25
+"""Clocks of no more than this share of the drives jump, or are others."""
+
 PROOF_BLOCK_S = 5.0
 """Two latencies are compared over such blocks."""
 
@@ -104,8 +107,12 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
         return _one_clock(len(log.episodes))
     squares, latencies, apart = _squares(log, drives, speeds)
     kept, jumps = stretches(log, squares, latencies)
+    varied = not _rare(len({jump.drive for jump in jumps}), len(log.episodes))
+    if varied:
+        kept, jumps = [(0.0, np.inf)] * len(log.episodes), ()
     own = [squares.squares[within(squares, e, kept[e])] for e in range(len(log.episodes))]
     common, others = deviants(own, latencies)
+    others = {} if varied or not _rare(len(others), len(log.episodes)) else others
     latency = likeliest(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
     unlike = like is not None and abs(latency.value - assumed) > max(LEAST_S, SURE * latency.deviation)
@@ -122,6 +129,14 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
         later_s=later,
         kept_s=np.array(kept, dtype=float),
     )
+
+
+def _rare(count: int, drives: int) -> bool:
+    """Whether so few drives are odd that it may be their clocks.
+
+    A robot whose lag is another in every manoeuvre, as one that ramps its duties, has many.
+    """
+    return count <= max(1.0, RARE * drives)
 
 
 def _one_clock(episodes: int) -> Clocks:

@@ -82,6 +82,12 @@ def test_a_slow_or_late_robot_is_no_clock_problem(theta):
     assert not read_clocks(planted_log({"trim": 0.03, **theta}, episodes=4, seconds=40.0), ROBOT).differ
 
 
+@pytest.mark.parametrize("name", ["slew_rate rise 0.4", "slew_rate rise 0.8", "yaw_lag time_constant 0.25"])
+def test_a_lag_that_is_another_in_every_manoeuvre_is_no_clock_problem(name):
+    (case,) = (case for case in hidden.IN_FORM if case.name == name)
+    assert not clocks(0.0, case).differ
+
+
 def test_a_drive_that_repeats_itself_is_no_clock_problem():
     times = np.arange(1200) / 20.0
     turn = 0.2 * np.sin(2.0 * np.pi * times / 6.0)

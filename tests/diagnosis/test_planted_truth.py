@@ -43,7 +43,7 @@ LATER = [
     "slew_rate rise 0.8",
     "thermal_fade loss 0.6",
     "cross_coupling forward 0.02",
-    "cross_coupling turn 0.3",
+    "cross_coupling turn 0.8",
     "understeer gain 0.5",
     "yaw_lag time_constant 0.1",
     "wheel_ripple left 0.25",

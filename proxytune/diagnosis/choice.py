@@ -1,5 +1,6 @@
 """Which of the effects that were looked at is adopted next, if any."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from proxytune.diagnosis.fitting import Fit, at_edge, fit
 from proxytune.diagnosis.replay import lateness
 from proxytune.diagnosis.round import Round
 from proxytune.diagnosis.screening import Lead
-from proxytune.diagnosis.windows import cut, ratio, strays
+from proxytune.diagnosis.windows import blocks_of, cut, ratio, strays
 from proxytune.effects import CATALOGUE, theta_names
 
 CLEAR_GAIN = 30.0
@@ -54,16 +55,26 @@ def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
     fits = [Choice(gain, fitted, lead) for lead, fitted, gain in looked.fits.values() if lead.p_value <= P_VALUE]
     named = [choice for choice in fits if not _is_everywhere(choice)]
     clear = [effect for effect in looked.random if effect.p_value <= P_VALUE and effect.gain >= CLEAR_GAIN]
-    chancy = [Choice(effect.gain, _drawing(model, effect), random=effect) for effect in clear]
-    ranked = sorted(named + chancy, key=lambda choice: -choice.gain)
-    enough = (choice for choice in ranked if choice.gain >= least)
+    everything: list[Choice | RandomEffect] = [*named, *clear]
+    ranked = sorted(everything, key=lambda one: -one.gain)
+    enough = (_choice(model, found) for found in ranked if found.gain >= least)
     best = next((choice for choice in enough if no_worse(choice.fitted, model)), None)
     if best is None:
         return None
-    plain = [choice for choice in named if _is_plain_form_of(choice, best)]
-    best = plain[0] if plain else best
-    within = [choice for choice in ranked if choice.gain > WITHIN_SHARE * best.gain and not _is_at_edge(choice)]
-    return within[0] if within and no_worse(within[0].fitted, best.fitted) else best
+    plain = next((choice for choice in named if _is_plain_form_of(choice, best)), best)
+    return plain if not _is_at_edge(plain) else _within(model, plain, ranked)
+
+
+def _choice(model: Fit, found: Choice | RandomEffect) -> Choice:
+    """A choice, for a random effect too, whose model is only fitted once it is asked for."""
+    return found if isinstance(found, Choice) else Choice(found.gain, _drawing(model, found), random=found)
+
+
+def _within(model: Fit, best: Choice, ranked: Sequence[Choice | RandomEffect]) -> Choice:
+    """The first that gains nearly as much as the best, is not at an end of its range, and predicts no worse."""
+    near = (_choice(model, found) for found in ranked if found.gain > WITHIN_SHARE * best.gain)
+    inside = next((choice for choice in near if not _is_at_edge(choice)), None)
+    return inside if inside is not None and no_worse(inside.fitted, best.fitted) else best
 
 
 def _is_everywhere(choice: Choice) -> bool:
@@ -105,5 +116,4 @@ def no_worse(one: Fit, other: Fit) -> bool:
     if len(windows.begin) < 2:
         return True
     squares = [strays(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
-    blocks = other.drives.block[windows.begin][windows.window]
-    return ratio(squares[0], squares[1], blocks).interval[0] <= ERROR_FACTOR
+    return ratio(squares[0], squares[1], blocks_of(other.drives, windows)).interval[0] <= ERROR_FACTOR

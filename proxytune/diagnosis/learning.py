@@ -11,7 +11,7 @@ from proxytune.diagnosis.found import Found
 from proxytune.diagnosis.lookalike import Lookalike, lookalike
 from proxytune.diagnosis.remainder import Remainder, remainder
 from proxytune.diagnosis.window_slopes import FITTED_S
-from proxytune.diagnosis.windows import Rmse, cut, ratio, rmse, strays
+from proxytune.diagnosis.windows import Rmse, blocks_of, cut, ratio, rmse, strays
 from proxytune.effects import effect_of
 
 DOUBTFUL = 0.95
@@ -79,7 +79,7 @@ def learn(found: Found, tested: Drives, horizons_s: Iterable[float]) -> Learning
 
 def _error(found: Found, beside: Remainder, drives: Drives, horizon_s: float) -> LearntError | None:
     windows = cut(drives, horizon_s)
-    blocks = drives.block[windows.begin][windows.window]
+    blocks = blocks_of(drives, windows)
     if len(np.unique(blocks)) < 2:
         return None
     names = strays(drives, found.model.theta, windows) ** 2
@@ -94,6 +94,6 @@ def _doubtful(found: Found, beside: Remainder) -> bool:
     drives = found.model.drives
     alone = remainder(drives, found.declared.theta)
     windows = cut(drives, FITTED_S)
-    blocks = drives.block[windows.begin][windows.window]
+    blocks = blocks_of(drives, windows)
     compared = ratio(alone.held_out, beside.held_out, blocks)
     return alone.used and compared.value < DOUBTFUL and compared.interval[1] < 1.0

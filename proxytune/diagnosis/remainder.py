@@ -8,15 +8,13 @@ import numpy as np
 from proxytune.diagnosis.drives import Drives, Floats, Whole
 from proxytune.diagnosis.group_choice import Choice, Sums, choose, sums
 from proxytune.diagnosis.offers import offered
+from proxytune.diagnosis.polish import HORIZONS_S
 from proxytune.diagnosis.window_slopes import FITTED_S, slopes_of
-from proxytune.diagnosis.windows import Rmse, Windows, cut, ratio, strays
+from proxytune.diagnosis.windows import Rmse, Windows, blocks_of, chosen, cut, ratio, strays
 from proxytune.effects.features import GROUPS
 from proxytune.effects.learnt import Learnt
 from proxytune.effects.learnt_table import learnt_theta
 from proxytune.space import Theta
-
-HORIZONS_S = (1.0, 2.0, 5.0)
-"""Windows on which the guard looks [s]."""
 
 PARTS = 16
 """No more parts are left out in turn."""
@@ -65,7 +63,7 @@ def remainder(drives: Drives, theta: Theta) -> Remainder:
     before = strays(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
     if blocks < FEWEST_PARTS:
         return Remainder(held_out=before)
-    whole, folds = _fitted(drives, theta, min(PARTS, int(drives.block.max()) + 1))
+    whole, folds = _fitted(drives, theta)
     if not whole.gains:
         return Remainder(held_out=before)
     guard = _guard(drives, theta, folds)
@@ -83,26 +81,26 @@ class _Fitted:
     gains: Mapping[str, float]
 
 
-def _fitted(drives: Drives, theta: Theta, parts: int) -> tuple[_Fitted, list[_Fitted]]:
+def _fitted(drives: Drives, theta: Theta) -> tuple[_Fitted, list[_Fitted]]:
     """The fit to all parts, and those without each fold."""
-    offer = offered(drives, theta)
+    offer, parts = offered(drives, theta), _parts(drives)
     groups = _columns(offer)
     weights = np.zeros(sum(len(curve.knots) for curve in offer.curves))
     now: Mapping[str, float] = {}
     for _ in range(ROUNDS):
         slopes = slopes_of(drives, {**theta, **now}, offer)
         given = sums(slopes, weights, slopes.block % parts, parts)
-        chosen = choose(given, groups)
-        weights, now = chosen.weights, _theta(offer, chosen)
-        if not chosen.gains:
+        choice = choose(given, groups)
+        weights, now = choice.weights, _theta(offer, choice)
+        if not choice.gains:
             break
     folds = [_without(offer, given, groups, fold) for fold in range(FOLDS)] if now else []
-    return _Fitted(now, chosen.gains), folds
+    return _Fitted(now, choice.gains), folds
 
 
 def _without(offer: Learnt, given: Sums, groups: Mapping[str, Whole], fold: int) -> _Fitted:
-    chosen = choose(given.only(np.arange(len(given.size)) % FOLDS != fold), groups)
-    return _Fitted(_theta(offer, chosen), chosen.gains)
+    choice = choose(given.only(np.arange(len(given.size)) % FOLDS != fold), groups)
+    return _Fitted(_theta(offer, choice), choice.gains)
 
 
 def _columns(offer: Learnt) -> dict[str, Whole]:
@@ -111,14 +109,14 @@ def _columns(offer: Learnt) -> dict[str, Whole]:
     return {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist())}
 
 
-def _theta(offer: Learnt, chosen: Choice) -> dict[str, float]:
+def _theta(offer: Learnt, choice: Choice) -> dict[str, float]:
     """The chosen groups with their weights, by their names in θ."""
-    if not chosen.gains:
+    if not choice.gains:
         return {}
     ends = np.cumsum([len(curve.knots) for curve in offer.curves])[:-1]
-    parts = zip(offer.curves, np.split(chosen.weights, ends), strict=True)
+    parts = zip(offer.curves, np.split(choice.weights, ends), strict=True)
     curves = tuple(
-        curve._replace(weights=tuple(weights.tolist())) for curve, weights in parts if curve.group in chosen.gains
+        curve._replace(weights=tuple(weights.tolist())) for curve, weights in parts if curve.group in choice.gains
     )
     return learnt_theta(Learnt(offer.seen, curves))
 
@@ -127,7 +125,7 @@ def _guard(drives: Drives, theta: Theta, folds: list[_Fitted]) -> dict[float, Rm
     found = {}
     for horizon_s in HORIZONS_S:
         windows = cut(drives, horizon_s)
-        blocks = drives.block[windows.begin][windows.window]
+        blocks = blocks_of(drives, windows)
         if len(np.unique(blocks)) >= FEWEST_PARTS:
             before = strays(drives, theta, windows)[:, 0] ** 2
             after = _crossed(drives, theta, folds, windows)
@@ -137,17 +135,19 @@ def _guard(drives: Drives, theta: Theta, folds: list[_Fitted]) -> dict[float, Rm
 
 def _crossed(drives: Drives, theta: Theta, folds: list[_Fitted], windows: Windows) -> Floats:
     """Squared distance at every compared pose (M,), each predicted by the fit that left its block out."""
-    parts = min(PARTS, int(drives.block.max()) + 1)
     squares = np.empty(len(windows.increment))
-    fold_of = (drives.block[windows.begin] % parts) % FOLDS
+    fold_of = drives.block[windows.begin] % _parts(drives) % FOLDS
     for number, fold in enumerate(folds):
         own = fold_of == number
-        kept = own[windows.window]
         if own.any():
-            renumbered = np.cumsum(own) - 1
-            part = Windows(windows.begin[own], renumbered[windows.window[kept]], windows.increment[kept])
-            squares[kept] = strays(drives, {**theta, **fold.theta}, part)[:, 0] ** 2
+            part = chosen(windows, own)
+            squares[own[windows.window]] = strays(drives, {**theta, **fold.theta}, part)[:, 0] ** 2
     return squares
+
+
+def _parts(drives: Drives) -> int:
+    """How many parts blocks are dealt out to."""
+    return min(PARTS, int(drives.block.max()) + 1)
 
 
 def _helps(guard: Mapping[float, Rmse]) -> bool:

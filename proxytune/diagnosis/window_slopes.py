@@ -6,7 +6,7 @@ import numpy as np
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
 from proxytune.diagnosis.replay import tracked, window_features, window_twists
-from proxytune.diagnosis.windows import Windows, cut
+from proxytune.diagnosis.windows import Windows, chosen, cut
 from proxytune.driving.planar import integrate
 from proxytune.effects.learnt import Learnt
 from proxytune.effects.learnt_table import is_learnt
@@ -40,13 +40,11 @@ def compared(drives: Drives) -> Windows:
     """The windows and poses that are fitted."""
     windows = cut(drives, FITTED_S)
     step = int(np.ceil(len(windows.begin) / MOST_WINDOWS))
-    chosen = np.arange(len(windows.begin)) % step == 0
+    windows = chosen(windows, np.arange(len(windows.begin)) % step == 0)
     tick = drives.last[windows.increment] - drives.first[windows.begin][windows.window]
     part = windows.window * POSES + np.minimum(POSES - 1, tick * POSES // (FITTED_S * drives.tick_hz)).astype(int)
     last = np.concatenate((part[1:] != part[:-1], [True]))
-    kept = np.flatnonzero(last & chosen[windows.window])
-    number = np.cumsum(chosen) - 1
-    return Windows(windows.begin[chosen], number[windows.window[kept]], windows.increment[kept])
+    return Windows(windows.begin, windows.window[last], windows.increment[last])
 
 
 def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:

@@ -35,7 +35,7 @@ def chosen(drives, *tried):
         lead = Lead(form, form.probes[0], form.probes[0], gain, gain, 0.002, np.ones(3))
         fits[label] = (lead, seen(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
     best = best_of(model, Round([], fits, (), []), 15.0)
-    return best and best.lead.candidate.effect
+    return best and best.lead.candidate.label
 
 
 def patch(radius):
@@ -53,6 +53,13 @@ def test_a_part_of_the_map_that_holds_all_drives_is_no_part(drives):
     scrub = ("yaw_scrub", {"yaw_scrub": 0.1601}, 50.0)
     assert chosen(drives, ("slippery_patch", patch(0.1), 90.0), scrub) == "slippery_patch"
     assert chosen(drives, ("slippery_patch", patch(5.0), 90.0), scrub) == "yaw_scrub"
+
+
+@pytest.mark.parametrize(("gain", "wanted"), [(85.0, "dead_band"), (40.0, "dead_band (left wheel)")])
+def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little_loss(drives, gain, wanted):
+    one = ("dead_band (left wheel)", {"dead_band.width": 0.001, "dead_band.imbalance": 0.001}, 90.0)
+    both = ("dead_band", {"dead_band.width": 0.001, "dead_band.imbalance": 0.0}, gain)
+    assert chosen(drives, one, both) == wanted
 
 
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "yaw_scrub"), (40.0, "motor_lag")])

@@ -12,7 +12,7 @@ from proxytune.diagnosis.found import Found
 from proxytune.diagnosis.polish import FEWEST_BLOCKS
 from proxytune.diagnosis.repeats import repeated
 from proxytune.diagnosis.verdict import Bracket, bracket
-from proxytune.diagnosis.windows import Rmse, Windows, blocks_of, cut, ratio, rmse, strays
+from proxytune.diagnosis.windows import Ratio, Rmse, Windows, blocks_of, cut, ratio, rmse, strays
 from proxytune.space import Theta
 
 
@@ -36,7 +36,7 @@ class HorizonError:
     windows: int
     before: Rmse
     after: Rmse
-    ratio: Rmse
+    ratio: Ratio
     floor: Bracket
     heading_before: Rmse
     heading_after: Rmse

@@ -11,7 +11,7 @@ from proxytune.diagnosis.found import Found
 from proxytune.diagnosis.lookalike import Lookalike, lookalike
 from proxytune.diagnosis.remainder import Remainder, remainder
 from proxytune.diagnosis.window_slopes import FITTED_S
-from proxytune.diagnosis.windows import Rmse, blocks_of, cut, ratio, rmse, strays
+from proxytune.diagnosis.windows import Ratio, Rmse, blocks_of, cut, ratio, rmse, strays
 from proxytune.effects import effect_of
 
 DOUBTFUL = 0.95
@@ -31,7 +31,7 @@ class LearntError(NamedTuple):
     horizon_s: float
     after: Rmse
     heading: Rmse
-    ratio: Rmse
+    ratio: Ratio
 
 
 @dataclass(frozen=True)
@@ -96,4 +96,4 @@ def _doubtful(found: Found, beside: Remainder) -> bool:
     windows = cut(drives, FITTED_S)
     blocks = blocks_of(drives, windows)
     compared = ratio(alone.held_out, beside.held_out, blocks)
-    return alone.used and compared.value < DOUBTFUL and compared.interval[1] < 1.0
+    return alone.used and compared.value < DOUBTFUL and compared.below

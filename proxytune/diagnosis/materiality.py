@@ -16,10 +16,10 @@ from proxytune.diagnosis.fitting import fit
 from proxytune.diagnosis.found import Adopted, Dropped, Found, Variant
 from proxytune.diagnosis.polish import compared, fit_windows, held_out, horizons
 from proxytune.diagnosis.replay import drawn_paths, lateness, paths
-from proxytune.diagnosis.windows import Rmse, Windows, blocks_of, cut, moved_along, ratio, strays
+from proxytune.diagnosis.windows import Ratio, Windows, blocks_of, cut, moved_along, ratio, strays
 
 MATERIAL = 1.05
-"""An effect matters if without it the error at some horizon is so many times as large, its interval being above 1."""
+"""An effect matters if without it the error at some horizon is so many times as large, being shown to be larger."""
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
@@ -30,7 +30,7 @@ DRAWS = 10
 LARGEST_SHARE = 0.95
 """A random effect is said to make up no more of the error than this share, even if its draws stray further."""
 
-Worth = Mapping[float, Rmse]
+Worth = Mapping[float, Ratio]
 """The error without an effect by the error with it, by horizon [s]."""
 
 
@@ -43,12 +43,12 @@ class Weighed(NamedTuple):
     @property
     def material(self) -> bool:
         """Whether predictions are shown to need it."""
-        return any(one.value >= MATERIAL and one.interval[0] > 1.0 for one in self.worth.values())
+        return any(one.value >= MATERIAL and one.above for one in self.worth.values())
 
     @property
     def harmful(self) -> bool:
         """Whether predictions are shown to be better without it."""
-        return any(one.value <= 1.0 / MATERIAL and one.interval[1] < 1.0 for one in self.worth.values())
+        return any(one.value <= 1.0 / MATERIAL and one.below for one in self.worth.values())
 
     @property
     def largest(self) -> float:
@@ -133,7 +133,7 @@ def _length(drives: Drives) -> float:
 
 def _worth_of_draws(
     drives: Drives, variant: Variant, effect: Adopted, whole: Mapping[float, Floats], seed: int
-) -> dict[float, Rmse]:
+) -> dict[float, Ratio]:
     """What a random effect is worth: it moves no mean, so what counts is how much of the error its draws make up.
 
     With s the distance of drawn and expected replays and e the error, the error without the draws would be √(e² − s²).
@@ -143,7 +143,7 @@ def _worth_of_draws(
         windows = cut(drives, horizon)
         share = ratio(_drawn_squares(drives, variant, windows, seed), squares, blocks_of(drives, windows))
         value, low, high = (_without_draws(end) for end in (share.value, *share.interval))
-        found[horizon] = Rmse(value, (low, high))
+        found[horizon] = Ratio(value, (low, high))
     return found
 
 

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole
 from proxytune.diagnosis.fitting import STEP, Coordinate, Fit, placed, seen, span
-from proxytune.diagnosis.windows import Rmse, Windows, blocks_of, chosen, cut, measured_since, misses, ratio, strays
+from proxytune.diagnosis.windows import Ratio, Windows, blocks_of, chosen, cut, measured_since, misses, ratio, strays
 from proxytune.space import Theta
 
 HORIZONS_S = (1.0, 2.0, 5.0)
@@ -49,7 +49,7 @@ class Polish(NamedTuple):
     """
 
     horizon_s: float
-    ratios: Mapping[float, Rmse]
+    ratios: Mapping[float, Ratio]
     intervals: Mapping[str, tuple[float, float]]
 
 
@@ -159,7 +159,7 @@ def _folds(drives: Drives) -> Whole:
     return np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
 
 
-def compared(drives: Drives, one: Mapping[float, Floats], other: Mapping[float, Floats]) -> dict[float, Rmse]:
+def compared(drives: Drives, one: Mapping[float, Floats], other: Mapping[float, Floats]) -> dict[float, Ratio]:
     """The ratio of two errors over the same windows, by horizon [s]."""
     return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h))) for h, squares in one.items()}
 
@@ -168,7 +168,7 @@ def polished(fitted: Fit) -> tuple[Fit, Polish | None]:
     """The model with its parameters fitted to windows, if held-out windows show that this helps and nowhere harms."""
     drives = fitted.drives
     plain = {h: strays(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
-    best: tuple[float, float, dict[float, Rmse]] | None = None
+    best: tuple[float, float, dict[float, Ratio]] | None = None
     for length in [s for s in FITTED_S if s in plain]:
         ratios = compared(drives, held_out(drives, fitted.theta, fitted.free, length), plain)
         values = [one.value for one in ratios.values()]

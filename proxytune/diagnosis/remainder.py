@@ -10,7 +10,7 @@ from proxytune.diagnosis.group_choice import Choice, Sums, choose, sums
 from proxytune.diagnosis.offers import offered
 from proxytune.diagnosis.polish import HORIZONS_S
 from proxytune.diagnosis.window_slopes import FITTED_S, slopes_of
-from proxytune.diagnosis.windows import Rmse, Windows, blocks_of, chosen, cut, ratio, strays
+from proxytune.diagnosis.windows import Ratio, Windows, blocks_of, chosen, cut, ratio, strays
 from proxytune.effects.features import GROUPS
 from proxytune.effects.learnt import Learnt
 from proxytune.effects.learnt_table import learnt_theta
@@ -46,7 +46,7 @@ class Remainder:
 
     theta: Mapping[str, float] = field(default_factory=dict)
     share: Mapping[str, float] = field(default_factory=dict)
-    guard: Mapping[float, Rmse] = field(default_factory=dict)
+    guard: Mapping[float, Ratio] = field(default_factory=dict)
     used: bool = False
     held_out: Floats = field(default_factory=lambda: np.empty(0))
 
@@ -121,7 +121,7 @@ def _theta(offer: Learnt, choice: Choice) -> dict[str, float]:
     return learnt_theta(Learnt(offer.seen, curves))
 
 
-def _guard(drives: Drives, theta: Theta, folds: list[_Fitted]) -> dict[float, Rmse]:
+def _guard(drives: Drives, theta: Theta, folds: list[_Fitted]) -> dict[float, Ratio]:
     found = {}
     for horizon_s in HORIZONS_S:
         windows = cut(drives, horizon_s)
@@ -150,6 +150,6 @@ def _parts(drives: Drives) -> int:
     return min(PARTS, int(drives.block.max()) + 1)
 
 
-def _helps(guard: Mapping[float, Rmse]) -> bool:
-    helps = any(one.value < HELPS and one.interval[1] < 1.0 for one in guard.values())
+def _helps(guard: Mapping[float, Ratio]) -> bool:
+    helps = any(one.value < HELPS and one.below for one in guard.values())
     return helps and all(one.value <= HARMS for one in guard.values())

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole, sum_by
-from proxytune.diagnosis.windows import Rmse, Windows, cut, measured_since, ratio, strays
+from proxytune.diagnosis.windows import Ratio, Windows, cut, measured_since, ratio, strays
 from proxytune.space import Theta
 
 FEWEST = 20
@@ -23,7 +23,7 @@ class Repeated(NamedTuple):
         apart: What they do not repeat: RMSE of position [m].
     """
 
-    share: Rmse
+    share: Ratio
     apart: float
 
 

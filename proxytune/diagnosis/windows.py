@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
+from scipy.stats import wilcoxon
 
 from proxytune.diagnosis.drives import Drives, Floats, Whole, relative
 from proxytune.diagnosis.replay import window_paths
@@ -12,6 +13,9 @@ from proxytune.space import Theta
 
 SHORTEST = 0.9
 """Windows that cover less of the horizon are left out: poses seldom end exactly at it, but a stub is no window."""
+
+P_VALUE = 0.025
+"""Ratios of so many blocks on one side of 1 are no chance."""
 
 
 class Windows(NamedTuple):
@@ -96,15 +100,52 @@ class Rmse(NamedTuple):
     interval: tuple[float, float]
 
 
+class Ratio(NamedTuple):
+    """One error by another over the same windows.
+
+    Attributes:
+        value: The ratio of the two root mean squares.
+        interval: Its 95 % interval, from leaving blocks out in turn.
+        p_below: How likely chance makes so many blocks' ratios so far below 1 (Wilcoxon's signed ranks, one-sided).
+        p_above: The same above 1.
+    """
+
+    value: float
+    interval: tuple[float, float]
+    p_below: float = 1.0
+    p_above: float = 1.0
+
+    @property
+    def below(self) -> bool:
+        """Whether it is shown to be below 1, by its interval or, where few blocks weigh most, by signed ranks."""
+        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < P_VALUE)
+
+    @property
+    def above(self) -> bool:
+        """Whether it is shown to be above 1."""
+        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < P_VALUE)
+
+
 def rmse(squares: Floats, blocks: Whole) -> Rmse:
     """The root mean square, with a t-interval on its logarithm from leaving blocks out in turn."""
     return _root(float(np.log(squares.mean())), _half_width(_left_out(squares, blocks)))
 
 
-def ratio(after: Floats, before: Floats, blocks: Whole) -> Rmse:
+def ratio(after: Floats, before: Floats, blocks: Whole) -> Ratio:
     """The ratio of two root mean squares over the same windows, with its interval."""
     half = _half_width(_left_out(after, blocks) - _left_out(before, blocks))
-    return _root(float(np.log(after.mean() / before.mean())), half)
+    value, interval = _root(float(np.log(after.mean() / before.mean())), half)
+    return Ratio(value, interval, *_signed_ranks(after, before, blocks))
+
+
+def _signed_ranks(after: Floats, before: Floats, blocks: Whole) -> tuple[float, float]:
+    """How likely chance makes the blocks' ratios so far below 1, and so far above."""
+    _, label = np.unique(blocks, return_inverse=True)
+    sums = np.stack([np.bincount(label, squares) for squares in (after, before)])
+    logs = -np.diff(np.log(sums[:, (sums > 0.0).all(axis=0)]), axis=0)[0]
+    if len(logs) < 2 or not logs.any():
+        return 1.0, 1.0
+    return float(wilcoxon(logs, alternative="less").pvalue), float(wilcoxon(logs, alternative="greater").pvalue)
 
 
 def _root(log: float, half: float) -> Rmse:

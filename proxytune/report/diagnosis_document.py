@@ -12,7 +12,7 @@ from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
 from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.horizon_error import HorizonError
 from proxytune.diagnosis.materiality import Worth
-from proxytune.diagnosis.windows import Rmse
+from proxytune.diagnosis.windows import Ratio
 from proxytune.driving.robot import robot_names
 from proxytune.effects import CATALOGUE, Model, model_text, theta_names
 from proxytune.logs import GEOMETRY
@@ -89,7 +89,7 @@ def _worth(worth: Worth) -> dict[str, Any]:
     return {f"{horizon:g}": _percent(one) for horizon, one in worth.items()}
 
 
-def _percent(one: Rmse) -> dict[str, Any]:
+def _percent(one: Ratio) -> dict[str, Any]:
     value, interval = per_cent(one)
     return {"value": value, "interval": list(interval), "unit": "%"}
 
@@ -128,7 +128,7 @@ def _error(error: HorizonError) -> dict[str, Any]:
     }
 
 
-def _ratio(one: Rmse) -> dict[str, Any]:
+def _ratio(one: Ratio) -> dict[str, Any]:
     return {"value": one.value, "interval": list(one.interval)}
 
 

@@ -3,7 +3,7 @@
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.found import Adopted
 from proxytune.diagnosis.materiality import MATERIAL, Worth
-from proxytune.diagnosis.windows import Rmse
+from proxytune.diagnosis.windows import Ratio
 from proxytune.report.clocks_document import clocks_notes
 from proxytune.report.learnt_document import learnt_notes
 from proxytune.report.likeness_document import unlike_notes
@@ -39,7 +39,7 @@ def notes(diagnosis: Diagnosis) -> list[str]:
     return lines + _next(diagnosis)
 
 
-def per_cent(one: Rmse) -> tuple[float, tuple[float, float]]:
+def per_cent(one: Ratio) -> tuple[float, tuple[float, float]]:
     """A ratio of errors as what it adds [%], with its interval."""
     value, low, high = (100.0 * (end - 1.0) for end in (one.value, *one.interval))
     return value, (low, high)
@@ -85,7 +85,7 @@ def _label(effect: Adopted) -> str:
     return f"{effect.effect} ({effect.form})" if effect.form else effect.effect
 
 
-def _ends(one: Rmse, decimals: int) -> str:
+def _ends(one: Ratio, decimals: int) -> str:
     low, high = per_cent(one)[1]
     return f"{fixed(low, decimals)} to {'+' if high > 0.0 else ''}{fixed(high, decimals)}"
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from proxytune.diagnosis.learning import Learning
 from proxytune.diagnosis.lookalike import Lookalike
-from proxytune.diagnosis.windows import Rmse
+from proxytune.diagnosis.windows import Ratio
 
 
 def learnt_document(learning: Learning) -> dict[str, Any]:
@@ -41,7 +41,7 @@ def _lookalike(like: Lookalike | None) -> dict[str, Any] | None:
     return {"name": like.effect, "form": like.form, "values": dict(like.theta), "share": like.share}
 
 
-def _ratios(found: Mapping[float, Rmse]) -> dict[str, dict[str, Any]]:
+def _ratios(found: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
     return {f"{horizon_s:g}": {"value": one.value, "interval": list(one.interval)} for horizon_s, one in found.items()}
 
 

@@ -12,7 +12,7 @@ from planted import DECLARED, NOISE, TRUTH, planted_drives
 from proxytune.diagnosis.fitting import seen
 from proxytune.diagnosis.found import Adopted, Found, Variant
 from proxytune.diagnosis.materiality import MATERIAL, Weighed, lacking, without_immaterial, worth
-from proxytune.diagnosis.windows import Rmse
+from proxytune.diagnosis.windows import Ratio
 
 SCRUB, SLIP = (("yaw_scrub",),), (("lateral_slip",),)
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
@@ -105,14 +105,14 @@ def test_without_a_random_effect_its_mean_lateness_is_delay():
     ],
 )
 def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger(ratios, material):
-    one = Weighed(adopted("x"), {float(h): Rmse(value, ends) for h, (value, *ends) in enumerate(ratios)})
+    one = Weighed(adopted("x"), {float(h): Ratio(value, ends) for h, (value, *ends) in enumerate(ratios)})
     assert one.material == material
     assert MATERIAL == 1.05
 
 
 def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_without_it():
     def weighed(value, low, high):
-        return Weighed(adopted("lateral_slip", SLIP), {2.0: Rmse(value, (low, high))})
+        return Weighed(adopted("lateral_slip", SLIP), {2.0: Ratio(value, (low, high))})
 
     assert weighed(0.9, 0.85, 0.96).harmful
     assert not weighed(0.9, 0.75, 1.02).harmful

@@ -12,7 +12,7 @@ from learnt_truth import TURNING
 from planted import TRUTH, planted_drives
 
 from proxytune.diagnosis.remainder import HARMS, HELPS, Remainder, _helps, remainder
-from proxytune.diagnosis.windows import Rmse, cut, strays
+from proxytune.diagnosis.windows import Ratio, cut, strays
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,8 @@ def test_too_few_blocks_teach_nothing():
     assert len(learnt.held_out)
 
 
-GOOD, DULL, BAD, UNSURE = Rmse(0.8, (0.7, 0.9)), Rmse(1.0, (0.9, 1.1)), Rmse(1.1, (0.9, 1.3)), Rmse(0.8, (0.6, 1.01))
+GOOD, DULL = Ratio(0.8, (0.7, 0.9)), Ratio(1.0, (0.9, 1.1))
+BAD, UNSURE = Ratio(1.1, (0.9, 1.3)), Ratio(0.8, (0.6, 1.01))
 
 
 @pytest.mark.parametrize(

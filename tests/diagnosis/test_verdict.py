@@ -4,11 +4,11 @@ import pytest
 
 from proxytune.diagnosis.repeats import Repeated
 from proxytune.diagnosis.verdict import bracket, verdict
-from proxytune.diagnosis.windows import Rmse
+from proxytune.diagnosis.windows import Ratio
 
-KNOWN = Repeated(Rmse(0.97, (0.9, 1.05)), 0.0116)
-BEYOND = Repeated(Rmse(0.5, (0.4, 0.6)), 0.006)
-UNSURE = Repeated(Rmse(0.75, (0.5, 1.1)), 0.009)
+KNOWN = Repeated(Ratio(0.97, (0.9, 1.05)), 0.0116)
+BEYOND = Repeated(Ratio(0.5, (0.4, 0.6)), 0.006)
+UNSURE = Repeated(Ratio(0.75, (0.5, 1.1)), 0.009)
 
 
 def said(after, lower, *, reached=None, repeated=None, named=True, unnamed=False):

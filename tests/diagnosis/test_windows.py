@@ -102,7 +102,7 @@ def test_intervals_cover_the_true_error_about_as_often_as_they_say():
 
 def test_the_ratio_of_an_error_with_itself_is_one():
     squares, blocks = np.random.default_rng(1).random(100), np.repeat(np.arange(10), 10)
-    assert ratio(squares, squares, blocks) == (1.0, (1.0, 1.0))
+    assert ratio(squares, squares, blocks)[:2] == (1.0, (1.0, 1.0))
 
 
 def test_a_ratio_is_surer_than_its_parts_where_both_vary_together():
@@ -119,3 +119,22 @@ def test_a_single_block_says_nothing_of_its_uncertainty():
     found = rmse(np.ones(5), np.zeros(5, dtype=int))
     assert found.value == 1.0
     assert not np.isfinite(found.interval[1])
+
+
+def test_a_ratio_is_shown_by_many_blocks_on_one_side_though_a_few_weigh_most():
+    blocks = np.repeat(np.arange(16), 20)
+    before = np.exp(np.random.default_rng(1).normal(size=320))
+    more = np.append(np.full(15, 1.05), 300.0)[blocks]
+    larger, smaller = ratio(before * more, before, blocks), ratio(before, before * more, blocks)
+    assert larger.interval[0] < 1.0 < larger.value
+    assert larger.above
+    assert not larger.below
+    assert smaller.below
+    assert not smaller.above
+
+
+def test_a_ratio_of_few_blocks_or_of_errors_that_are_the_same_shows_nothing():
+    squares, blocks = np.arange(1.0, 9.0), np.arange(8)
+    assert not ratio(squares, squares, blocks).above
+    assert not ratio(np.append(squares, 0.0), np.append(squares, 0.0), np.arange(9)).below
+    assert not ratio(np.array([4.0, 9.0, 1.0]), np.array([1.0, 1.0, 0.9]), np.arange(3)).above

@@ -11,15 +11,15 @@ from proxytune.diagnosis.learning import Learning
 from proxytune.diagnosis.manoeuvres import LIBRARY, Manoeuvre
 from proxytune.diagnosis.polish import Polish
 from proxytune.diagnosis.remainder import Remainder
-from proxytune.diagnosis.windows import Rmse
+from proxytune.diagnosis.windows import Ratio
 from proxytune.report.diagnosis_notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
 
 SLIP = Adopted("lateral_slip", "", ("lateral_slip",), (("lateral_slip",),), 75.2, 0.002, ())
 BAND = Adopted("dead_band", "left wheel", ("dead_band.width",), (("dead_band.width",),), 900.0, 0.002, ())
-LITTLE = {2.0: Rmse(0.999, (0.98, 1.02)), 5.0: Rmse(1.01, (0.942, 1.083))}
-SURE = {2.0: Rmse(1.001, (0.98, 1.02)), 5.0: Rmse(1.01, (0.99, 1.03))}
+LITTLE = {2.0: Ratio(0.999, (0.98, 1.02)), 5.0: Ratio(1.01, (0.942, 1.083))}
+SURE = {2.0: Ratio(1.001, (0.98, 1.02)), 5.0: Ratio(1.01, (0.99, 1.03))}
 TIMES = np.arange(20) / 20.0
-MUCH = {2.0: Rmse(1.34, (1.2, 1.5))}
+MUCH = {2.0: Ratio(1.34, (1.2, 1.5))}
 
 
 def diagnosis(**changes):
@@ -86,14 +86,14 @@ def test_where_noise_is_not_known_a_manoeuvre_is_to_be_driven_ten_times():
 
 
 def test_parameters_fitted_to_windows_are_told_with_what_that_did():
-    polish = Polish(2.0, {1.0: Rmse(0.95, (0.9, 1.0)), 2.0: Rmse(0.8, (0.7, 0.9))}, {})
+    polish = Polish(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
     (note,) = notes(diagnosis(polish=polish))
     assert "fitted to windows of 2 s" in note
     assert "1 s: 0.95, 2 s: 0.80" in note
 
 
 def test_a_ratio_is_told_as_what_it_adds():
-    value, ends = per_cent(Rmse(1.25, (0.9, 2.0)))
+    value, ends = per_cent(Ratio(1.25, (0.9, 2.0)))
     assert (value, *ends) == pytest.approx((25.0, -10.0, 100.0))
     assert decisive(LITTLE) == 5.0
     assert may_matter(LITTLE)

@@ -5,10 +5,10 @@ import json
 from proxytune.diagnosis.learning import Learning, LearntError
 from proxytune.diagnosis.lookalike import Lookalike
 from proxytune.diagnosis.remainder import Remainder
-from proxytune.diagnosis.windows import Rmse
+from proxytune.diagnosis.windows import Ratio, Rmse
 from proxytune.report.learnt_document import learnt_document, learnt_notes
 
-RATIO = Rmse(0.5, (0.4, 0.6))
+RATIO = Ratio(0.5, (0.4, 0.6))
 ERROR = LearntError(2.0, Rmse(0.01, (0.009, 0.011)), Rmse(0.02, (0.01, 0.03)), RATIO)
 THETA = {"learnt.turn_rate.yaw@1.0": 0.1}
 SHARE = {"heading": 0.25, "turn rate": 0.75}

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import repeat
 
-from proxytune.diagnosis.fitting import Coordinate
+from proxytune.diagnosis.coordinates import Coordinate
 from proxytune.diagnosis.replay import RANDOM_EFFECTS
 from proxytune.effects import CATALOGUE, Effect, Form, theta_names
 from proxytune.space import Parameter, Theta

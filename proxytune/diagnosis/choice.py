@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.diagnosis.coordinates import at_edge
 from proxytune.diagnosis.events import RandomEffect
-from proxytune.diagnosis.fitting import Fit, at_edge, fit
+from proxytune.diagnosis.fitting import Fit, fit
 from proxytune.diagnosis.replay import lateness
 from proxytune.diagnosis.round import Round
 from proxytune.diagnosis.screening import Lead

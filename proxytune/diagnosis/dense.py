@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.candidates import Candidate
+from proxytune.diagnosis.coordinates import placed, span
 from proxytune.diagnosis.drives import Drives, Floats
-from proxytune.diagnosis.fitting import Fit, placed, seen, span
+from proxytune.diagnosis.fitting import Fit, seen
 from proxytune.diagnosis.innovations import HUBER, clipped
 from proxytune.diagnosis.replay import increments
 from proxytune.effects import CATALOGUE

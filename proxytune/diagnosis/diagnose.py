@@ -8,10 +8,11 @@ from proxytune.diagnosis.clocks import Clocks, in_step, read_clocks
 from proxytune.diagnosis.confirmation import bullet_strays, has_body
 from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
 from proxytune.diagnosis.drives import gather
-from proxytune.diagnosis.fitting import Fit, intervals
+from proxytune.diagnosis.fitting import Fit
 from proxytune.diagnosis.floor import pose_noise
 from proxytune.diagnosis.found import Adopted, Dropped, Found, Variant
 from proxytune.diagnosis.horizon_error import HorizonError, KeptAside, horizon_error
+from proxytune.diagnosis.intervals import intervals
 from proxytune.diagnosis.learning import Learning, learn
 from proxytune.diagnosis.likeness import two_robots
 from proxytune.diagnosis.manoeuvres import next_manoeuvre
@@ -124,7 +125,7 @@ def declared_parameters(effects: Iterable[str]) -> tuple[str, ...]:
 
 def estimates(fitted: Fit, adopted: Iterable[Adopted], polish: Polish | None) -> dict[str, Estimate]:
     """Every value of a fitted model with its interval; fixed ones have none to speak of."""
-    known = dict(polish.intervals) if polish else intervals(fitted)
+    known = intervals(fitted) | (dict(polish.intervals) if polish else {})
     for effect in adopted:
         if effect.interval is not None:
             known[effect.names[0]] = effect.interval

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from proxytune.diagnosis.clocks import Clocks
-from proxytune.diagnosis.fitting import at_edge
+from proxytune.diagnosis.coordinates import at_edge
 from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.horizon_error import HorizonError
 from proxytune.diagnosis.innovations import Noise

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from proxytune.diagnosis.coordinates import Coordinate, is_stepwise, placed, span
 from proxytune.diagnosis.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.innovations import (
     FIRST_GUESS,
@@ -18,7 +19,6 @@ from proxytune.diagnosis.innovations import (
     whitener,
 )
 from proxytune.diagnosis.replay import increments
-from proxytune.effects import CATALOGUE, PARAMETERS, effect_of
 from proxytune.space import Theta
 
 ROUNDS = 3
@@ -27,17 +27,11 @@ ROUNDS = 3
 STEP = 1e-3
 """Finite differences step by this fraction of a coordinate's range."""
 
-EDGE = 0.01
-"""A value this near to an end of its range, as a share of the range, is at the end."""
-
 KEPT_SOLVABLE = 1e-6
 """Added to the curvature of the loss, so that a coordinate without a slope does no harm."""
 
 SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(0.99, 1.01, 11))
 """Where a scan looks in each round, as multiples of the value it starts from."""
-
-Coordinate = tuple[str, ...]
-"""Parameters of θ that share one value."""
 
 
 @dataclass(frozen=True)
@@ -61,19 +55,6 @@ class Fit:
     whiten: Whitener
     innovations: Floats
     slopes: Floats
-
-
-def span(coordinate: Coordinate) -> tuple[float, float]:
-    """Lowest and highest value of a coordinate."""
-    return PARAMETERS[coordinate[0]].low, PARAMETERS[coordinate[0]].high
-
-
-def at_edge(name: str, value: float, figures: Mapping[str, float]) -> bool:
-    """Whether a value lies at an end of its parameter's range that is not neutral."""
-    parameter = PARAMETERS[name]
-    reach = EDGE * (parameter.high - parameter.low)
-    ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(figures)]
-    return any(abs(value - end) <= reach for end in ends)
 
 
 def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise = FIRST_GUESS) -> Fit:
@@ -122,20 +103,23 @@ def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], white
 
 
 def _scanned(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats) -> Theta:
-    """The best value of each coordinate in which the motion changes by steps, all others held."""
+    """The best value of each coordinate in which the motion changes by steps, all others held.
+
+    Round numbers near by are looked at first: people set thresholds and steps to them, and a duty that lies just on one
+    goes the other way at a value a hair beside it.
+    """
     for coordinate in rough:
         low, high = span(coordinate)
         here = theta[coordinate[0]]
-        values = np.clip(here * np.concatenate(([1.0], multiples)), low, high)
+        values = np.clip(np.concatenate((_round(here), [here], here * multiples)), low, high)
         losses = [loss_of(drives, placed(theta, (coordinate,), np.array([value])), whiten) for value in values]
         theta = placed(theta, (coordinate,), values[[int(np.argmin(losses))]])
     return theta
 
 
-def is_stepwise(coordinate: Coordinate) -> bool:
-    """Whether it changes the motion by steps: no slope leads to its best value, so that is scanned for."""
-    trace = CATALOGUE[effect_of(coordinate[0])].trace
-    return trace is not None and trace.stepwise
+def _round(value: float) -> list[float]:
+    """The value with one, two and three significant figures."""
+    return [float(f"{value:.{figures}g}") for figures in (1, 2, 3)]
 
 
 def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
@@ -143,19 +127,19 @@ def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
     return float(huber(whiten.whiten(drives.measured - increments(drives, theta))).sum())
 
 
-def placed(theta: Theta, free: tuple[Coordinate, ...], values: Floats) -> dict[str, float]:
-    """θ with its free coordinates at these values."""
-    given = {name: float(value) for names, value in zip(free, values, strict=True) for name in names}
-    return {**theta, **given}
-
-
 def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Floats:
-    """Change of the innovations per coordinate, as a fraction of its range (3N, coordinates)."""
+    """Change of the innovations per coordinate, as a fraction of its range (3N, coordinates).
+
+    It is 0 along coordinates that change the motion by steps: the slope there says nothing of the next step.
+    """
     if not free:
         return np.empty((3 * len(drives.episode), 0))
     here = increments(drives, theta)
     columns = []
     for coordinate in free:
+        if is_stepwise(coordinate):
+            columns.append(np.zeros_like(here))
+            continue
         low, high = span(coordinate)
         step = STEP if theta[coordinate[0]] + STEP * (high - low) <= high else -STEP
         there = placed(theta, (coordinate,), np.array([theta[coordinate[0]] + step * (high - low)]))
@@ -202,19 +186,3 @@ def slopes_by_block(fitted: Fit, columns: Floats) -> tuple[Floats, Floats]:
     pull = by_block(fitted.drives, columns * clipped(z)[:, None])
     curve = [columns[own].T @ inner[own] for own in (label == block for block in range(len(pull)))]
     return pull, np.stack(curve)
-
-
-def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
-    """Intervals of the fitted parameters: 95 %, from the spread between blocks (sandwich)."""
-    pull, curve = slopes_by_block(fitted, fitted.slopes)
-    blocks, count = pull.shape
-    inverse = np.linalg.inv(curve.sum(axis=0) + KEPT_SOLVABLE * np.eye(count))
-    spread = inverse @ (pull.T @ pull) @ inverse * blocks / max(1, blocks - count)
-    found = {}
-    for coordinate, variance in zip(fitted.free, np.diag(spread), strict=True):
-        low, high = span(coordinate)
-        half = 1.96 * float(np.sqrt(variance)) * (high - low)
-        for name in coordinate:
-            value = fitted.theta[name]
-            found[name] = (max(low, value - half), min(high, value + half))
-    return found

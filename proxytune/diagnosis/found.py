@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from proxytune.diagnosis.candidates import Candidate
-from proxytune.diagnosis.fitting import Coordinate, Fit
+from proxytune.diagnosis.coordinates import Coordinate
+from proxytune.diagnosis.fitting import Fit
 from proxytune.diagnosis.flexible import Curve
 from proxytune.space import Theta
 

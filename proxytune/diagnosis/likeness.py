@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.diagnosis.coordinates import Coordinate, span
 from proxytune.diagnosis.drives import Drives, Floats, sum_by
-from proxytune.diagnosis.fitting import KEPT_SOLVABLE, Coordinate, Fit, seen, slopes, span
+from proxytune.diagnosis.fitting import KEPT_SOLVABLE, Fit, seen, slopes
 from proxytune.diagnosis.innovations import HUBER, clipped
 
 GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))

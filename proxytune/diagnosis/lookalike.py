@@ -7,8 +7,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from proxytune.diagnosis.candidates import Candidate, candidates
+from proxytune.diagnosis.coordinates import placed, span
 from proxytune.diagnosis.drives import Drives, Floats
-from proxytune.diagnosis.fitting import placed, span
 from proxytune.diagnosis.remainder import Remainder
 from proxytune.diagnosis.window_slopes import FITTED_S
 from proxytune.diagnosis.windows import cut, strays

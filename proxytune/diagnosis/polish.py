@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from proxytune.diagnosis.coordinates import Coordinate, is_stepwise, placed, span
 from proxytune.diagnosis.drives import Drives, Floats, Whole
-from proxytune.diagnosis.fitting import STEP, Coordinate, Fit, placed, seen, span
+from proxytune.diagnosis.fitting import STEP, Fit, seen
 from proxytune.diagnosis.windows import Ratio, Windows, blocks_of, chosen, cut, measured_since, misses, ratio, strays
 from proxytune.space import Theta
 
@@ -45,7 +46,7 @@ class Polish(NamedTuple):
     Attributes:
         horizon_s: Length of the windows [s].
         ratios: Held-out error of the new values by that of the old ones, by horizon [s].
-        intervals: 95 % intervals of the new values, by name in θ.
+        intervals: 95 % intervals of the new values, by name in θ; none of what was not fitted to windows.
     """
 
     horizon_s: float
@@ -64,12 +65,13 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
     Args:
         drives: The measured drives.
         theta: Where to start.
-        free: What is fitted.
+        free: What is fitted, except where it changes the motion by steps: single steps tell that far more sharply.
         windows: Windows over the drives; long logs are thinned to MOST_WINDOWS of them.
     """
-    if not free or len(windows.begin) == 0:
+    smooth = _smooth(free)
+    if not smooth or len(windows.begin) == 0:
         return dict(theta)
-    problem = _problem(drives, theta, tuple(free), _thinned(windows))
+    problem = _problem(drives, theta, smooth, _thinned(windows))
     found = least_squares(
         problem.left,
         problem.start,
@@ -81,6 +83,10 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
         max_nfev=MOST_TRIALS,
     )
     return problem.at(np.clip(found.x, 0.0, 1.0))
+
+
+def _smooth(free: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
+    return tuple(coordinate for coordinate in free if not is_stepwise(coordinate))
 
 
 class _Problem(NamedTuple):
@@ -178,7 +184,7 @@ def polished(fitted: Fit) -> tuple[Fit, Polish | None]:
         return fitted, None
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
-    polish = Polish(best[1], best[2], _intervals(drives, theta, fitted.free, windows))
+    polish = Polish(best[1], best[2], _intervals(drives, theta, _smooth(fitted.free), windows))
     return seen(drives, theta, fitted.free, fitted.noise), polish
 
 

@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.candidates import candidates
+from proxytune.diagnosis.coordinates import placed, span
 from proxytune.diagnosis.events import RandomEffect, random_effects
-from proxytune.diagnosis.fitting import Fit, fit, loss_of, placed, predictive, span
+from proxytune.diagnosis.fitting import Fit, fit, loss_of, predictive
 from proxytune.diagnosis.flexible import Curve, curves
 from proxytune.diagnosis.found import Tried
 from proxytune.diagnosis.replay import RANDOM_EFFECTS

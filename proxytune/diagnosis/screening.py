@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.candidates import Candidate
+from proxytune.diagnosis.coordinates import placed
 from proxytune.diagnosis.dense import with_dense_probes
 from proxytune.diagnosis.drives import Drives, Floats, Whole, sum_by
-from proxytune.diagnosis.fitting import Fit, placed, predictive
+from proxytune.diagnosis.fitting import Fit, predictive
 from proxytune.diagnosis.innovations import HUBER, clipped
 from proxytune.diagnosis.replay import increments
 from proxytune.effects import PARAMETERS

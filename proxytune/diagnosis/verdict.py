@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from proxytune.diagnosis.repeats import Repeated
 
 AT_FLOOR = 1.15
@@ -9,6 +11,9 @@ AT_FLOOR = 1.15
 
 WIDE = 1.5
 """A bracket whose upper end is no more than so many times its lower is narrow enough to say that all is explained."""
+
+CHANCE = 1.03
+"""The lowest of several errors is lower than that of the right model by chance, by no more than this."""
 
 LOWERS = 0.95
 """A model lowers the error if it brings it to this share."""
@@ -24,7 +29,8 @@ class Bracket(NamedTuple):
 
     Attributes:
         lower: What the noise of measured poses alone makes [m].
-        upper: The lowest error that any model reached, or what drives do not repeat where that is less [m].
+        upper: What a right model might have by chance where this was the lowest error that any model reached, less what
+            drives repeat of it [m].
         reached: The lowest error that any model reached [m].
         again: What drives from the same commands say; None where too few were driven.
     """
@@ -43,8 +49,14 @@ def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
         reached: The lowest error of any model [m].
         again: What drives from the same commands say.
     """
-    upper = reached * min(1.0, again.share.interval[1]) if again else reached
-    return Bracket(min(lower, reached), max(upper, min(lower, reached)), reached, again)
+    lower = min(lower, reached)
+    return Bracket(lower, max(lower, CHANCE * reached * (_not_repeated(again) if again else 1.0)), reached, again)
+
+
+def _not_repeated(again: Repeated) -> float:
+    """At most this share of an error is noise: all of it in windows that were driven once."""
+    repeats = 1.0 - min(1.0, again.share.interval[1]) ** 2
+    return float(np.sqrt(1.0 - again.weight * repeats))
 
 
 def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:
@@ -71,7 +83,7 @@ def at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
         return False
     if floor.again is not None:
         return floor.again.share.value >= 1.0 / AT_FLOOR and after <= ALIKE * floor.again.apart
-    return floor.upper < WIDE * floor.lower
+    return floor.upper < CHANCE * WIDE * floor.lower
 
 
 def _beyond(floor: Bracket) -> bool:

@@ -3,9 +3,10 @@
 import numpy as np
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS, Candidate, candidates
+from proxytune.diagnosis.coordinates import placed
 from proxytune.diagnosis.drives import Floats
 from proxytune.diagnosis.events import responses
-from proxytune.diagnosis.fitting import Fit, placed
+from proxytune.diagnosis.fitting import Fit
 from proxytune.diagnosis.replay import RANDOM_EFFECTS, increments
 from proxytune.diagnosis.screening import without
 

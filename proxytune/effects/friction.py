@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.effects.effect import Setting, Signal, Stage
-from proxytune.effects.trace import Cue, Trace, WheelCurve
+from proxytune.effects.trace import Cue, Form, Trace, WheelCurve
 from proxytune.effects.wheels import IMBALANCE, per_wheel, wheel_forms
 from proxytune.space import Parameter
 
@@ -47,10 +47,11 @@ class DeadBand:
 
 
 class Grip(NamedTuple):
-    """The duties at which each wheel breaks away and stops (2,), the newest sample, and whether the wheels move."""
+    """At which duties each wheel breaks away, stops and turns the other way at once (2,), and whether wheels move."""
 
     breakaway: Signal
     stop: Signal
+    turn: Signal
     sample: Signal
     moving: NDArray[np.bool_]
 
@@ -59,12 +60,13 @@ class Grip(NamedTuple):
 class Stiction:
     """A resting wheel needs a duty of `breakaway` to start; a moving one goes on down to `release` times that.
 
-    A wheel whose duty changes sign comes to rest on the way.
+    A wheel whose duty changes sign comes to rest on the way, unless that is `reversal` times the breakaway or more.
     """
 
     breakaway: float
     imbalance: float
     release: float
+    reversal: float
     name: ClassVar[str] = "stiction"
     stage: ClassVar[Stage] = Stage.ACTUATION
     parameters: ClassVar[tuple[Parameter, ...]] = (
@@ -88,11 +90,24 @@ class Stiction:
             source="rolling friction by sticking friction: about half, nearly all where a driver cuts small duties",
             shape=True,
         ),
+        Parameter(
+            name="reversal",
+            unit="",
+            low=0.0,
+            high=1.0,
+            neutral=1.0,
+            probes=(0.0,),
+            source="1: friction catches a slow wheel as it passes rest; 0: a wheel with momentum runs through",
+            shape=True,
+        ),
     )
     trace: ClassVar[Trace | None] = Trace(
         cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL),
         shown=WheelCurve.STEADY,
-        forms=wheel_forms("breakaway", "release"),
+        forms=(
+            *wheel_forms("breakaway", "release"),
+            Form((("breakaway",), ("release",)), "runs through reversals", fixed={"reversal": 0.0}),
+        ),
         stepwise=True,
     )
 
@@ -101,14 +116,14 @@ class Stiction:
         breakaway = per_wheel(self.breakaway, self.imbalance)
         rest = np.asarray(setting.rest, dtype=float)[..., None, :]
         stop = self.release * breakaway
-        return Grip(breakaway, stop, rest, np.abs(rest) >= stop)
+        return Grip(breakaway, stop, self.reversal * breakaway, rest, np.abs(rest) >= stop)
 
     def apply(self, signal: Signal, memory: Grip) -> tuple[Signal, Grip]:
         """A Schmitt trigger on each wheel's duty."""
         size = np.abs(signal)
         before = np.concatenate((memory.sample, signal[..., :-1, :]), axis=-2)
         starts = size >= memory.breakaway
-        stops = ~starts & ((size < memory.stop) | (signal * before < 0.0))
+        stops = ~starts & ((size < memory.stop) | (signal * before < 0.0) & (size < memory.turn))
         moving = _latest(starts, stops, memory.moving)
         return np.where(moving, signal, 0.0), memory._replace(sample=signal[..., -1:, :], moving=moving[..., -1:, :])
 

@@ -7,9 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from proxytune.diagnosis.coordinates import placed, span
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.drives import Drives, Floats
-from proxytune.diagnosis.fitting import Fit, placed, span
+from proxytune.diagnosis.fitting import Fit
 from proxytune.diagnosis.flexible import Curve
 from proxytune.diagnosis.innovations import HUBER
 from proxytune.diagnosis.replay import disturbed, increments

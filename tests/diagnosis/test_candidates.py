@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import ROBOT, TRUTH
 
 from proxytune.diagnosis.candidates import MOTION_EFFECTS, candidates
-from proxytune.diagnosis.fitting import placed
+from proxytune.diagnosis.coordinates import placed
 from proxytune.diagnosis.replay import RANDOM_EFFECTS
 from proxytune.effects import CATALOGUE, PARAMETERS, Stage, effects_from
 

@@ -12,7 +12,8 @@ from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.candidates import candidates
 from proxytune.diagnosis.choice import best_of
-from proxytune.diagnosis.fitting import at_edge, seen
+from proxytune.diagnosis.coordinates import at_edge
+from proxytune.diagnosis.fitting import seen
 from proxytune.diagnosis.round import Round
 from proxytune.diagnosis.screening import Lead
 from proxytune.driving.robot import read_robot

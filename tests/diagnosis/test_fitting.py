@@ -11,20 +11,10 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, fitted, planted_drives
 
-from proxytune.diagnosis.fitting import (
-    Fit,
-    by_block,
-    fit,
-    intervals,
-    loss_of,
-    placed,
-    predictive,
-    renoised,
-    seen,
-    slopes,
-    span,
-)
+from proxytune.diagnosis.coordinates import placed, span
+from proxytune.diagnosis.fitting import Fit, by_block, fit, loss_of, predictive, renoised, seen, slopes
 from proxytune.diagnosis.innovations import Whitener, whitener
+from proxytune.diagnosis.intervals import intervals
 from proxytune.diagnosis.replay import increments
 
 
@@ -80,6 +70,23 @@ def test_a_scan_finds_the_threshold_of_stiction(start):
     drives = planted_drives(truth)
     found = fit(drives, {**truth, "stiction.breakaway": start}, (("stiction.breakaway",),))
     assert found.theta["stiction.breakaway"] == pytest.approx(0.14, rel=0.03)
+
+
+def test_a_step_is_found_to_the_last_figure_with_an_interval_round_it():
+    truth = {**TRUTH, "command_quantisation": 0.25}
+    free = (*DECLARED, ("command_quantisation",))
+    found = fit(planted_drives(truth), {**truth, "command_quantisation": 0.2503}, free)
+    assert found.theta["command_quantisation"] == 0.25
+    assert not found.slopes[:, 2].any()
+    low, high = intervals(found)["command_quantisation"]
+    assert 0.24 < low < 0.25 < high < 0.26
+
+
+def test_the_threshold_of_stiction_lies_in_its_interval():
+    truth = {**TRUTH, "stiction.breakaway": 0.141, "stiction.imbalance": 0.0}
+    found = fit(planted_drives(truth), {**truth, "stiction.breakaway": 0.15}, (*DECLARED, ("stiction.breakaway",)))
+    low, high = intervals(found)["stiction.breakaway"]
+    assert low < 0.141 < high < low + 0.03
 
 
 def test_values_stay_within_their_bounds():

@@ -6,9 +6,9 @@ from proxytune.diagnosis.repeats import Repeated
 from proxytune.diagnosis.verdict import bracket, verdict
 from proxytune.diagnosis.windows import Ratio
 
-KNOWN = Repeated(Ratio(0.97, (0.9, 1.05)), 0.0116)
-BEYOND = Repeated(Ratio(0.5, (0.4, 0.6)), 0.006)
-UNSURE = Repeated(Ratio(0.75, (0.5, 1.1)), 0.009)
+KNOWN = Repeated(Ratio(0.97, (0.9, 1.05)), 0.0116, 0.8)
+BEYOND = Repeated(Ratio(0.5, (0.4, 0.6)), 0.006, 0.75)
+UNSURE = Repeated(Ratio(0.75, (0.5, 1.1)), 0.009, 0.8)
 
 
 def said(after, lower, *, reached=None, repeated=None, named=True, unnamed=False):
@@ -59,11 +59,14 @@ def test_a_narrow_bracket_does_not_explain_what_drives_repeat():
 
 def test_the_floor_lies_between_the_noise_of_poses_and_what_a_model_reached():
     floor = bracket(0.004, 0.012, None)
-    assert (floor.lower, floor.upper) == (0.004, 0.012)
+    assert floor.lower == 0.004
+    assert 0.012 < floor.upper < 0.0125
     assert bracket(0.013, 0.012, None).lower == 0.012
 
 
 def test_repeats_lower_the_upper_end_but_not_beneath_the_lower():
-    assert bracket(0.004, 0.012, BEYOND).upper == pytest.approx(0.0072)
-    assert bracket(0.004, 0.012, KNOWN).upper == 0.012
+    alone = bracket(0.004, 0.012, None).upper
+    assert bracket(0.004, 0.012, BEYOND).upper == pytest.approx(alone * (0.25 + 0.75 * 0.6**2) ** 0.5)
+    assert bracket(0.004, 0.012, BEYOND._replace(weight=1.0)).upper == pytest.approx(alone * 0.6)
+    assert bracket(0.004, 0.012, KNOWN).upper == alone
     assert bracket(0.010, 0.012, BEYOND).upper == 0.010

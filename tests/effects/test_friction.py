@@ -37,16 +37,23 @@ def test_a_dead_band_of_one_wheel_is_its_share():
     ],
 )
 def test_a_resting_wheel_breaks_away_and_a_moving_one_goes_on_to_half_of_it(duties, expected):
-    np.testing.assert_array_equal(run(Stiction(0.2, 0.0, 0.5), duties)[:, 0], expected)
+    np.testing.assert_array_equal(run(Stiction(0.2, 0.0, 0.5, 1.0), duties)[:, 0], expected)
+
+
+@pytest.mark.parametrize(("reversal", "turned"), [(0.0, -0.15), (0.7, -0.15), (0.8, 0.0), (1.0, 0.0)])
+def test_a_wheel_with_momentum_runs_through_its_reversal(reversal, turned):
+    np.testing.assert_array_equal(run(Stiction(0.2, 0.0, 0.5, reversal), [0.3, -0.15, -0.09])[:, 0], [0.3, turned, 0.0])
 
 
 def test_stiction_of_one_wheel_leaves_the_other_free():
-    np.testing.assert_array_equal(run(Stiction(0.2, 1.0, 0.5), [0.1, 0.39, 0.4]), [[0.1, 0.0], [0.39, 0.0], [0.4, 0.4]])
+    np.testing.assert_array_equal(
+        run(Stiction(0.2, 1.0, 0.5, 1.0), [0.1, 0.39, 0.4]), [[0.1, 0.0], [0.39, 0.0], [0.4, 0.4]]
+    )
 
 
 @pytest.mark.parametrize(("rest", "first"), [(0.3, 0.15), (0.12, 0.15), (-0.3, 0.0), (0.05, 0.0)])
 def test_a_wheel_that_turned_before_the_start_goes_on(rest, first):
-    assert run(Stiction(0.2, 0.0, 0.5), [0.15], rest=rest)[0, 0] == first
+    assert run(Stiction(0.2, 0.0, 0.5, 1.0), [0.15], rest=rest)[0, 0] == first
 
 
 def schmitt(duties, breakaway):
@@ -64,7 +71,7 @@ def schmitt(duties, breakaway):
 def test_stiction_is_the_trigger_written_as_a_loop():
     duties = np.repeat(np.random.default_rng(3).normal(0.0, 0.3, (400, 2)), 2, axis=0)
     expected = np.stack([schmitt(duties[:, side], width) for side, width in ((0, 0.12), (1, 0.36))], axis=-1)
-    np.testing.assert_array_equal(run(Stiction(0.24, 0.5, 0.5), *duties.T), expected)
+    np.testing.assert_array_equal(run(Stiction(0.24, 0.5, 0.5, 1.0), *duties.T), expected)
 
 
 def test_a_gear_turns_half_its_gap_before_the_wheel_starts_and_all_of_it_when_it_reverses():

@@ -11,6 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, fitted, planted_drives
 
+from proxytune.diagnosis import fitting
 from proxytune.diagnosis.coordinates import placed, span
 from proxytune.diagnosis.fitting import Fit, by_block, fit, loss_of, predictive, renoised, seen, slopes
 from proxytune.diagnosis.innovations import Whitener, whitener
@@ -72,11 +73,18 @@ def test_a_scan_finds_the_threshold_of_stiction(start):
     assert found.theta["stiction.breakaway"] == pytest.approx(0.14, rel=0.03)
 
 
-def test_a_step_is_found_to_the_last_figure_with_an_interval_round_it():
+def test_of_steps_that_are_as_good_a_round_one_is_taken(drives, monkeypatch):
+    name = "command_quantisation"
+    monkeypatch.setattr(fitting, "loss_of", lambda drives, theta, whiten: round(abs(theta[name] - 0.25), 3))
+    theta = {**TRUTH, name: 0.2503}
+    assert fitting._scanned(drives, theta, ((name,),), None, np.array([0.9, 1.1]))[name] == 0.25
+
+
+def test_a_step_is_found_with_an_interval_round_it():
     truth = {**TRUTH, "command_quantisation": 0.25}
     free = (*DECLARED, ("command_quantisation",))
     found = fit(planted_drives(truth), {**truth, "command_quantisation": 0.2503}, free)
-    assert found.theta["command_quantisation"] == 0.25
+    assert found.theta["command_quantisation"] == pytest.approx(0.25, rel=2e-3)
     assert not found.slopes[:, 2].any()
     low, high = intervals(found)["command_quantisation"]
     assert 0.24 < low < 0.25 < high < 0.26

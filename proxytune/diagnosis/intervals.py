@@ -12,6 +12,9 @@ from proxytune.diagnosis.replay import increments
 LOOKS = (np.geomspace(0.6, 1.6, 31), np.geomspace(0.97, 1.03, 31))
 """Where a coordinate that changes the motion by steps is looked at, as multiples of its value."""
 
+LEAST = 0.003
+"""Half of such an interval is no less than this share of the value."""
+
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """95 % intervals of the fitted parameters, from what blocks say differently."""
@@ -23,7 +26,7 @@ def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
 
 
 def _of_steps(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
-    """From the best values without each block in turn (jackknife); no narrower than what was looked at."""
+    """From the best values without each block in turn (jackknife)."""
     low, high = span(coordinate)
     here = fitted.theta[coordinate[0]]
     values = np.unique(np.clip(here * np.concatenate(([1.0], *LOOKS)), low, high))
@@ -33,7 +36,7 @@ def _of_steps(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
     if count < 2:
         return low, high
     spread = np.sqrt((count - 1) / count * np.square(best - best.mean()).sum())
-    half = max(float(student.ppf(0.975, count - 1) * spread), float(np.diff(values).min()))
+    half = max(float(student.ppf(0.975, count - 1) * spread), LEAST * here)
     return max(low, here - half), min(high, here + half)
 
 

@@ -7,12 +7,16 @@ import numpy as np
 
 from proxytune.diagnosis.drives import Floats, Whole, sum_by
 from proxytune.diagnosis.window_slopes import Slopes
+from proxytune.effects.features import LEVEL
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
 """Pulls towards no curve that are tried, as shares of what an average weight of the group is held by."""
 
 FIRMEST_ONLY = {"speed_and_turn": 0.1}
 """Curves over two signals are never pulled less than this: most of their knots are seldom visited."""
+
+FREE = 1e-6
+"""The level is hardly pulled."""
 
 LEAST_SHARE = 0.02
 """A group is added if it takes away at least this share of the squared error on blocks that it was not fitted to."""
@@ -65,16 +69,16 @@ def sums(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
 
 
 def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
-    """Add groups one by one, the best first, as long as they pay on parts that are left out.
+    """Add groups one by one, the best first, as long as they pay on parts that are left out; the level is always there.
 
     Args:
         given: Sums over the parts.
         groups: The columns of each group.
     """
     mean = given.curve.sum(axis=0).diagonal()
-    pulls: dict[str, float] = {}
+    pulls = {name: FREE for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
-    losses = given.size
+    losses = _left_out(given, *_penalised(groups, pulls, mean))
     while True:
         tried = {name: _tried(given, groups, pulls, name, mean) for name in groups if name not in pulls}
         paying = {name: found for name, found in tried.items() if _pays(losses, found[1])}

@@ -6,7 +6,7 @@ import numpy as np
 
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.replay import twists_of
-from proxytune.effects.features import GROUPS, Knots
+from proxytune.effects.features import GROUPS, LEVEL, Knots
 from proxytune.effects.learnt import Curve, Learnt, Seen
 from proxytune.space import Theta
 
@@ -18,6 +18,9 @@ GRID = (4, 6)
 """Knots of a curve over a wheel's speed, over the yaw rate, over time or use, and over speed and yaw rate together."""
 
 TRANSIENTS_S = (0.04, 0.1, 0.25, 0.63, 1.6)
+STARTS_S = (0.05, 0.15, 0.5)
+"""Time constants over which the memory of a start fades [s]."""
+
 REVERSALS_M = (0.003, 0.01, 0.03, 0.1)
 """Ways over which the memory of a reversal fades [m]."""
 
@@ -40,7 +43,9 @@ def offered(drives: Drives, theta: Theta) -> Learnt:
         "wheel_speed": _corners(np.concatenate((forward - turn, forward + turn)), WHEEL_KNOTS),
         "turn_rate": _corners(yaw, TURN_KNOTS),
         "speed_and_turn": _pairs(_corners(forward, GRID[0]), _corners(yaw, GRID[1])),
+        LEVEL: (1.0,),
         "transients": TRANSIENTS_S,
+        "start": STARTS_S,
         "reversal": REVERSALS_M,
         "direction": (-1.0,) if float((forward < -0.01 * drives.robot.figures["full_speed"]).mean()) > RARE else (),
         "time": _steps(seconds),

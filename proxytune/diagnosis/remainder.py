@@ -11,7 +11,7 @@ from proxytune.diagnosis.offers import offered
 from proxytune.diagnosis.polish import HORIZONS_S
 from proxytune.diagnosis.window_slopes import FITTED_S, slopes_of
 from proxytune.diagnosis.windows import Ratio, Windows, blocks_of, chosen, cut, ratio, strays
-from proxytune.effects.features import GROUPS
+from proxytune.effects.features import GROUPS, LEVEL
 from proxytune.effects.learnt import Learnt
 from proxytune.effects.learnt_table import learnt_theta
 from proxytune.space import Theta
@@ -116,7 +116,9 @@ def _theta(offer: Learnt, choice: Choice) -> dict[str, float]:
     ends = np.cumsum([len(curve.knots) for curve in offer.curves])[:-1]
     parts = zip(offer.curves, np.split(choice.weights, ends), strict=True)
     curves = tuple(
-        curve._replace(weights=tuple(weights.tolist())) for curve, weights in parts if curve.group in choice.gains
+        curve._replace(weights=tuple(weights.tolist()))
+        for curve, weights in parts
+        if curve.group in choice.gains or curve.group == LEVEL
     )
     return learnt_theta(Learnt(offer.seen, curves))
 

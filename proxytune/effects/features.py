@@ -26,6 +26,7 @@ class Asked(NamedTuple):
         bands: Of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants).
         loads: Low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants).
         rolled: How far each wheel has rolled since it last turned the other way [m] (2, …, time).
+        started: Since each wheel last stood [s] (2, …, time).
     """
 
     forward: Signal
@@ -37,6 +38,7 @@ class Asked(NamedTuple):
     bands: Signal
     loads: Signal
     rolled: Signal
+    started: Signal
 
 
 class Channel(NamedTuple):
@@ -81,6 +83,10 @@ def _grid(asked: Asked, knots: Knots) -> Signal:
     return np.asarray(parts[0] * parts[1])
 
 
+def _sign(asked: Asked, wheel: int) -> Signal:
+    return np.asarray(np.clip(asked.wheels[wheel][..., None] / REST_SPEED, -1.0, 1.0))
+
+
 def _moving(asked: Asked) -> Signal:
     return np.minimum(1.0, np.abs(asked.forward) / REST_SPEED)
 
@@ -89,11 +95,28 @@ def _backwards(asked: Asked, knots: Knots) -> Signal:
     return hats(np.clip(asked.forward / REST_SPEED, -1.0, 1.0), knots)
 
 
+def _level(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """A wheel's speed as it is, whatever the knots."""
+    return np.asarray(asked.wheels[wheel][..., None] * np.ones(len(knots)))
+
+
 def _slowing(asked: Asked, knots: Knots, wheel: int) -> Signal:
     """The bands of a wheel that is slower than it has been of late, 0 while it speeds up."""
     bands = asked.bands[wheel]
     slow = asked.wheels[wheel][..., None] - np.cumsum(bands, axis=-1)
     return np.where(bands * slow < 0.0, bands, 0.0)
+
+
+def _stopping(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """The bands of a wheel that is to stand and was moving of late."""
+    bands = asked.bands[wheel]
+    speed = asked.wheels[wheel][..., None]
+    return np.where(np.abs(speed) < STANDS * np.abs(speed - np.cumsum(bands, axis=-1)), bands, 0.0)
+
+
+def _started(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """1 when a wheel starts to move, fading with time."""
+    return np.asarray(np.exp(-asked.started[wheel][..., None] / np.asarray(knots)))
 
 
 def _after_reversal(asked: Asked, knots: Knots, wheel: int) -> Signal:
@@ -115,11 +138,18 @@ def _of_wheels(unit: str, basis: Callable[[Asked, Knots, int], Signal]) -> dict[
     }
 
 
+STANDS = 0.1
+"""A wheel is to stand where it is asked to go slower than this share of its speed of late."""
+
+LEVEL = "level"
+"""The one group that is no curve: beside others it takes back what fitted gains and trim have taken of theirs."""
+
 HEADING = "heading"
 """The one group that looks at where the robot points."""
 
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
+        LEVEL: Group("level", "", _of_wheels("of its speed", _level), 1e-3),
         "wheel_speed": Group("wheel speed", "m/s", _of_wheels("m/s", lambda a, k, wheel: hats(a.wheels[wheel], k))),
         "turn_rate": Group(
             "turn rate",
@@ -146,6 +176,18 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
                 **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
                 "left_slowing": Channel("left", "of the change", lambda a, k: _slowing(a, k, 0)),
                 "right_slowing": Channel("right", "of the change", lambda a, k: _slowing(a, k, 1)),
+                "left_stopping": Channel("left", "of the change", lambda a, k: _stopping(a, k, 0)),
+                "right_stopping": Channel("right", "of the change", lambda a, k: _stopping(a, k, 1)),
+            },
+            1e-3,
+        ),
+        "start": Group(
+            "time since it stood",
+            "s",
+            {
+                **_of_wheels("of its speed", lambda a, k, wheel: a.wheels[wheel][..., None] * _started(a, k, wheel)),
+                "left_push": Channel("left", "m/s", lambda a, k: _sign(a, 0) * _started(a, k, 0)),
+                "right_push": Channel("right", "m/s", lambda a, k: _sign(a, 1) * _started(a, k, 1)),
             },
             1e-3,
         ),

@@ -7,8 +7,9 @@ import numpy as np
 
 from proxytune.effects.effect import Setting, Signal, Stage
 from proxytune.effects.features import GROUPS, HEADING, Asked, Knots
+from proxytune.effects.floor import REST_SPEED
 from proxytune.effects.known import Known, beforehand, values_along
-from proxytune.effects.past import low_passes, rolled_since
+from proxytune.effects.past import low_passes, moved_since, rolled_since
 from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
 
@@ -38,6 +39,7 @@ class Past(NamedTuple):
         slow: Low-passes of each wheel's speed (2, …, time constants).
         load: Low-passes of the mean wheel speed's size (…, time constants).
         rolled: How far each wheel has rolled since it last turned the other way [m] (2, …), negative backwards.
+        started: Since each wheel last stood [s] (2, …).
         bearing: The heading, and headings that are known beforehand.
         rate_hz: Samples per second.
         baseline: The robot's effective baseline [m].
@@ -49,6 +51,7 @@ class Past(NamedTuple):
     slow: Signal
     load: Signal
     rolled: Signal
+    started: Signal
     bearing: Known
     rate_hz: float
     baseline: float
@@ -81,6 +84,7 @@ class Learnt:
             np.zeros(batch),
             slow,
             load,
+            np.zeros((2, *batch)),
             np.zeros((2, *batch)),
             beforehand(setting.headings, setting),
             *figures,
@@ -120,6 +124,7 @@ class Learnt:
             slow=np.stack([before(one) for one in slow]),
             load=before(asked.loads),
             rolled=np.stack([before(one) for one in asked.rolled]),
+            started=np.stack([before(one) for one in asked.started]),
         )
 
     def features(self, signal: Signal, memory: Past) -> list[tuple[Signal, Signal]]:
@@ -158,9 +163,10 @@ class Learnt:
         load = low_passes(effort, past.load, self._constants("load"), past.rate_hz)
         bands = -np.diff(slow, axis=-1, prepend=wheels[..., None])
         rolled = rolled_since(wheels, past.rolled, past.rate_hz)
+        started = moved_since(wheels, past.started, REST_SPEED, past.rate_hz)
         after = past._replace(seconds=seconds[..., -1], use=use[..., -1], slow=slow[..., -1, :], load=load[..., -1, :])
-        asked = Asked(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), bands, load, rolled)
-        return asked, after._replace(rolled=rolled[..., -1])
+        asked = Asked(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), bands, load, rolled, started)
+        return asked, after._replace(rolled=rolled[..., -1], started=started[..., -1])
 
 
 def _direction(to: str, baseline: float) -> Signal:

@@ -17,6 +17,20 @@ def low_passes(signal: Signal, slow: Signal, constants: Knots, rate_hz: float) -
     return out
 
 
+def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float) -> Signal:
+    """How long ago a wheel last stood [s] (…, time), 0 while it does.
+
+    Args:
+        speed: Its speed (…, time).
+        before: How long ago that was before the first sample (…,).
+        rest_speed: It stands where it is slower than this, in the same unit.
+        rate_hz: Samples per second.
+    """
+    number = np.arange(1.0, speed.shape[-1] + 1.0)
+    stood = np.where(np.abs(speed) < rest_speed, number, -before[..., None] * rate_hz)
+    return np.asarray((number - np.maximum.accumulate(stood, axis=-1)) / rate_hz)
+
+
 def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
     """How far a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
 

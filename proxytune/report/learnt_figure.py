@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from proxytune.diagnosis.learning import Learning
-from proxytune.effects.features import GROUPS, HEADING
+from proxytune.effects.features import GROUPS, HEADING, LEVEL
 from proxytune.effects.learnt import Curve, Learnt
 from proxytune.effects.learnt_table import learnt_effect
 from proxytune.report.style import BLUE, GREY, dress
@@ -19,7 +19,7 @@ SHOWN_AS = {
 }
 """How weights are told, by their unit: a factor and its unit; shares in per cent."""
 
-FADING = {"transients": "time constant", "load": "time constant", "reversal": "fading over"}
+FADING = {"transients": "time constant", "load": "time constant", "reversal": "fading over", "start": "fading over"}
 """Groups whose weights are points, each of something that fades, and what their knots are."""
 
 PAIRS = "speed_and_turn"
@@ -31,7 +31,8 @@ def learnt_figure(learning: Learning) -> Figure | None:
     if effect is None:
         return None
     order = list(learning.remainder.share)
-    groups = sorted({curve.group for curve in effect.curves}, key=lambda group: order.index(GROUPS[group].title))
+    shown = {curve.group for curve in effect.curves} - {LEVEL}
+    groups = sorted(shown, key=lambda group: order.index(GROUPS[group].title))
     rows = [[curve for curve in effect.curves if curve.group == group] for group in groups]
     rows = [_courses(row) if row[0].group == HEADING else row for row in rows]
     across = max(len(row) for row in rows)

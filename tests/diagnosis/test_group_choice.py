@@ -61,3 +61,12 @@ def test_curves_over_two_signals_are_always_pulled_firmly():
     truth = np.concatenate((np.zeros(7), 0.3 * np.ones(8)))
     weights = choose(summed(slopes(truth, noise=0.0)), GROUPS).weights
     assert np.all(np.abs(weights[7:]) < 0.95 * 0.3)
+
+
+def test_the_level_is_always_there_and_never_a_gain():
+    groups = {"level": GROUPS["one"], "other": GROUPS["other"]}
+    truth = TRUTH + np.concatenate(((0.6, -0.4, 0.5), np.zeros(12)))
+    chosen = choose(summed(slopes(truth)), groups)
+    assert list(chosen.gains) == ["other"]
+    np.testing.assert_allclose(chosen.weights[:7], truth[:7], atol=0.02)
+    assert not choose(summed(slopes(truth - TRUTH)), groups).gains

@@ -16,6 +16,8 @@ ROBOT = read_robot("duckiebot")
 RATE_HZ = 60.0
 SEEN = Seen((-0.4, 0.5), (-4.0, 3.0))
 KNOTS = {
+    "level": (1.0,),
+    "start": (0.1, 0.4),
     "wheel_speed": (-0.5, -0.2, 0.1, 0.3, 0.6),
     "turn_rate": (-3.0, -1.0, 0.5, 2.0),
     "speed_and_turn": ((-0.3, -1.0), (-0.3, 0.0), (0.0, 2.0), (0.2, -1.0), (0.4, 2.0)),

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.effects.past import low_passes, rolled_since
+from proxytune.effects.past import low_passes, moved_since, rolled_since
 
 RATE_HZ = 10.0
 
@@ -23,6 +23,12 @@ def test_the_way_is_counted_from_where_a_wheel_turns_the_other_way():
 
 def test_a_wheel_that_has_not_moved_has_no_way_behind_it():
     np.testing.assert_array_equal(rolled_since(np.zeros(3), np.zeros(()), RATE_HZ), np.zeros(3))
+
+
+def test_the_time_is_counted_from_where_a_wheel_stood():
+    speed = np.array([0.0, 1.0, 1.0, 0.01, -1.0, 1.0])
+    np.testing.assert_allclose(moved_since(speed, np.zeros(()), 0.02, RATE_HZ), [0.0, 0.1, 0.2, 0.0, 0.1, 0.2])
+    np.testing.assert_allclose(moved_since(np.ones(2), np.array(0.5), 0.02, RATE_HZ), [0.6, 0.7])
 
 
 @settings(max_examples=50, derandomize=True, deadline=None)

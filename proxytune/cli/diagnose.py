@@ -5,10 +5,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.text import Text
 
 from proxytune.cli.answer import Answer
+from proxytune.cli.steps import Steps
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.vehicle import robot_of
@@ -17,6 +18,21 @@ from proxytune.logs import read_log
 from proxytune.report.diagnosis_document import document, model_file, shown
 from proxytune.report.diagnosis_figures import diagnosis_figures
 from proxytune.report.writing import save, write_text
+
+SHARES = {
+    "fitting what is declared": 0.02,
+    "looking for what is missing, round 1": 0.05,
+    "looking for what is missing, round 2": 0.4,
+    "looking for what is missing, round 3": 0.6,
+    "looking for what is missing, round 4": 0.68,
+    "weighing what each effect is worth": 0.72,
+    "fitting to windows of prediction": 0.75,
+    "learning what no named effect explains": 0.8,
+    "testing on drives kept aside": 0.85,
+    "confirming on the bullet plant": 0.88,
+    "drawing": 0.96,
+}
+"""The share of a diagnosis' time that is usually over when each of its steps begins."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -42,10 +58,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     )
     declared = declared_effects(robot) if given is None else given
     test = read_log(arguments.test) if arguments.test else None
-    with Console(stderr=True).status("reading") as status:
-        found = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=status.update)
+    with Steps(SHARES) as step:
+        found = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=step)
         folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
-        status.update("drawing")
+        step("drawing")
         told = document(found)
         files = _write(found, told, folder)
     return Answer(told | {"files": files}, Group(shown(found), Text("\n".join(files))))

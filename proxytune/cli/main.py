@@ -28,6 +28,9 @@ COMMANDS: dict[str, tuple[ModuleType, str]] = {
     "list": (listing, "robots, effects, agents or metrics"),
 }
 
+RESUMED = ("study", "sweep", "teach", "compare")
+"""Commands that go on where they were interrupted."""
+
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 
@@ -50,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         0 done, 1 failed, 2 bad input or usage; 130 interrupted (Ctrl-C) and 143 terminated (SIGTERM), with everything
-        finished kept.
+        finished kept by the commands that can go on.
     """
     arguments = parser().parse_args(argv)
     try:
@@ -61,7 +64,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return BAD_INPUT if isinstance(problem, InputError) else FAILED
     except KeyboardInterrupt as problem:
         word, status = ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
-        _complain(arguments.command, f"{word}; what was finished is kept, the same command goes on")
+        kept = "what was finished is kept, the same command goes on"
+        left = kept if arguments.command in RESUMED else "nothing was written, the same command begins anew"
+        _complain(arguments.command, f"{word}; {left}")
         return status
     return DONE
 

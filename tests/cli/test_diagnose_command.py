@@ -327,5 +327,6 @@ def test_where_the_noise_is_not_known_people_read_what_to_drive(tmp_path, capsys
     told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert told["verdict"] == "cannot be told"
     assert told["next_manoeuvre"]["times"] == 10
-    assert told["error"]["noise_floor"] < told["error"]["noise_floor_upper"] == pytest.approx(told["error"]["after"])
+    assert told["error"]["noise_floor"] < told["error"]["noise_floor_upper"]
+    assert 1.0 <= told["error"]["noise_floor_upper"] / told["error"]["after"] < 1.05
     assert "10 times from the same commands" in out

@@ -62,10 +62,17 @@ def test_a_mistake_is_one_line_on_standard_error(failing, capsys, problem, statu
     assert out.err == "proxytune list: a: b\n"
 
 
-def test_an_interruption_says_that_the_same_command_goes_on(failing, capsys):
+def test_an_interruption_says_whether_the_same_command_goes_on(failing, capsys, monkeypatch):
     failing(KeyboardInterrupt())
     assert main(["list", "robots"]) == 130
-    assert "the same command goes on" in capsys.readouterr().err
+    assert "nothing was written, the same command begins anew" in capsys.readouterr().err
+    monkeypatch.setattr(module, "RESUMED", ("list",))
+    assert main(["list", "robots"]) == 130
+    assert "what was finished is kept, the same command goes on" in capsys.readouterr().err
+
+
+def test_commands_that_go_on_are_commands():
+    assert set(module.RESUMED) < set(COMMANDS)
 
 
 def test_what_is_not_json_is_a_defect_and_not_printed(monkeypatch):

@@ -1,0 +1,47 @@
+"""What a command of several steps is doing: a bar with the time left on a terminal, elsewhere a line for each step."""
+
+import time
+from collections.abc import Mapping
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+
+class Steps:
+    """Takes a line about each step as it begins; use as a context."""
+
+    def __init__(self, shares: Mapping[str, float]) -> None:
+        """Begin with nothing done.
+
+        Args:
+            shares: By the beginning of a step's line, the share of the whole time that is usually over when it begins.
+        """
+        self._shares = shares
+        self._began = time.monotonic()
+        self._console = Console(stderr=True)
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left about"),
+            TimeRemainingColumn(),
+            console=self._console,
+            disable=not self._console.is_terminal,
+            speed_estimate_period=3600.0,
+            transient=True,
+        )
+        self._task = self._bar.add_task("", total=1.0)
+
+    def __enter__(self) -> "Steps":
+        self._bar.start()
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self._bar.stop()
+
+    def __call__(self, step: str) -> None:
+        """Say what begins; the bar never goes back."""
+        if not self._console.is_terminal:
+            self._console.print(f"{time.monotonic() - self._began:.0f} s: {step}", highlight=False, soft_wrap=True)
+        share = max((over for begin, over in self._shares.items() if step.startswith(begin)), default=0.0)
+        self._bar.update(self._task, description=step, completed=max(share, self._bar.tasks[0].completed))

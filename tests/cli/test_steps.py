@@ -1,0 +1,30 @@
+"""Every step is told as it begins: a bar with the time left on a terminal, else a line."""
+
+from proxytune.cli import steps
+from proxytune.cli.steps import Steps
+
+
+def told(capsys, *lines):
+    with Steps({"first": 0.1, "second": 0.6}) as step:
+        for line in lines:
+            step(line)
+        completed = step._bar.tasks[0].completed
+    return capsys.readouterr().err, completed
+
+
+def test_without_a_terminal_every_step_is_a_line_with_the_seconds_so_far(capsys):
+    text, _ = told(capsys, "first", "second, round 2")
+    assert text == "0 s: first\n0 s: second, round 2\n"
+
+
+def test_a_bar_never_goes_back(capsys):
+    assert told(capsys, "second", "first")[1] == 0.6
+    assert told(capsys, "something else")[1] == 0.0
+
+
+def test_a_terminal_has_a_bar_and_no_lines(capsys, monkeypatch):
+    real = steps.Console
+    monkeypatch.setattr(steps, "Console", lambda **known: real(**known, force_terminal=True, width=80))
+    text, _ = told(capsys, "first")
+    assert "left about" in text
+    assert "0 s: first" not in text

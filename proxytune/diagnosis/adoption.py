@@ -33,7 +33,7 @@ def _steady(best: Choice, looked: Round) -> Adopted:
 
 def _drawn(effect: RandomEffect, looked: Round) -> Adopted:
     least = min(effect.gain - NATS_APART, RIVAL_SHARE * effect.gain)
-    close = [other for other in looked.random if other is not effect and other.gain > least]
+    close = [other for other in looked.random if other.effect != effect.effect and other.gain > least]
     rivals = tuple(Candidate(other.effect, "", ((other.parameter,),), {}, (0.0,), ((other.value,),)) for other in close)
     return Adopted(
         effect.effect, "", (effect.parameter,), (), effect.gain, effect.p_value, rivals, interval=effect.interval

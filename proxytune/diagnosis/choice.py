@@ -58,7 +58,7 @@ def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
     clear = [effect for effect in looked.random if effect.p_value <= P_VALUE and effect.gain >= CLEAR_GAIN]
     everything: list[Choice | RandomEffect] = [*named, *clear]
     ranked = sorted(everything, key=lambda one: -one.gain)
-    enough = (_choice(model, found) for found in ranked if found.gain >= least)
+    enough = (choice_of(model, found) for found in ranked if found.gain >= least)
     best = next((choice for choice in enough if no_worse(choice.fitted, model)), None)
     if best is None:
         return None
@@ -66,14 +66,14 @@ def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
     return plain if not _is_at_edge(plain) else _within(model, plain, ranked)
 
 
-def _choice(model: Fit, found: Choice | RandomEffect) -> Choice:
+def choice_of(model: Fit, found: Choice | RandomEffect) -> Choice:
     """A choice, for a random effect too, whose model is only fitted once it is asked for."""
     return found if isinstance(found, Choice) else Choice(found.gain, _drawing(model, found), random=found)
 
 
 def _within(model: Fit, best: Choice, ranked: Sequence[Choice | RandomEffect]) -> Choice:
     """The first that gains nearly as much as the best, is not at an end of its range, and predicts no worse."""
-    near = (_choice(model, found) for found in ranked if found.gain > WITHIN_SHARE * best.gain)
+    near = (choice_of(model, found) for found in ranked if found.gain > WITHIN_SHARE * best.gain)
     inside = next((choice for choice in near if not _is_at_edge(choice)), None)
     return inside if inside is not None and no_worse(inside.fitted, best.fitted) else best
 

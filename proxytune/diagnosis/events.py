@@ -18,6 +18,9 @@ from proxytune.effects.trace import Draws
 MEMORY_S = 2.5
 """A command moves nothing any more after so long."""
 
+GRID = 25
+"""Sizes that are tried at first, evenly in their logarithm."""
+
 SHIFTS = 99
 """How often the null distribution is drawn."""
 
@@ -28,12 +31,12 @@ class Responses(NamedTuple):
     Attributes:
         pull: Inner product of the change of the innovations with the innovations.
         size: Inner product of the change with itself.
-        shifted: The pull after the innovations were shifted in time, which chance alone could make (shifts, commands).
+        others: The pull had the innovations been others (columns, commands).
     """
 
     pull: Floats
     size: Floats
-    shifted: Floats
+    others: Floats
 
 
 class RandomEffect(NamedTuple):
@@ -43,7 +46,7 @@ class RandomEffect(NamedTuple):
         effect: Its name in the catalogue.
         parameter: The name of its parameter in θ.
         value: Its likeliest size.
-        interval: Sizes that lose less than 1.92 nats, the 95 % interval of a likelihood.
+        interval: Where the size lies; all sizes that are looked for, until `sized` has told.
         gain: Its gain in log-likelihood beyond what chance gives on average [nats].
         p_value: How often chance gains as much.
     """
@@ -58,7 +61,9 @@ class RandomEffect(NamedTuple):
 
 def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
     """Every effect that draws, weighed on what the model leaves over."""
-    answered = responses(fitted, seed)
+    z = fitted.innovations.reshape(-1, 3)
+    shifts = _shifts(len(z), seed)
+    answered = responses(fitted, np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1))
     if len(answered.size) == 0:
         return ()
     rate = fitted.drives.rate_hz
@@ -72,45 +77,53 @@ def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats
 
 
 def _weighed(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
-    def ratio(value: float, pull: Floats) -> Floats:
-        late = draws.lateness(value, rate_hz)
-        return _mixture(late.commands, late.log_weights, pull, answered.size)
-
-    low, high = np.log(draws.sizes)
-    grid = np.exp(np.linspace(low, high, 25))
-
-    def total(value: float) -> float:
-        return float(ratio(value, answered.pull).sum())
-
-    here = int(np.argmax([total(value) for value in grid]))
-    around = (float(np.log(grid[max(0, here - 1)])), float(np.log(grid[min(len(grid) - 1, here + 1)])))
-    best = float(np.exp(minimize_scalar(lambda log: -total(np.exp(log)), bounds=around, method="bounded").x))
-    chance = np.max([ratio(value, answered.shifted).sum(axis=1) for value in grid], axis=0)
-    gain = total(best)
-    likely = [value for value in grid if total(value) > gain - 1.92] + [best]
+    best, gain = likeliest_size(draws, rate_hz, answered.pull, answered.size)
+    chance = np.max([_ratio(draws, rate_hz, size, answered.others, answered.size) for size in _grid(draws)], axis=0)
     p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
-    return RandomEffect(
-        effect, effect, best, (float(min(likely)), float(max(likely))), gain - max(0.0, float(chance.mean())), p_value
+    return RandomEffect(effect, effect, best, draws.sizes, gain - max(0.0, float(chance.mean())), p_value)
+
+
+def likeliest_size(draws: Draws, rate_hz: float, pull: Floats, energy: Floats) -> tuple[float, float]:
+    """The size of an effect that the responses of commands (commands,) speak for most, and what it gains [nats]."""
+    grid = _grid(draws)
+    here = int(np.argmax([_ratio(draws, rate_hz, size, pull, energy) for size in grid]))
+    ends = np.log((grid[max(0, here - 1)], grid[min(len(grid) - 1, here + 1)]))
+    found = minimize_scalar(
+        lambda log: -float(_ratio(draws, rate_hz, float(np.exp(log)), pull, energy)),
+        bounds=(float(ends[0]), float(ends[1])),
+        method="bounded",
     )
+    return float(np.exp(found.x)), -float(found.fun)
 
 
-def responses(fitted: Fit, seed: int) -> Responses:
+def _grid(draws: Draws) -> Floats:
+    return np.geomspace(*draws.sizes, GRID)
+
+
+def _ratio(draws: Draws, rate_hz: float, size: float, pull: Floats, energy: Floats) -> Floats:
+    """The log-likelihood ratio of an effect of this size, over all commands (…,)."""
+    late = draws.lateness(size, rate_hz)
+    return np.asarray(_mixture(late.commands, late.log_weights, pull, energy).sum(axis=-1))
+
+
+def responses(fitted: Fit, others: Floats) -> Responses:
     """What the loss of each command would have changed.
 
     Commands far apart are lost together, so that one replay tells of many.
+
+    Args:
+        fitted: The model, and what it leaves over.
+        others: Other innovations, for which the same is asked (3N, columns).
     """
     drives = fitted.drives
     changed, phase = _changed(drives)
     here = between(drives, paths(drives, fitted.theta))
-    shifts = _shifts(len(drives.episode), seed)
-    z = fitted.innovations.reshape(-1, 3)
-    moved = np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1)
-    found = [_lost_together(fitted, changed[phase == number], here, moved) for number in np.unique(phase)]
+    found = [_lost_together(fitted, changed[phase == number], here, others) for number in np.unique(phase)]
     if not found:
-        return Responses(np.empty(0), np.empty(0), np.empty((SHIFTS, 0)))
-    pull, size, shifted = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
+        return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
+    pull, size, pulls = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
     kept = size > 1e-3
-    return Responses(pull[kept], size[kept], shifted[:, kept])
+    return Responses(pull[kept], size[kept], pulls[:, kept])
 
 
 def _changed(drives: Drives) -> tuple[Whole, Whole]:
@@ -135,14 +148,14 @@ def _without(drives: Drives, lost: Whole) -> Floats:
     return duties
 
 
-def _lost_together(fitted: Fit, lost: Whole, here: Floats, moved: Floats) -> tuple[Floats, Floats, Floats]:
-    """Pull, size and shifted pulls of commands of one phase."""
+def _lost_together(fitted: Fit, lost: Whole, here: Floats, others: Floats) -> tuple[Floats, Floats, Floats]:
+    """Pull, size and other pulls of commands of one phase."""
     drives = fitted.drives
     other = replace(drives, duties=_without(drives, lost))
     change = fitted.whiten.whiten(here - between(other, paths(other, fitted.theta)))
     label = np.repeat(_label(drives, lost), 3)
     size = sum_by(label, change**2, len(lost))
-    both = np.concatenate((fitted.innovations[:, None], moved), axis=1)
+    both = np.concatenate((fitted.innovations[:, None], others), axis=1)
     pulls = sum_by(label, change[:, None] * both, len(lost))
     pulls /= _loudness(label, change, both, pulls / (size[:, None] + 1e-12))
     return pulls[:, 0], size, pulls[:, 1:].T

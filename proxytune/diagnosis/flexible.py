@@ -37,16 +37,15 @@ def curves(fitted: Fit) -> list[Curve]:
     The best few are fitted again with the noise that they leave: a candidate's noise is fitted too.
     """
     plain = float(predictive(fitted).sum())
-    groups = signal_groups(fitted)
-    columns = {group.name: _columns(fitted, group) for group in groups}
-    found = [_curve(fitted, group, columns[group.name], plain) for group in groups]
+    found = [_curve(fitted, group, _columns(fitted, group), plain) for group in signal_groups(fitted)]
     found.sort(key=lambda curve: -curve.gain)
     promising = [curve for curve in found[:REFITTED] if curve.gain > 0.0]
-    again = [_with_own_noise(fitted, curve, columns[curve.group.name], plain) for curve in promising]
+    again = [_with_own_noise(fitted, curve, plain) for curve in promising]
     return sorted(again + found[len(promising) :], key=lambda curve: -curve.gain)
 
 
-def _with_own_noise(fitted: Fit, curve: Curve, changes: Floats, plain: float) -> Curve:
+def _with_own_noise(fitted: Fit, curve: Curve, plain: float) -> Curve:
+    changes = _columns(fitted, curve.group)
     left = fitted.drives.measured - increments(fitted.drives, fitted.theta) + changes @ curve.weights
     quieter = renoised(fitted, fit_noise(fitted.drives, left, fitted.noise))
     better = _curve(quieter, curve.group, changes, plain)
@@ -70,7 +69,8 @@ def _columns(fitted: Fit, group: SignalGroup) -> Floats:
     drives, theta = fitted.drives, fitted.theta
     twists = twists_of(drives, theta)
     here = moved_by(drives, theta, twists)
-    parts = np.moveaxis(group.twists, -1, 0)
+    added = group.twists
+    parts = (added[..., column] for column in range(added.shape[-1]))
     return np.stack([here - moved_by(drives, theta, twists + part) for part in parts], axis=-1)
 
 

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Collection
 
 from proxytune.diagnosis.adoption import adopt, without_idle
-from proxytune.diagnosis.choice import Choice, best_of
+from proxytune.diagnosis.choice import Choice, best_of, choice_of
 from proxytune.diagnosis.drives import Drives
 from proxytune.diagnosis.fitting import Fit, fit
 from proxytune.diagnosis.flexible import Curve
 from proxytune.diagnosis.found import Adopted, Found, Tried
 from proxytune.diagnosis.round import FLEXIBLE_NATS, LEAST_GAIN, look, tried_of, unnamed
+from proxytune.diagnosis.sizing import sized
 from proxytune.effects import effect_of
 from proxytune.space import Theta
 
@@ -57,6 +58,8 @@ def search(base: Fit, seed: int, told: Told, without: Collection[str] = ()) -> F
         remainder = unnamed(looked, max(least, best.gain if best else 0.0))
         if best is None or number == MOST_EFFECTS or (remainder and not _goes_on(adopted, best, remainder)):
             break
+        if best.random is not None:
+            best = choice_of(model, sized(model, best.random, seed))
         model, adopted = without_idle(best.fitted, adopt(adopted, best, looked))
     return Found(base, model, tuple(adopted), tuple(tried), tuple(remainder), tuple(first_curves))
 

@@ -1,8 +1,10 @@
 """What a residual may depend on: signals of the drives, and flexible motion as curves over each of them."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import lfilter
@@ -20,6 +22,15 @@ MOST_PATCHES = 14
 """Over a position, corners lie this far apart [m], but there are no more than so many."""
 
 
+class _Made(NamedTuple):
+    """A signal (E, T), its unit, and the motion that depends on it, per basis function (E, T, 3, columns)."""
+
+    name: Cue
+    signal: Floats
+    unit: str
+    twists: Floats
+
+
 @dataclass(frozen=True)
 class SignalGroup:
     """Flexible motion that depends on one signal.
@@ -28,13 +39,18 @@ class SignalGroup:
         name: What people call the signal.
         signal: The signal over time, for drawing (E, T).
         unit: Its unit.
-        twists: Motion added to that of the model, per basis function (E, T, 3, columns): [m/s], [m/s], [rad/s].
+        make: Makes the motion that depends on it: of long drives it is too large to be kept.
     """
 
     name: Cue
     signal: Floats
     unit: str
-    twists: Floats
+    make: Callable[[], _Made]
+
+    @property
+    def twists(self) -> Floats:
+        """Motion added to that of the model, per basis function (E, T, 3, columns): [m/s], [m/s], [rad/s]."""
+        return self.make().twists
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -54,24 +70,26 @@ class _Motion:
     commands: Floats
 
 
-def signal_groups(fitted: Fit) -> tuple[SignalGroup, ...]:
-    """Every signal group of these drives, seen with the fitted model."""
+def signal_groups(fitted: Fit) -> Iterator[SignalGroup]:
+    """Every signal group of these drives, seen with the fitted model, as it is asked for."""
     motion = _motion(fitted)
-    made = [
-        _command_level(motion),
-        _wheel_difference(motion),
-        _transients(motion),
-        _after_reversal(motion),
-        _time(motion),
-        _use(motion),
-        _turning(motion),
-        _heading(motion),
-        _position(motion),
-        _wheel_angle(motion, 0, Cue.LEFT_ANGLE),
-        _wheel_angle(motion, 1, Cue.RIGHT_ANGLE),
-        _direction(motion),
-    ]
-    return tuple(group for group in made if np.abs(group.twists).max() > 1e-9)
+    for maker in (
+        _command_level,
+        _wheel_difference,
+        _transients,
+        _after_reversal,
+        _time,
+        _use,
+        _turning,
+        _heading,
+        _position,
+        partial(_wheel_angle, side=0, name=Cue.LEFT_ANGLE),
+        partial(_wheel_angle, side=1, name=Cue.RIGHT_ANGLE),
+        _direction,
+    ):
+        made = maker(motion)
+        if np.abs(made.twists).max() > 1e-9:
+            yield SignalGroup(made.name, made.signal, made.unit, partial(maker, motion))
 
 
 def _motion(fitted: Fit) -> _Motion:
@@ -111,20 +129,20 @@ def _of_wheels(motion: _Motion, left: Floats | None, right: Floats | None) -> Fl
     return np.concatenate(parts, axis=-1)
 
 
-def _command_level(motion: _Motion) -> SignalGroup:
+def _command_level(motion: _Motion) -> _Made:
     full = motion.drives.robot.figures["full_speed"]
     lagged = [side / full for side in (motion.left, motion.right)]
     columns = [hats(side, 9) * full for side in lagged]
-    return SignalGroup(Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns))
+    return _Made(Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns))
 
 
-def _wheel_difference(motion: _Motion) -> SignalGroup:
+def _wheel_difference(motion: _Motion) -> _Made:
     signal = motion.commands[..., 1] - motion.commands[..., 0]
     columns = hats(signal)
-    return SignalGroup(Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns))
+    return _Made(Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns))
 
 
-def _transients(motion: _Motion) -> SignalGroup:
+def _transients(motion: _Motion) -> _Made:
     rate = motion.drives.tick_hz
     parts = []
     for side in range(2):
@@ -133,7 +151,7 @@ def _transients(motion: _Motion) -> SignalGroup:
         parts.append(np.stack([command - slow[0]] + [a - b for a, b in pairwise(slow)], axis=-1))
     full = motion.drives.robot.figures["full_speed"]
     signal = parts[0].sum(axis=-1)
-    return SignalGroup(Cue.TRANSIENTS, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
+    return _Made(Cue.TRANSIENTS, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
 
 
 def _smoothed(signal: Floats, ticks: float) -> Floats:
@@ -141,13 +159,13 @@ def _smoothed(signal: Floats, ticks: float) -> Floats:
     return np.asarray(lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=kept * signal[:, :1])[0])
 
 
-def _after_reversal(motion: _Motion) -> SignalGroup:
+def _after_reversal(motion: _Motion) -> _Made:
     columns = []
     for speed in (motion.left, motion.right):
         gone = _since_reversal(speed) / motion.drives.tick_hz
         columns.append(np.stack([np.exp(-gone / reach) for reach in (0.005, 0.015, 0.04, 0.12)], -1) * speed[..., None])
     signal = _since_reversal(motion.left) / motion.drives.tick_hz
-    return SignalGroup(Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns))
+    return _Made(Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns))
 
 
 def _since_reversal(speed: Floats) -> Floats:
@@ -162,42 +180,42 @@ def _since_reversal(speed: Floats) -> Floats:
     return np.asarray(way - np.take_along_axis(way, start, axis=1))
 
 
-def _time(motion: _Motion) -> SignalGroup:
+def _time(motion: _Motion) -> _Made:
     signal = np.broadcast_to(np.arange(motion.left.shape[1]) / motion.drives.tick_hz, motion.left.shape)
     columns = hats(signal)[..., 1:]
     wheels = _of_wheels(motion, columns * motion.left[..., None], columns * motion.right[..., None])
-    return SignalGroup(Cue.TIME, signal, "s", wheels)
+    return _Made(Cue.TIME, signal, "s", wheels)
 
 
-def _use(motion: _Motion) -> SignalGroup:
+def _use(motion: _Motion) -> _Made:
     use = np.cumsum(np.abs(motion.commands).mean(axis=-1), axis=1) / motion.drives.tick_hz
     columns = hats(use)[..., 1:]
     twists = _twists(columns * motion.forward[..., None], yaw=columns * motion.yaw[..., None])
-    return SignalGroup(Cue.USE, use, "s at full duty", twists)
+    return _Made(Cue.USE, use, "s at full duty", twists)
 
 
-def _turning(motion: _Motion) -> SignalGroup:
+def _turning(motion: _Motion) -> _Made:
     columns = hats(motion.yaw)
     bend = hats(motion.forward * motion.yaw)
     sideways = np.concatenate((bend[..., :-1] - bend[..., 1:], columns), axis=-1)
     twists = _twists(columns * motion.forward[..., None], sideways, columns)
-    return SignalGroup(Cue.TURN_RATE, motion.yaw, "rad/s", twists)
+    return _Made(Cue.TURN_RATE, motion.yaw, "rad/s", twists)
 
 
-def _heading(motion: _Motion) -> SignalGroup:
+def _heading(motion: _Motion) -> _Made:
     angle = motion.drives.headings
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1)
     moving = np.minimum(1.0, np.abs(motion.forward) / 0.02)[..., None]
     twists = _twists(waves * moving, waves * motion.forward[..., None], waves * np.abs(motion.forward)[..., None])
-    return SignalGroup(Cue.HEADING, np.mod(angle, 2.0 * np.pi), "rad", twists)
+    return _Made(Cue.HEADING, np.mod(angle, 2.0 * np.pi), "rad", twists)
 
 
-def _position(motion: _Motion) -> SignalGroup:
+def _position(motion: _Motion) -> _Made:
     places = motion.drives.places
     columns = np.concatenate([_patches(places[..., axis]) for axis in range(2)], axis=-1)
     forward, yaw = columns * motion.forward[..., None], columns * motion.yaw[..., None]
     twists = _twists(forward, yaw=np.concatenate((yaw, columns * np.abs(motion.forward)[..., None]), axis=-1))
-    return SignalGroup(Cue.POSITION, places[..., 0], "m", twists)
+    return _Made(Cue.POSITION, places[..., 0], "m", twists)
 
 
 def _patches(signal: Floats) -> Floats:
@@ -207,17 +225,17 @@ def _patches(signal: Floats) -> Floats:
     return np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))[1:]], axis=-1)
 
 
-def _wheel_angle(motion: _Motion, side: int, name: Cue) -> SignalGroup:
+def _wheel_angle(motion: _Motion, side: int, name: Cue) -> _Made:
     angle = motion.drives.angles[..., side]
     speed = (motion.left, motion.right)[side]
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1) * speed[..., None]
     own: Mapping[int, Floats] = {side: waves}
-    return SignalGroup(name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
+    return _Made(name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
 
 
-def _direction(motion: _Motion) -> SignalGroup:
+def _direction(motion: _Motion) -> _Made:
     back = (motion.forward < 0.0)[..., None]
     twists = _twists(
         back * motion.forward[..., None], yaw=np.concatenate((back * motion.yaw[..., None], back), axis=-1)
     )
-    return SignalGroup(Cue.DIRECTION, np.sign(motion.forward), "", twists)
+    return _Made(Cue.DIRECTION, np.sign(motion.forward), "", twists)

@@ -24,7 +24,7 @@ def unseen(model: Fit, taken: set[str]) -> tuple[str, ...]:
     plain = {form.effect for form in forms if not form.form}
     for form in (form for form in forms if not form.form or form.effect not in plain):
         best[form.effect] = max(best.get(form.effect, 0.0), _trace(model, form))
-    strike = LOST_SHARE * float(responses(model, 1).size.sum()) / 2.0
+    strike = LOST_SHARE * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
     best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}
     return tuple(name for name in MOTION_EFFECTS if name not in taken and best.get(name, 0.0) < CLEAR_NATS)
 

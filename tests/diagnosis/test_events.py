@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parent))
 from own_times import own_times_log
 from planted import TRUTH, drives_of, fitted, planted_drives
 
-from proxytune.diagnosis.events import SHIFTS, _changed, _mixture, _without, random_effects, responses
+from proxytune.diagnosis.events import _changed, _mixture, _without, random_effects, responses
 from proxytune.diagnosis.replay import RANDOM_EFFECTS
 
 SHORT = {"episodes": 4, "seconds": 25.0}
@@ -45,7 +45,6 @@ def test_lost_commands_are_found_with_their_probability(lost):
     assert found.p_value <= 0.01
     assert found.gain > lost["delay_jitter"].gain
     assert 0.1 < found.value < 0.5
-    assert found.interval[0] <= found.value <= found.interval[1]
 
 
 def test_jittering_commands_are_found_with_their_spread(late):
@@ -53,7 +52,6 @@ def test_jittering_commands_are_found_with_their_spread(late):
     assert found.gain > 15.0
     assert found.p_value <= 0.01
     assert 0.07 < found.value < 0.3
-    assert found.interval[0] <= found.value <= found.interval[1]
 
 
 @pytest.mark.parametrize("seed", [3, 4])
@@ -66,21 +64,25 @@ def test_every_effect_names_its_parameter(lost):
     assert {name: effect.parameter for name, effect in lost.items()} == {name: name for name in lost}
 
 
+def answers(base, others=1):
+    return responses(base, np.random.default_rng(1).standard_normal((len(base.innovations), others)))
+
+
 @pytest.fixture(scope="module")
 def answered():
-    return responses(fitted(planted_drives({**TRUTH, "dropped_commands": 0.3}, episodes=2, seconds=10.0)), 1)
+    return answers(fitted(planted_drives({**TRUTH, "dropped_commands": 0.3}, episodes=2, seconds=10.0)), 7)
 
 
 def test_every_command_that_changes_something_has_a_response(answered):
     assert 20 < len(answered.size) < 2 * 200
     assert answered.pull.shape == answered.size.shape
-    assert answered.shifted.shape == (SHIFTS, len(answered.size))
+    assert answered.others.shape == (7, len(answered.size))
     assert answered.size.min() > 0.0
 
 
 def test_a_model_that_explains_everything_is_pulled_nowhere():
     base = fitted(planted_drives(TRUTH, episodes=2, seconds=10.0, noise=None))
-    found = responses(base, 1)
+    found = answers(base)
     assert np.median(np.abs(found.pull) / found.size) < 0.1
 
 
@@ -88,7 +90,7 @@ def test_a_robot_whose_command_never_changes_has_no_responses():
     drives = planted_drives(TRUTH, episodes=2, seconds=10.0)
     still = replace(drives, duties=np.full_like(drives.duties, 0.4), rest=np.full_like(drives.rest, 0.4))
     base = fitted(still)
-    assert len(responses(base, 1).size) == 0
+    assert len(answers(base).size) == 0
     assert random_effects(base, 1) == ()
 
 

@@ -52,7 +52,7 @@ def clean():
 
 
 def test_every_signal_has_motion_on_every_tick_and_effects_of_the_catalogue(clean):
-    groups = signal_groups(clean)
+    groups = list(signal_groups(clean))
     assert {group.name for group in groups} == set(Cue)
     assert {name for group in groups for name in group.effects} == set(MOTION_EFFECTS)
     for group in groups:

@@ -48,7 +48,8 @@ def _rows(wanted: Sequence[Job], asked: argparse.Namespace) -> Iterator[rates.Ro
 def report(rows: Sequence[rates.Row]) -> str:
     """The rates and what was said of what."""
     lines = [f"{name}: {rate}" for name, rate in rates.rates(rows).items()]
-    return "\n".join((f"{len(rows)} cases", *lines, "", rates.confusion(rows)))
+    ratios = "error after, curves included, by that of the right model, windows of 2 s"
+    return "\n".join((f"{len(rows)} cases", *lines, "", ratios, rates.errors(rows), "", rates.confusion(rows)))
 
 
 def main() -> None:

@@ -29,11 +29,14 @@ def test_what_is_hidden_is_named_and_what_cannot_be_named_is_flagged(capsys):
         print("\n".join(f"{name}: {rate}" for name, rate in counted.items()))
         print(rates.confusion(rows))
     assert counted["failed"].hits == 0
-    assert counted["in form above 30 nats named"].share >= 0.85
+    assert counted["in form and material: named"].share >= 0.85
+    assert counted["in form and material: named, nothing beside"].share >= 0.75
     assert counted["in form wrong without a flag"].share <= 0.15
     assert counted["pairs both named"].share >= 0.5
     assert counted["clean false alarms"].share <= 0.4
     assert counted["taken out flagged"].share >= 0.5
+    assert counted["explained beyond 1.3 x the true floor"].share <= 0.1
+    assert counted["floor bracket holds the true one"].share >= 0.75
     assert counted["outside flagged"].share >= 0.8
     assert counted["other form right or flagged"].share >= 0.5
 
@@ -62,20 +65,22 @@ def test_what_is_neither_hidden_nor_a_rival_is_wrong_unless_flagged():
 def test_rates_count_what_they_say():
     hidden = (("dead_band",),)
     rows = [
-        row("in form", "explained", ("dead_band",), right=hidden, evidence=100.0, after=1.04, true=1.0),
-        row("in form", "nothing missing", right=hidden, evidence=10.0),
+        row("in form", "explained", ("dead_band",), right=hidden, evidence=99.0, before=2.0, after=1.04, true=1.0),
+        row("in form", "nothing missing", right=hidden, evidence=10.0, before=1.04, true=1.0),
+        row("in form", "explained", ("dead_band",), ("trim",), right=hidden, before=2.0, learnt=1.2, true=1.0),
         row("clean", "explained", ("trim",)),
         row("clean", "nothing missing"),
         row("taken out", "unexplained", right=hidden),
         row("outside", "explained", ("dead_band",)),
     ]
     counted = {name: (rate.hits, rate.of) for name, rate in rates.rates(rows).items()}
-    assert counted["in form above 30 nats named"] == (1, 1)
-    assert counted["in form, any evidence, named"] == (1, 2)
+    assert counted["in form and material: named"] == (2, 2)
+    assert counted["in form and material: named, nothing beside"] == (1, 2)
+    assert counted["in form, not material: nothing wrong named"] == (1, 1)
     assert counted["clean false alarms"] == (1, 2)
     assert counted["taken out flagged"] == (1, 1)
     assert counted["outside flagged"] == (0, 1)
-    assert counted["error after within 5 % of the true model's"] == (1, 1)
+    assert "worst 1.20 (case)" in rates.errors(rows)
     assert "nothing" in rates.confusion(rows)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.replay import twists_of
-from proxytune.effects.features import GROUPS, LEVEL, Knots
+from proxytune.effects.bases import Knots
+from proxytune.effects.features import GROUPS, LEVEL
 from proxytune.effects.learnt import Curve, Learnt, Seen
 from proxytune.space import Theta
 
@@ -21,7 +22,13 @@ TRANSIENTS_S = (0.04, 0.1, 0.25, 0.63, 1.6)
 STARTS_S = (0.05, 0.15, 0.5)
 """Time constants over which the memory of a start fades [s]."""
 
-REVERSALS_M = (0.003, 0.01, 0.03, 0.1)
+RINGING_HZ = (0.4, 0.8, 1.6, 3.2)
+"""Frequencies of swings."""
+
+PLAYS = (0.02, 0.05, 0.1, 0.2)
+"""Half widths of plays, as shares of full speed."""
+
+REVERSALS_M = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Ways over which the memory of a reversal fades [m]."""
 
 LOADS_S = (1.0, 4.5, 20.0)
@@ -46,6 +53,8 @@ def offered(drives: Drives, theta: Theta) -> Learnt:
         LEVEL: (1.0,),
         "transients": TRANSIENTS_S,
         "start": STARTS_S,
+        "ringing": RINGING_HZ,
+        "play": tuple(_told(share * drives.robot.figures["full_speed"]) for share in PLAYS),
         "reversal": REVERSALS_M,
         "direction": (-1.0,) if float((forward < -0.01 * drives.robot.figures["full_speed"]).mean()) > RARE else (),
         "time": _steps(seconds),

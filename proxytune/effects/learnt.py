@@ -5,11 +5,12 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from proxytune.effects.bases import Asked, Knots
 from proxytune.effects.effect import Setting, Signal, Stage
-from proxytune.effects.features import GROUPS, HEADING, Asked, Knots
+from proxytune.effects.features import GROUPS, HEADING
 from proxytune.effects.floor import REST_SPEED
 from proxytune.effects.known import Known, beforehand, values_along
-from proxytune.effects.past import low_passes, moved_since, rolled_since
+from proxytune.effects.past import low_passes, moved_since, play, rings, rolled_since
 from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
 
@@ -40,6 +41,9 @@ class Past(NamedTuple):
         load: Low-passes of the mean wheel speed's size (…, time constants).
         rolled: How far each wheel has rolled since it last turned the other way [m] (2, …), negative backwards.
         started: Since each wheel last stood [s] (2, …).
+        last: Each wheel's newest speed (2, …).
+        ring: Swings of each wheel's speed, complex (2, …, frequencies).
+        dragged: Each wheel's speed through plays (2, …, widths).
         bearing: The heading, and headings that are known beforehand.
         rate_hz: Samples per second.
         baseline: The robot's effective baseline [m].
@@ -52,6 +56,9 @@ class Past(NamedTuple):
     load: Signal
     rolled: Signal
     started: Signal
+    last: Signal
+    ring: Signal
+    dragged: Signal
     bearing: Known
     rate_hz: float
     baseline: float
@@ -86,6 +93,9 @@ class Learnt:
             load,
             np.zeros((2, *batch)),
             np.zeros((2, *batch)),
+            np.zeros((2, *batch)),
+            np.zeros((2, *batch, len(self._constants("ringing"))), dtype=complex),
+            np.zeros((2, *batch, len(self._constants("play")))),
             beforehand(setting.headings, setting),
             *figures,
         )
@@ -125,6 +135,9 @@ class Learnt:
             load=before(asked.loads),
             rolled=np.stack([before(one) for one in asked.rolled]),
             started=np.stack([before(one) for one in asked.started]),
+            last=np.stack([before(one) for one in asked.wheels]),
+            ring=np.stack([before(one) for one in asked.rings]),
+            dragged=np.stack([before(one) for one in asked.played]),
         )
 
     def features(self, signal: Signal, memory: Past) -> list[tuple[Signal, Signal]]:
@@ -164,9 +177,14 @@ class Learnt:
         bands = -np.diff(slow, axis=-1, prepend=wheels[..., None])
         rolled = rolled_since(wheels, past.rolled, past.rate_hz)
         started = moved_since(wheels, past.started, REST_SPEED, past.rate_hz)
+        change = np.diff(wheels, axis=-1, prepend=past.last[..., None])
+        ringing = rings(change, past.ring, self._constants("ringing"), past.rate_hz)
+        played = play(wheels, past.dragged, self._constants("play"))
         after = past._replace(seconds=seconds[..., -1], use=use[..., -1], slow=slow[..., -1, :], load=load[..., -1, :])
-        asked = Asked(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), bands, load, rolled, started)
-        return asked, after._replace(rolled=rolled[..., -1], started=started[..., -1])
+        of_wheels = (bands, load, rolled, started, ringing, played)
+        asked = Asked(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), *of_wheels)
+        after = after._replace(rolled=rolled[..., -1], started=started[..., -1], last=wheels[..., -1])
+        return asked, after._replace(ring=ringing[..., -1, :], dragged=played[..., -1, :])
 
 
 def _direction(to: str, baseline: float) -> Signal:

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Callable, Mapping
 
-from proxytune.effects.features import GROUPS, Group, Knot, Knots
+from proxytune.effects.bases import Knot, Knots
+from proxytune.effects.features import GROUPS, Group
 from proxytune.effects.learnt import Curve, Learnt, Seen
 from proxytune.errors import SettingsError
 from proxytune.settings import Section, nearest

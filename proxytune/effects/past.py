@@ -3,8 +3,11 @@
 import numpy as np
 from scipy.signal import lfilter
 
+from proxytune.effects.bases import Knots
 from proxytune.effects.effect import Signal
-from proxytune.effects.features import Knots
+
+DAMPING = 0.25
+"""Of the swings, as a share of critical damping."""
 
 
 def low_passes(signal: Signal, slow: Signal, constants: Knots, rate_hz: float) -> Signal:
@@ -14,6 +17,28 @@ def low_passes(signal: Signal, slow: Signal, constants: Knots, rate_hz: float) -
         kept = float(np.exp(-1.0 / (np.asarray(constant) * rate_hz)))
         start = kept * slow[..., number][..., None]
         out[..., number], _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=start)
+    return out
+
+
+def rings(change: Signal, before: Signal, frequencies_hz: Knots, rate_hz: float) -> Signal:
+    """Damped swings that changes of a signal (…, time) set off, complex (…, time, frequencies)."""
+    out = np.empty((*change.shape, len(frequencies_hz)), dtype=complex)
+    for number, frequency in enumerate(frequencies_hz):
+        turn = 2.0 * np.pi * np.asarray(frequency) / rate_hz
+        kept = complex(np.exp(turn * (-DAMPING + 1j * np.sqrt(1.0 - DAMPING**2))))
+        start = kept * before[..., number][..., None]
+        out[..., number], _ = lfilter([1.0], [1.0, -kept], change.astype(complex), axis=-1, zi=start)
+    return out
+
+
+def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
+    """What is dragged along by a signal (…, time) through plays of these half widths (…, time, widths)."""
+    out, now = np.empty((*signal.shape, len(halves))), before
+    half = np.asarray(halves)
+    for step in range(signal.shape[-1] if len(halves) else 0):
+        here = signal[..., step, None]
+        now = np.clip(now, here - half, here + half)
+        out[..., step, :] = now
     return out
 
 

@@ -19,7 +19,14 @@ SHOWN_AS = {
 }
 """How weights are told, by their unit: a factor and its unit; shares in per cent."""
 
-FADING = {"transients": "time constant", "load": "time constant", "reversal": "fading over", "start": "fading over"}
+FADING = {
+    "transients": "time constant",
+    "load": "time constant",
+    "reversal": "fading over",
+    "start": "fading over",
+    "ringing": "frequency",
+    "play": "half the play",
+}
 """Groups whose weights are points, each of something that fades, and what their knots are."""
 
 PAIRS = "speed_and_turn"

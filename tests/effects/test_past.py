@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.effects.past import low_passes, moved_since, rolled_since
+from proxytune.effects.past import low_passes, moved_since, play, rings, rolled_since
 
 RATE_HZ = 10.0
 
@@ -38,3 +38,19 @@ def test_cutting_a_signal_changes_nothing(speed, cut):
     first = rolled_since(np.array(speed[:cut]), np.zeros(()), RATE_HZ)
     rest = rolled_since(np.array(speed[cut:]), first[-1], RATE_HZ) if speed[cut:] else np.empty(0)
     np.testing.assert_allclose(np.concatenate((first, rest)), whole, atol=1e-12)
+
+
+def test_a_change_sets_off_a_swing_of_its_frequency_that_dies_away():
+    change = np.zeros(400)
+    change[10] = 0.3
+    swing = rings(change, np.zeros(1, dtype=complex), (0.5,), RATE_HZ)[:, 0]
+    np.testing.assert_array_equal(swing[:10], 0.0)
+    assert swing[10] == 0.3
+    period = np.flatnonzero(np.diff(np.sign(swing.imag[10:200])) > 0.0)
+    assert np.diff(period[1:3])[0] == pytest.approx(RATE_HZ / 0.5, rel=0.1)
+    assert abs(swing[-1]) < 1e-3
+
+
+def test_a_play_drags_along_what_has_crossed_it():
+    dragged = play(np.array([0.0, 0.3, 0.5, 0.45, 0.2, -0.1]), np.zeros(1), (0.1,))[:, 0]
+    np.testing.assert_allclose(dragged, [0.0, 0.2, 0.4, 0.4, 0.3, 0.0], atol=1e-12)

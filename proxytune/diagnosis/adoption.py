@@ -6,7 +6,7 @@ from proxytune.diagnosis.candidates import Candidate
 from proxytune.diagnosis.choice import Choice, no_worse
 from proxytune.diagnosis.events import RandomEffect
 from proxytune.diagnosis.fitting import Fit, fit, predictive
-from proxytune.diagnosis.found import Adopted
+from proxytune.diagnosis.found import Adopted, Variant, lacking
 from proxytune.diagnosis.round import LEAST_GAIN, Round
 from proxytune.diagnosis.screening import Lead
 
@@ -64,13 +64,8 @@ def without_idle(model: Fit, adopted: list[Adopted]) -> tuple[Fit, list[Adopted]
     """Drop what no longer pays beside the effect adopted last."""
     for effect in adopted[:-1]:
         if effect.free and len(adopted) > 1:
-            without = _dropped(model, effect)
+            rest = lacking(Variant(model.theta, model.free), effect, model.drives.rate_hz)
+            without = fit(model.drives, rest.theta, rest.free, model.noise)
             if float(predictive(model).sum() - predictive(without).sum()) < LEAST_GAIN:
                 return without, [other for other in adopted if other is not effect]
     return model, adopted
-
-
-def _dropped(model: Fit, effect: Adopted) -> Fit:
-    theta = {name: value for name, value in model.theta.items() if name not in effect.names}
-    free = tuple(coordinate for coordinate in model.free if coordinate not in effect.free)
-    return fit(model.drives, theta, free, model.noise)

@@ -7,6 +7,7 @@ from proxytune.diagnosis.candidates import Candidate
 from proxytune.diagnosis.coordinates import Coordinate
 from proxytune.diagnosis.fitting import Fit
 from proxytune.diagnosis.flexible import Curve
+from proxytune.diagnosis.replay import lateness
 from proxytune.space import Theta
 
 
@@ -56,6 +57,15 @@ class Variant(NamedTuple):
 
     theta: Theta
     free: tuple[Coordinate, ...]
+
+
+def lacking(variant: Variant, effect: Adopted, rate_hz: float) -> Variant:
+    """A model less an effect; the mean lateness of one that draws becomes a part of the delay again."""
+    theta = {name: value for name, value in variant.theta.items() if name not in effect.names}
+    late = lateness(variant.theta, rate_hz) - lateness(theta, rate_hz)
+    if late > 0.0:
+        theta["delay"] = theta.get("delay", 0.0) + late
+    return Variant(theta, tuple(coordinate for coordinate in variant.free if coordinate not in effect.free))
 
 
 class Dropped(NamedTuple):

@@ -13,9 +13,9 @@ import numpy as np
 
 from proxytune.diagnosis.drives import Drives, Floats
 from proxytune.diagnosis.fitting import fit
-from proxytune.diagnosis.found import Adopted, Dropped, Found, Variant
+from proxytune.diagnosis.found import Adopted, Dropped, Found, Variant, lacking
 from proxytune.diagnosis.polish import compared, fit_windows, held_out, horizons
-from proxytune.diagnosis.replay import drawn_paths, lateness, paths
+from proxytune.diagnosis.replay import drawn_paths, paths
 from proxytune.diagnosis.windows import Ratio, Windows, blocks_of, cut, moved_along, ratio, strays
 
 MATERIAL = 1.05
@@ -78,15 +78,6 @@ def without_immaterial(found: Found, seed: int) -> Found:
         return found
     model = fit(drives, variant.theta, variant.free, found.model.noise)
     return replace(found, model=model, adopted=tuple(kept), immaterial=tuple(dropped))
-
-
-def lacking(variant: Variant, effect: Adopted, rate_hz: float) -> Variant:
-    """A model less an effect; the mean lateness of one that draws becomes a part of the delay again."""
-    theta = {name: value for name, value in variant.theta.items() if name not in effect.names}
-    late = lateness(variant.theta, rate_hz) - lateness(theta, rate_hz)
-    if late > 0.0:
-        theta["delay"] = theta.get("delay", 0.0) + late
-    return Variant(theta, tuple(coordinate for coordinate in variant.free if coordinate not in effect.free))
 
 
 def _weighed(drives: Drives, variant: Variant, effects: Sequence[Adopted], seed: int) -> list[Weighed]:

@@ -18,7 +18,7 @@ from proxytune.effects import CATALOGUE, Model, model_text, theta_names
 from proxytune.logs import GEOMETRY
 from proxytune.report.clocks_document import clocks_document
 from proxytune.report.diagnosis_notes import decisive, headline, may_matter, notes, per_cent
-from proxytune.report.learnt_document import learnt_document
+from proxytune.report.learnt_document import learnt_document, ratio_document, ratios_document
 from proxytune.report.likeness_document import unlike_document
 
 
@@ -100,7 +100,7 @@ def _polish(diagnosis: Diagnosis) -> dict[str, Any] | None:
         return None
     return {
         "horizon_s": polish.horizon_s,
-        "error_ratio": {f"{horizon:g}": _ratio(one) for horizon, one in polish.ratios.items()},
+        "error_ratio": ratios_document(polish.ratios),
     }
 
 
@@ -116,7 +116,7 @@ def _error(error: HorizonError) -> dict[str, Any]:
         "ratio_interval": list(error.ratio.interval),
         "noise_floor": error.floor.lower,
         "noise_floor_upper": error.floor.upper,
-        "not_repeated": _ratio(error.floor.again.share) if error.floor.again else None,
+        "not_repeated": ratio_document(error.floor.again.share) if error.floor.again else None,
         "removable_left": error.removable_left,
         "unit": "m",
         "heading": {
@@ -126,10 +126,6 @@ def _error(error: HorizonError) -> dict[str, Any]:
             "unit": "rad",
         },
     }
-
-
-def _ratio(one: Ratio) -> dict[str, Any]:
-    return {"value": one.value, "interval": list(one.interval)}
 
 
 def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:

@@ -19,8 +19,8 @@ def learnt_document(learning: Learning) -> dict[str, Any]:
         "used": beside.used,
         "groups": list(learning.depends_on(())),
         "share": dict(share),
-        "ratio": _ratios({error.horizon_s: error.ratio for error in learning.errors}),
-        "guard": _ratios(beside.guard),
+        "ratio": ratios_document({error.horizon_s: error.ratio for error in learning.errors}),
+        "guard": ratios_document(beside.guard),
         "errors": [
             {
                 "horizon_s": error.horizon_s,
@@ -41,8 +41,14 @@ def _lookalike(like: Lookalike | None) -> dict[str, Any] | None:
     return {"name": like.effect, "form": like.form, "values": dict(like.theta), "share": like.share}
 
 
-def _ratios(found: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
-    return {f"{horizon_s:g}": {"value": one.value, "interval": list(one.interval)} for horizon_s, one in found.items()}
+def ratio_document(one: Ratio) -> dict[str, Any]:
+    """One error by another, with its interval."""
+    return {"value": one.value, "interval": list(one.interval)}
+
+
+def ratios_document(found: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
+    """Such ratios by horizon in seconds."""
+    return {f"{horizon_s:g}": ratio_document(one) for horizon_s, one in found.items()}
 
 
 def learnt_notes(learning: Learning) -> list[str]:

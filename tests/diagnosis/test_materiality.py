@@ -10,8 +10,8 @@ sys.path.append(str(Path(__file__).parent))
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.fitting import seen
-from proxytune.diagnosis.found import Adopted, Found, Variant
-from proxytune.diagnosis.materiality import MATERIAL, Weighed, lacking, without_immaterial, worth
+from proxytune.diagnosis.found import Adopted, Found, Variant, lacking
+from proxytune.diagnosis.materiality import MATERIAL, Weighed, without_immaterial, worth
 from proxytune.diagnosis.windows import Ratio
 
 SCRUB, SLIP = (("yaw_scrub",),), (("lateral_slip",),)

@@ -64,7 +64,7 @@ HEADING = "heading"
 
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
-        LEVEL: Group("level", "of itself", _of_wheels("of its speed", level), 1e-3),
+        LEVEL: Group("level", "at all speeds", _of_wheels("of its speed", level), 1e-3),
         "wheel_speed": Group("wheel speed", "m/s", _of_wheels("m/s", lambda a, k, wheel: hats(a.wheels[wheel], k))),
         "turn_rate": Group(
             "turn rate",

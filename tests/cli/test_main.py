@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from proxytune.cli import main as module
+from proxytune.cli import listing
 from proxytune.cli.answer import Answer
 from proxytune.cli.main import COMMANDS, main
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
@@ -25,14 +25,10 @@ def failing(monkeypatch):
     """Make `list` raise."""
 
     def make(problem):
-        class Failing:
-            configure = staticmethod(module.listing.configure)
+        def run(arguments):
+            raise problem
 
-            @staticmethod
-            def run(arguments):
-                raise problem
-
-        monkeypatch.setitem(COMMANDS, "list", (Failing, "fails"))
+        monkeypatch.setattr(listing, "run", run)
 
     return make
 
@@ -66,21 +62,20 @@ def test_an_interruption_says_whether_the_same_command_goes_on(failing, capsys, 
     failing(KeyboardInterrupt())
     assert main(["list", "robots"]) == 130
     assert "nothing was written, the same command begins anew" in capsys.readouterr().err
-    monkeypatch.setattr(module, "RESUMED", ("list",))
+    monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(resumes=True))
     assert main(["list", "robots"]) == 130
     assert "what was finished is kept, the same command goes on" in capsys.readouterr().err
 
 
-def test_commands_that_go_on_are_commands():
-    assert set(module.RESUMED) < set(COMMANDS)
+def test_help_loads_no_library_that_only_commands_need(tmp_path):
+    heavy = "pybullet", "sklearn", "skopt", "scipy", "pandas", "matplotlib", "numpy"
+    line = f"import sys, proxytune.cli.main as m; m.parser([]); print([n for n in {heavy} if n in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True, cwd=os.getcwd())
+    assert done.stdout == "[]\n"
 
 
 def test_what_is_not_json_is_a_defect_and_not_printed(monkeypatch):
-    class Undefined:
-        configure = staticmethod(module.listing.configure)
-        run = staticmethod(lambda arguments: Answer({"value": float("nan")}, ""))
-
-    monkeypatch.setitem(COMMANDS, "list", (Undefined, "undefined"))
+    monkeypatch.setattr(listing, "run", lambda arguments: Answer({"value": float("nan")}, ""))
     with pytest.raises(ValueError, match="JSON"):
         main(["list", "robots", "--json"])
 

@@ -14,13 +14,14 @@ import rates
 from hidden import Case
 from rate_jobs import Job, all_jobs
 
-EVERY = 24
+EVERY = 30
 """Every so many-th case of each kind: twelve one-minute logs take about half a minute of processor time a case."""
 
 
 @pytest.mark.slow
-def test_what_is_hidden_is_named_and_what_cannot_be_named_is_flagged(capsys):
-    jobs = all_jobs(EVERY)
+@pytest.mark.parametrize("generator", ["first", "second"])
+def test_what_is_hidden_is_named_and_what_cannot_be_named_is_flagged(generator, capsys):
+    jobs = all_jobs(EVERY, generator)
     rows = Parallel(n_jobs=2)(delayed(rates.diagnosed)(job) for job in jobs)
     counted = rates.rates(rows)
     with capsys.disabled():

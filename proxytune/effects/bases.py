@@ -24,7 +24,7 @@ class Asked(NamedTuple):
         heading: Heading [rad].
         bands: Of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants).
         loads: Low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants).
-        rolled: How far each wheel has rolled since it last turned the other way [m] (2, …, time).
+        rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …, time).
         started: Since each wheel last stood [s] (2, …, time).
         rings: Damped swings, complex, that each change of a wheel's speed sets off [m/s] (2, …, time, frequencies).
         played: Each wheel's speed through plays of some widths [m/s] (2, …, time, widths).
@@ -115,6 +115,11 @@ def after_reversal(asked: Asked, knots: Knots, wheel: int) -> Signal:
     """A wheel's speed, fading with the way since it last turned the other way."""
     way = np.abs(asked.rolled[wheel])[..., None]
     return np.asarray(asked.wheels[wheel][..., None] * np.exp(-way / np.asarray(knots)))
+
+
+def body_after_reversal(asked: Asked, knots: Knots) -> Signal:
+    """The forward speed, fading with the way since the robot last drove the other way."""
+    return np.asarray(asked.forward[..., None] * np.exp(-np.abs(asked.rolled[2])[..., None] / np.asarray(knots)))
 
 
 def waves(wave: Callable[[Signal], Signal]) -> Callable[[Asked, Knots], Signal]:

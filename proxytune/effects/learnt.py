@@ -39,7 +39,8 @@ class Past(NamedTuple):
         use: Minutes at full speed.
         slow: Low-passes of each wheel's speed (2, …, time constants).
         load: Low-passes of the mean wheel speed's size (…, time constants).
-        rolled: How far each wheel has rolled since it last turned the other way [m] (2, …), negative backwards.
+        rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …), negative
+            backwards.
         started: Since each wheel last stood [s] (2, …).
         last: Each wheel's newest speed (2, …).
         ring: Swings of each wheel's speed, complex (2, …, frequencies).
@@ -91,7 +92,7 @@ class Learnt:
             np.zeros(batch),
             slow,
             load,
-            np.zeros((2, *batch)),
+            np.zeros((3, *batch)),
             np.zeros((2, *batch)),
             np.zeros((2, *batch)),
             np.zeros((2, *batch, len(self._constants("ringing"))), dtype=complex),
@@ -105,10 +106,28 @@ class Learnt:
         asked, after = self._asked(signal, memory)
         moved = signal + self._added(asked, memory.baseline, of_heading=False)
         if self._constants(HEADING):
-            course, onwards = values_along(moved[..., 2], memory.bearing)
-            asked, after = asked._replace(heading=course), after._replace(bearing=onwards)
-            moved = moved + self._added(asked, memory.baseline, of_heading=True)
+            moved, onwards = self._bent(moved, asked, memory)
+            after = after._replace(bearing=onwards)
         return moved, after
+
+    def _bent(self, moved: Signal, asked: Asked, memory: Past) -> tuple[Signal, Known]:
+        """The motion with what depends on the heading: sample by sample where that leads to another heading."""
+        bearing, length = memory.bearing, moved.shape[-2]
+        at_once = bearing.values.shape[-1] - bearing.next >= length or not self._turns_by_heading
+        out = []
+        for begin in range(0, length, length if at_once else 1):
+            here = slice(begin, length if at_once else begin + 1)
+            course, _ = values_along(moved[..., here, 2], bearing)
+            there = asked._replace(forward=asked.forward[..., here], yaw=asked.yaw[..., here], heading=course)
+            out.append(moved[..., here, :] + self._added(there, memory.baseline, of_heading=True))
+            _, bearing = values_along(out[-1][..., 2], bearing)
+        return np.concatenate(out, axis=-2), bearing
+
+    @property
+    def _turns_by_heading(self) -> bool:
+        return any(
+            curve.group == HEADING and GROUPS[HEADING].channels[curve.channel].to == "yaw" for curve in self.curves
+        )
 
     def recall(self, setting: Setting, signal: Signal, row: Signal, sample: Signal) -> Past:
         """The memory as of given samples of longer signals: the past of windows that begin amid drives.
@@ -175,7 +194,7 @@ class Learnt:
         slow = low_passes(wheels, past.slow, self._constants("transients"), past.rate_hz)
         load = low_passes(effort, past.load, self._constants("load"), past.rate_hz)
         bands = -np.diff(slow, axis=-1, prepend=wheels[..., None])
-        rolled = rolled_since(wheels, past.rolled, past.rate_hz)
+        rolled = rolled_since(np.stack((*wheels, forward)), past.rolled, past.rate_hz)
         started = moved_since(wheels, past.started, REST_SPEED, past.rate_hz)
         change = np.diff(wheels, axis=-1, prepend=past.last[..., None])
         ringing = rings(change, past.ring, self._constants("ringing"), past.rate_hz)

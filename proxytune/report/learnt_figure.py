@@ -70,7 +70,7 @@ def _courses(curves: Sequence[Curve]) -> list[Curve]:
 
 def _draw(axes: Axes, effect: Learnt, curve: Curve) -> None:
     group = GROUPS[curve.group]
-    unit = "m/s" if curve.group == HEADING else group.channels[curve.channel].unit
+    unit = group.channels[curve.channel if curve.group != HEADING else f"{curve.channel}_cos"].unit
     factor, told = SHOWN_AS.get(unit, (100.0, f"% {unit}"))
     label = f"{curve.channel} [{told}]"
     if curve.group == PAIRS:

@@ -188,3 +188,12 @@ def test_a_learnt_effect_comes_after_all_named_ones():
     theta |= {"learnt.range.yaw@low": -1.0, "learnt.range.yaw@high": 1.0, "learnt.turn_rate.yaw@1.0": 0.1}
     names = [effect.name for effect in effects_from({**theta, "floor_slope.x": 0.1, "trim": 0.0}, ROBOT.figures)]
     assert names == ["trim", "floor_slope", "learnt"]
+
+
+def test_a_veer_by_the_heading_follows_the_heading_that_it_leads_to():
+    turning = Learnt(SEEN, (Curve("heading", "veer_sin", (1.0,), (3.0,)),))
+    ahead = np.tile((0.4, 0.0, 0.0), (600, 1))
+    moved = run(turning, ahead)
+    heading = 0.4 + np.concatenate(((0.0,), np.cumsum(moved[:-1, 2]) / RATE_HZ))
+    np.testing.assert_allclose(moved[:, 2], 3.0 * 0.4 * np.sin(heading), atol=1e-12)
+    assert heading[-1] == pytest.approx(np.pi, abs=0.01)

@@ -60,7 +60,8 @@ class Grip(NamedTuple):
 class Stiction:
     """A resting wheel needs a duty of `breakaway` to start; a moving one goes on down to `release` times that.
 
-    A wheel whose duty changes sign comes to rest on the way, unless that is `reversal` times the breakaway or more.
+    A wheel whose duty changes sign comes to rest on the way, unless that duty is large enough: from what keeps a wheel
+    going, at a `reversal` of 0, to what breaks it away, at 1.
     """
 
     breakaway: float
@@ -96,7 +97,7 @@ class Stiction:
             low=0.0,
             high=1.0,
             neutral=1.0,
-            probes=(0.0,),
+            probes=(0.0, 0.25, 0.5, 0.75),
             source="1: friction catches a slow wheel as it passes rest; 0: a wheel with momentum runs through",
             shape=True,
         ),
@@ -116,7 +117,7 @@ class Stiction:
         breakaway = per_wheel(self.breakaway, self.imbalance)
         rest = np.asarray(setting.rest, dtype=float)[..., None, :]
         stop = self.release * breakaway
-        return Grip(breakaway, stop, self.reversal * breakaway, rest, np.abs(rest) >= stop)
+        return Grip(breakaway, stop, stop + self.reversal * (breakaway - stop), rest, np.abs(rest) >= stop)
 
     def apply(self, signal: Signal, memory: Grip) -> tuple[Signal, Grip]:
         """A Schmitt trigger on each wheel's duty."""

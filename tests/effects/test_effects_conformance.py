@@ -124,7 +124,7 @@ def test_every_probe_value_changes_the_signal(name, theta_name, value):
 @pytest.mark.parametrize(("name", "theta_name"), sorted({(name, theta_name) for name, theta_name, _ in PROBE_VALUES}))
 def test_every_step_over_a_parameters_range_changes_the_signal(name, theta_name):
     parameter = PARAMETERS[theta_name]
-    signal = a_signal(CATALOGUE[name].stage, 6, length=900)
+    signal = a_signal(CATALOGUE[name].stage, 6, length=2700)
     steps = np.linspace(parameter.low, parameter.high, 9)
     values = [run(at(name, theta_name, value), signal) for value in steps]
     assert all(np.abs(later - earlier).max() > 1e-3 for earlier, later in pairwise(values))

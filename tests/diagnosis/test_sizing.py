@@ -28,7 +28,7 @@ def test_intervals_hold_the_true_size(effect, size):
     for one in found:
         assert one.value == pytest.approx(size, rel=0.35)
         assert one.interval[0] < one.value < one.interval[1]
-        assert one.interval[1] < 3.5 * one.interval[0]
+        assert one.interval[1] < 4.0 * one.interval[0]
 
 
 def test_the_same_seed_says_the_same():

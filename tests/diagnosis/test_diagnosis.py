@@ -21,6 +21,7 @@ from proxytune.diagnosis.floor import PoseNoise
 from proxytune.diagnosis.found import Found
 from proxytune.diagnosis.horizon_error import KeptAside, horizon_error
 from proxytune.diagnosis.polish import HORIZONS_S
+from proxytune.diagnosis.verdict import CHANCE
 from proxytune.driving.robot import read_robot
 from proxytune.errors import LogError
 

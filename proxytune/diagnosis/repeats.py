@@ -21,12 +21,12 @@ class Repeated(NamedTuple):
     Attributes:
         share: What they do not repeat, by the model's error over the same windows: at 1 it predicts all that repeats.
         apart: What they do not repeat: RMSE of position [m].
-        weight: The share of all squared errors of the model that windows with repeats have.
+        part: The share of all windows that have repeats.
     """
 
     share: Ratio
     apart: float
-    weight: float
+    part: float
 
 
 def repeated(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
@@ -51,7 +51,7 @@ def repeated(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
     missed = strays(drives, theta, windows)[:, 0] ** 2
     first = np.flatnonzero(np.diff(windows.window, prepend=-1))
     share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])
-    return Repeated(share, float(np.sqrt(apart[kept].mean())), float(missed[kept].sum() / missed.sum()))
+    return Repeated(share, float(np.sqrt(apart[kept].mean())), float(kept.mean()))
 
 
 def _again(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:

@@ -50,13 +50,14 @@ def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
         again: What drives from the same commands say.
     """
     lower = min(lower, reached)
-    return Bracket(lower, max(lower, CHANCE * reached * (_not_repeated(again) if again else 1.0)), reached, again)
+    upper = reached if again is None else _not_repeated(reached, again)
+    return Bracket(lower, max(lower, CHANCE * upper), reached, again)
 
 
-def _not_repeated(again: Repeated) -> float:
-    """At most this share of an error is noise: all of it in windows that were driven once."""
-    repeats = 1.0 - min(1.0, again.share.interval[1]) ** 2
-    return float(np.sqrt(1.0 - again.weight * repeats))
+def _not_repeated(reached: float, again: Repeated) -> float:
+    """At most so much of an error is noise [m]: all of it in windows that were driven once."""
+    most = min(reached, again.apart * again.share.interval[1] / again.share.value)
+    return float(np.sqrt((1.0 - again.part) * reached**2 + again.part * most**2))
 
 
 def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:

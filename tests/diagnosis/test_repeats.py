@@ -29,8 +29,8 @@ def again(times, *, theta=TRUTH, seconds=30.0):
 @pytest.mark.parametrize("times", [2, 5])
 @pytest.mark.parametrize("horizon_s", [1.0, 2.0])
 def test_a_model_that_is_right_misses_only_what_is_not_repeated(times, horizon_s):
-    found, apart, weight = repeated(again(times), TRUTH, horizon_s)
-    assert weight == pytest.approx(1.0)
+    found, apart, part = repeated(again(times), TRUTH, horizon_s)
+    assert part == 1.0
     assert 0.003 < apart < 0.03
     assert found.value == pytest.approx(1.0, abs=0.15)
     assert found.interval[0] < 1.0 < found.interval[1] + 0.1
@@ -67,7 +67,7 @@ def test_of_a_horizon_without_windows_nothing_is_said():
     assert repeated(again(2, seconds=3.0), TRUTH, 5.0) is None
 
 
-def test_drives_without_repeats_have_a_share_of_the_errors_too():
+def test_drives_without_repeats_leave_windows_without_repeats():
     duties, starts = make_drives(3, 2, 600)
     duties, starts = np.concatenate((duties, duties[:1])), np.concatenate((starts, starts[:1]))
-    assert 0.3 < repeated(drives_of(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).weight < 0.9
+    assert 0.3 < repeated(drives_of(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9

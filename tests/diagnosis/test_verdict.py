@@ -66,7 +66,10 @@ def test_the_floor_lies_between_the_noise_of_poses_and_what_a_model_reached():
 
 def test_repeats_lower_the_upper_end_but_not_beneath_the_lower():
     alone = bracket(0.004, 0.012, None).upper
-    assert bracket(0.004, 0.012, BEYOND).upper == pytest.approx(alone * (0.25 + 0.75 * 0.6**2) ** 0.5)
-    assert bracket(0.004, 0.012, BEYOND._replace(weight=1.0)).upper == pytest.approx(alone * 0.6)
+    most = 0.006 * 0.6 / 0.5
+    assert bracket(0.004, 0.012, BEYOND._replace(part=1.0)).upper == pytest.approx(alone * most / 0.012)
+    half = ((0.012**2 + most**2) / 2.0) ** 0.5
+    assert bracket(0.004, 0.012, BEYOND._replace(part=0.5)).upper == pytest.approx(alone * half / 0.012)
     assert bracket(0.004, 0.012, KNOWN).upper == alone
-    assert bracket(0.010, 0.012, BEYOND).upper == 0.010
+    assert bracket(0.010, 0.012, BEYOND._replace(part=1.0)).upper == 0.010
+    assert bracket(0.004, 0.005, BEYOND._replace(part=1.0)).upper == bracket(0.004, 0.005, None).upper

@@ -22,6 +22,8 @@ MADE_FROM = {
     "known_answer": "truth.toml",
     "duckiebot": "twin.toml",
     "closing_the_loop": "twin.toml",
+    "closing_the_loop/two_effects": "twin.toml",
+    "closing_the_loop/no_name": "twin.toml",
     "teacher": "twin.toml",
     "truths": "truth.toml",
 }

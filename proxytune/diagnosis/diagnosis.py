@@ -92,7 +92,7 @@ class Diagnosis:
 
         The effect then stands for something else.
         """
-        fitted = {name for coordinate in effect.free for name in coordinate}
+        fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
         known = [name for name in effect.names if name in fitted and name in self.theta]
         return tuple(name for name in known if at_edge(name, self.theta[name].value, self.robot.figures))
 

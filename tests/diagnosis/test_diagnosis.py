@@ -17,12 +17,14 @@ from proxytune.diagnosis.diagnose import (
     declared_parameters,
     diagnose,
 )
+from proxytune.diagnosis.diagnosis import Estimate
 from proxytune.diagnosis.floor import PoseNoise
-from proxytune.diagnosis.found import Found
+from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.horizon_error import KeptAside, horizon_error
 from proxytune.diagnosis.polish import HORIZONS_S
 from proxytune.diagnosis.verdict import CHANCE
 from proxytune.driving.robot import read_robot
+from proxytune.effects import PARAMETERS
 from proxytune.errors import LogError
 
 SCRUBBING = {**TRUTH, "yaw_scrub": 0.12}
@@ -190,3 +192,12 @@ def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
     assert found.clocks[0].offset.value == pytest.approx(hidden.CLEAN[1].delay - 0.25 - 0.15, abs=0.03)
     assert found.effects == ()
     assert found.theta["delay"].value == pytest.approx(0.15, abs=0.03)
+
+
+def test_a_value_at_the_end_of_its_range_is_told_of_effects_that_draw_too(diagnosis):
+    jitter = Adopted("delay_jitter", "", ("delay_jitter",), (), 50.0, 0.01, ())
+    highest = Estimate(PARAMETERS["delay_jitter"].high, (0.2, 0.3), "s")
+    there = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": highest})
+    assert there.at_edge(jitter) == ("delay_jitter",)
+    inside = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": replace(highest, value=0.1)})
+    assert inside.at_edge(jitter) == ()

@@ -74,9 +74,23 @@ def _write(path: Path, arrays: Arrays) -> None:
             np.savez_compressed(file, allow_pickle=False, **arrays)
         draft.replace(path)
     except OSError as problem:
-        with contextlib.suppress(OSError):
-            draft.unlink()
         raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room, and run again to go on") from None
+    finally:
+        for left in path.parent.glob(f"{draft.stem}.*"):
+            if left == draft or not _is_alive(int(left.suffix[1:])):
+                with contextlib.suppress(OSError):
+                    left.unlink()
+
+
+def _is_alive(process: int) -> bool:
+    """Whether a process that may have been killed while it wrote is still there."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _read(path: Path) -> Arrays:

@@ -37,3 +37,8 @@ def is_stepwise(coordinate: Coordinate) -> bool:
     """Whether it changes the motion by steps: no slope leads to its best value, so that is scanned for."""
     trace = CATALOGUE[effect_of(coordinate[0])].trace
     return trace is not None and trace.stepwise
+
+
+def smooth(free: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
+    """Those of the coordinates that do not."""
+    return tuple(coordinate for coordinate in free if not is_stepwise(coordinate))

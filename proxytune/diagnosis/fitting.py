@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from proxytune.diagnosis.coordinates import Coordinate, is_stepwise, placed, span
+from proxytune.diagnosis.coordinates import Coordinate, is_stepwise, placed, smooth, span
 from proxytune.diagnosis.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.innovations import (
     FIRST_GUESS,
@@ -65,8 +65,7 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
     for number in range(ROUNDS):
         whiten = whitener(drives, noise)
         theta = _scanned(drives, theta, tuple(filter(is_stepwise, free)), whiten, SCANS[min(number, len(SCANS) - 1)])
-        smooth = tuple(coordinate for coordinate in free if not is_stepwise(coordinate))
-        theta = _fit_theta(drives, theta, smooth, whiten)
+        theta = _fit_theta(drives, theta, smooth(free), whiten)
         noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
     return seen(drives, theta, free, noise)
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from proxytune.diagnosis.coordinates import Coordinate, is_stepwise, placed, span
+from proxytune.diagnosis.coordinates import Coordinate, placed, smooth, span
 from proxytune.diagnosis.drives import Drives, Floats, Whole
 from proxytune.diagnosis.fitting import STEP, Fit, seen
 from proxytune.diagnosis.windows import Ratio, Windows, blocks_of, chosen, cut, measured_since, misses, ratio, strays
@@ -68,10 +68,10 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
         free: What is fitted, except where it changes the motion by steps: single steps tell that far more sharply.
         windows: Windows over the drives; long logs are thinned to MOST_WINDOWS of them.
     """
-    smooth = _smooth(free)
-    if not smooth or len(windows.begin) == 0:
+    fitted = smooth(free)
+    if not fitted or len(windows.begin) == 0:
         return dict(theta)
-    problem = _problem(drives, theta, smooth, _thinned(windows))
+    problem = _problem(drives, theta, fitted, _thinned(windows))
     found = least_squares(
         problem.left,
         problem.start,
@@ -83,10 +83,6 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
         max_nfev=MOST_TRIALS,
     )
     return problem.at(np.clip(found.x, 0.0, 1.0))
-
-
-def _smooth(free: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
-    return tuple(coordinate for coordinate in free if not is_stepwise(coordinate))
 
 
 class _Problem(NamedTuple):
@@ -184,7 +180,7 @@ def polished(fitted: Fit) -> tuple[Fit, Polish | None]:
         return fitted, None
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
-    polish = Polish(best[1], best[2], _intervals(drives, theta, _smooth(fitted.free), windows))
+    polish = Polish(best[1], best[2], _intervals(drives, theta, smooth(fitted.free), windows))
     return seen(drives, theta, fitted.free, fitted.noise), polish
 
 

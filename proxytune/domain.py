@@ -33,6 +33,23 @@ def make_episode(theta: Theta, *, agent: str, start: int, seed: int) -> Episode:
     return Episode(tuple(pairs), agent, start, seed)
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one episode.
+
+    Attributes:
+        episode: Which one.
+        metrics: Its scores, None if it failed.
+        failure: Why it failed, empty if it did not.
+        seconds: How long it took.
+    """
+
+    episode: Episode
+    metrics: Mapping[str, float] | None
+    failure: str
+    seconds: float
+
+
 class DomainFamily(Protocol):
     """A simulator with parameters: picklable, without global state, same episode, same result.
 

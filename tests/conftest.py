@@ -76,10 +76,10 @@ def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
 @pytest.fixture(scope="session")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
-    from proxytune.search.engines import make_proposer
-    from proxytune.study.progress import Silent
+    from proxytune.running.progress import Silent
+    from proxytune.search.engines.registry import make_proposer
+    from proxytune.storage.store import Store
     from proxytune.study.run import run_study
-    from proxytune.study.store import Store
     from proxytune.study.study import open_study
 
     folder = study_maker(tmp_path_factory.mktemp("finished"))()

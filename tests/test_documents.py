@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from floors import floor
 
 from proxytune.cli.compare_objective import STAND_INS
 from proxytune.cli.main import COMMANDS, main, parser
@@ -18,10 +19,10 @@ from proxytune.driving.agents import AGENTS
 from proxytune.driving.robot import UNITS
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE
-from proxytune.effects.features import GROUPS
-from proxytune.search.engines import ENGINES, STUDY_ENGINES
+from proxytune.effects.learnt.features import GROUPS
+from proxytune.learning.settings import KEYS as TEACHING_KEYS
+from proxytune.search.engines.registry import ENGINES, STUDY_ENGINES
 from proxytune.study.settings import KEYS
-from proxytune.study.teaching import KEYS as TEACHING_KEYS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -122,6 +123,7 @@ def test_every_room_is_in_the_readme_in_reading_order():
     rooms = {path.name.removesuffix(".py") for path in (ROOT / "proxytune").iterdir() if not path.name.startswith("__")}
     named = re.findall(r"^\| `proxytune/(\w+)", README, flags=re.MULTILINE)
     assert rooms == set(named)
+    assert [floor(room) for room in named] == sorted(floor(room) for room in named), "a room stands before one it needs"
 
 
 def test_every_link_of_the_documents_leads_somewhere():

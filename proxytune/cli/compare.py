@@ -11,16 +11,16 @@ from rich.text import Text
 
 from proxytune.cli.answer import Answer
 from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, check_truths, objective_of
+from proxytune.comparison.analytic import Objective
+from proxytune.comparison.judgement import judging_code
+from proxytune.comparison.runs import Run, RunKey, judged_again, run_document, run_engine, run_from
+from proxytune.comparison.summary import EngineSummary, summarise
 from proxytune.errors import InputError, StoreError
-from proxytune.report.compare_document import compare_document, compare_lines, compare_tables
-from proxytune.report.compare_figure import compare_figure
+from proxytune.report.compare.document import compare_document, compare_lines, compare_tables
+from proxytune.report.compare.figure import compare_figure
 from proxytune.report.writing import save, write_text
-from proxytune.search.analytic import Objective
-from proxytune.search.comparison import Run, RunKey, judged_again, run_document, run_engine, run_from
-from proxytune.search.engines import ENGINES, STUDY_ENGINES, engine_code, why_not
-from proxytune.search.judgement import judging_code
-from proxytune.search.summary import EngineSummary, summarise
-from proxytune.study.lock import locked
+from proxytune.search.engines.registry import ENGINES, STUDY_ENGINES, engine_code, why_not
+from proxytune.storage.lock import locked
 
 FILE_NAME = "runs.jsonl"
 

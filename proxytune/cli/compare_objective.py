@@ -7,17 +7,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from proxytune.cli.study_folder import study_folder
+from proxytune.comparison.analytic import Analytic, Objective
+from proxytune.comparison.calibrated import Calibrated
+from proxytune.comparison.of_study import StudyObjective, noise_floor
+from proxytune.comparison.of_truths import TruthObjective, lacking_families
+from proxytune.comparison.ranking import Ranking
 from proxytune.errors import InputError
-from proxytune.search.analytic import Analytic, Objective
-from proxytune.search.calibrated import Calibrated
-from proxytune.search.ranking import Ranking
-from proxytune.study.objective import StudyObjective, noise_floor
+from proxytune.running.progress import Bars, Watcher
+from proxytune.storage.store import Store
 from proxytune.study.preflight import most_episodes
-from proxytune.study.progress import Bars, Watcher
 from proxytune.study.settings import StudySettings
-from proxytune.study.store import Store
 from proxytune.study.study import Study, open_study
-from proxytune.study.truths import TruthObjective, lacking_families
 
 STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking(), "calibrated": Calibrated()}
 BUDGET, INITIAL = 40, 10

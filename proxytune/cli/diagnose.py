@@ -12,11 +12,11 @@ from proxytune.cli.answer import Answer
 from proxytune.cli.steps import Steps
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
 from proxytune.diagnosis.diagnosis import Diagnosis
-from proxytune.diagnosis.vehicle import robot_of
+from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.errors import InputError
 from proxytune.logs import read_log
-from proxytune.report.diagnosis_document import document, model_file, shown
-from proxytune.report.diagnosis_figures import diagnosis_figures
+from proxytune.report.diagnosis.document import document, model_file, shown
+from proxytune.report.diagnosis.figures import diagnosis_figures
 from proxytune.report.writing import save, write_text
 
 SHARES = {

@@ -4,15 +4,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from proxytune.cli.answer import Answer
-from proxytune.report.plv_document import plv_document, plv_table
-from proxytune.report.plv_figure import plv_figure
+from proxytune.report.teaching.plv_document import plv_document, plv_table
+from proxytune.report.teaching.plv_figure import plv_figure
 from proxytune.report.writing import save
-from proxytune.search.engines import make_proposer
-from proxytune.study.lock import locked
-from proxytune.study.plv_study import run_plv_study, search_space
-from proxytune.study.progress import Bars
+from proxytune.running.progress import Bars
+from proxytune.search.engines.registry import make_proposer
+from proxytune.storage.lock import locked
 from proxytune.study.study import Study
-from proxytune.study.teach import open_school, points_of
+from proxytune.teaching.experiment import open_school, points_of
+from proxytune.teaching.search import run_plv_study, search_space
 
 
 def taught(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[float, float]]]) -> Answer:

@@ -9,9 +9,9 @@ from rich.text import Text
 
 from proxytune.cli.answer import Answer
 from proxytune.errors import InputError
+from proxytune.running.progress import Bars
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.study.measure import SEED_OFFSET, measure
-from proxytune.study.progress import Bars
 from proxytune.study.settings import read_study_settings
 
 

@@ -12,15 +12,15 @@ from rich.text import Text
 from proxytune.cli.answer import Answer
 from proxytune.cli.study import draw
 from proxytune.cli.sweep import draw_curves
-from proxytune.report.study_document import study_document
-from proxytune.report.study_table import study_table
+from proxytune.report.study.document import study_document
+from proxytune.report.study.table import study_table
 from proxytune.scores import Metric
+from proxytune.storage.store import Store
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import as_stored
-from proxytune.study.store import Store
 from proxytune.study.study import Study, open_study
-from proxytune.study.sweep import Curve, all_curves
+from proxytune.sweep.sweep import Curve, all_curves
 
 RESCORED = "rescored"
 

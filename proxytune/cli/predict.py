@@ -7,8 +7,8 @@ import numpy as np
 from rich.text import Text
 
 from proxytune.cli.answer import Answer
-from proxytune.diagnosis.prediction import agreement, predict
-from proxytune.diagnosis.vehicle import robot_of
+from proxytune.diagnosis.horizon.prediction import agreement, predict
+from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.driving.robot import Robot, robot_from_geometry, robot_names
 from proxytune.effects import Model, read_model
 from proxytune.errors import InputError

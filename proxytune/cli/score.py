@@ -7,9 +7,9 @@ from pathlib import Path
 
 from proxytune.cli.answer import Answer
 from proxytune.errors import InputError
-from proxytune.report.score_document import document_of, document_of_ranking
-from proxytune.report.score_figures import flipped_pairs, scatter
-from proxytune.report.score_table import measures, ranking
+from proxytune.report.scores.document import document_of, document_of_ranking
+from proxytune.report.scores.figures import flipped_pairs, scatter
+from proxytune.report.scores.table import measures, ranking
 from proxytune.report.writing import save
 from proxytune.scores import Metric, ScoreTable, read_domains, read_scores
 from proxytune.usefulness import Assessment, assess, select_proxy

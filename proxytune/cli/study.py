@@ -9,23 +9,23 @@ from typing import Any
 from proxytune.cli.answer import Answer
 from proxytune.cli.learning_value import taught
 from proxytune.cli.study_folder import study_folder
-from proxytune.report.convergence import convergence
-from proxytune.report.importance_figure import importance_figure
-from proxytune.report.page import page
-from proxytune.report.profiles_figure import profiles_figure
-from proxytune.report.search_figures import evaluations_figure
-from proxytune.report.study_document import study_document
-from proxytune.report.study_table import study_table
+from proxytune.report.study.convergence import convergence
+from proxytune.report.study.document import study_document
+from proxytune.report.study.importance_figure import importance_figure
+from proxytune.report.study.page import page
+from proxytune.report.study.profiles_figure import profiles_figure
+from proxytune.report.study.search_figures import evaluations_figure
+from proxytune.report.study.table import study_table
 from proxytune.report.writing import save, write_text
-from proxytune.search.engines import make_proposer, why_not
+from proxytune.running.progress import Bars, Watcher
+from proxytune.search.engines.registry import make_proposer, why_not
+from proxytune.storage.lock import locked
+from proxytune.storage.store import Store
 from proxytune.study import confirmation, preflight
-from proxytune.study.composition import goal_of
-from proxytune.study.evaluate import Spent
-from proxytune.study.lock import locked
-from proxytune.study.progress import Bars, Watcher
+from proxytune.study.evaluation import Spent
+from proxytune.study.outputs import goal_of
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import check_facts, run_study
-from proxytune.study.store import Store
 from proxytune.study.study import Study, open_study
 
 

@@ -13,7 +13,7 @@ from proxytune.cli.answer import Answer
 from proxytune.cli.study_folder import study_folder
 from proxytune.effects import read_model
 from proxytune.errors import InputError
-from proxytune.report.sweep_document import (
+from proxytune.report.sweep.document import (
     NO_POD,
     curve_csv,
     curve_document,
@@ -22,16 +22,17 @@ from proxytune.report.sweep_document import (
     curve_tables,
     failures,
 )
-from proxytune.report.sweep_figure import bars_figure, panels_figure, sweep_figure
+from proxytune.report.sweep.figures import bars_figure, panels_figure, sweep_figure
 from proxytune.report.writing import save, write_text
+from proxytune.running.progress import Bars
 from proxytune.space import Theta
-from proxytune.study.discrepancy import discrepancy_study
-from proxytune.study.evaluate import Spent
-from proxytune.study.lock import locked
-from proxytune.study.progress import Bars
-from proxytune.study.store import Store, SweepRecord
+from proxytune.storage.lock import locked
+from proxytune.storage.records import SweepRecord
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import Spent
 from proxytune.study.study import Study, open_study
-from proxytune.study.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval, with_target
+from proxytune.sweep.discrepancy import discrepancy_study
+from proxytune.sweep.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval, with_target
 
 MOST_POINTS = 10_000
 

@@ -5,16 +5,16 @@ from pathlib import Path
 
 from proxytune.cli.answer import Answer
 from proxytune.cli.study_folder import study_folder
-from proxytune.report.teach_document import teach_document
-from proxytune.report.teach_figure import teach_figure
-from proxytune.report.teach_table import teach_table
+from proxytune.report.teaching.document import teach_document
+from proxytune.report.teaching.figure import teach_figure
+from proxytune.report.teaching.table import teach_table
 from proxytune.report.writing import save
-from proxytune.study.lock import locked
-from proxytune.study.predictivity import predictivity
-from proxytune.study.progress import Bars
-from proxytune.study.store import Store
+from proxytune.running.progress import Bars
+from proxytune.storage.lock import locked
+from proxytune.storage.store import Store
 from proxytune.study.study import open_study
-from proxytune.study.teach import open_school, points_of, run_experiment
+from proxytune.teaching.experiment import open_school, points_of, run_experiment
+from proxytune.teaching.predictivity import predictivity
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -3,28 +3,28 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from proxytune.diagnosis.candidates import MOTION_EFFECTS
-from proxytune.diagnosis.clocks import Clocks, in_step, read_clocks
-from proxytune.diagnosis.confirmation import bullet_strays, has_body
 from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
-from proxytune.diagnosis.drives import gather
-from proxytune.diagnosis.fitting import Fit
-from proxytune.diagnosis.floor import pose_noise
-from proxytune.diagnosis.found import Adopted, Dropped, Found, Variant
+from proxytune.diagnosis.horizon.confirmation import bullet_strays, has_body
+from proxytune.diagnosis.horizon.floor import pose_noise
+from proxytune.diagnosis.horizon.polish import HORIZONS_S, Polish, polished
 from proxytune.diagnosis.horizon_error import HorizonError, KeptAside, horizon_error
-from proxytune.diagnosis.intervals import intervals
-from proxytune.diagnosis.learning import Learning, learn
-from proxytune.diagnosis.likeness import two_robots
 from proxytune.diagnosis.manoeuvres import next_manoeuvre
-from proxytune.diagnosis.materiality import Worth, worth
-from proxytune.diagnosis.naming import name_effects
-from proxytune.diagnosis.plausible import check_motion, check_units
-from proxytune.diagnosis.polish import HORIZONS_S, Polish, polished
-from proxytune.diagnosis.rests import without_long_rests
-from proxytune.diagnosis.search import Told, fit_declared
-from proxytune.diagnosis.split import Parts, all_drives, split
+from proxytune.diagnosis.measured.clocks import Clocks, in_step, read_clocks
+from proxytune.diagnosis.measured.drives import gather
+from proxytune.diagnosis.measured.rests import without_long_rests
+from proxytune.diagnosis.measured.split import Parts, all_drives, split
+from proxytune.diagnosis.model.fitting import Fit
+from proxytune.diagnosis.model.intervals import intervals
+from proxytune.diagnosis.model.plausible import check_motion, check_units
+from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS
+from proxytune.diagnosis.naming.found import Adopted, Dropped, Found, Variant
+from proxytune.diagnosis.naming.likeness import two_robots
+from proxytune.diagnosis.naming.materiality import Worth, worth
+from proxytune.diagnosis.naming.names import name_effects
+from proxytune.diagnosis.naming.search import Told, fit_declared
+from proxytune.diagnosis.naming.visibility import unseen
+from proxytune.diagnosis.remainder.learning import Learning, learn
 from proxytune.diagnosis.verdict import verdict
-from proxytune.diagnosis.visibility import unseen
 from proxytune.driving.robot import Robot
 from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, effect_of, theta_names
 from proxytune.errors import LogError

@@ -3,17 +3,17 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from proxytune.diagnosis.clocks import Clocks
-from proxytune.diagnosis.coordinates import at_edge
-from proxytune.diagnosis.found import Adopted, Found
+from proxytune.diagnosis.horizon.polish import Polish
 from proxytune.diagnosis.horizon_error import HorizonError
-from proxytune.diagnosis.innovations import Noise
-from proxytune.diagnosis.learning import Learning
-from proxytune.diagnosis.likeness import Unlike
 from proxytune.diagnosis.manoeuvres import Manoeuvre
-from proxytune.diagnosis.materiality import Worth
-from proxytune.diagnosis.polish import Polish
-from proxytune.diagnosis.split import Parts
+from proxytune.diagnosis.measured.clocks import Clocks
+from proxytune.diagnosis.measured.split import Parts
+from proxytune.diagnosis.model.coordinates import at_edge
+from proxytune.diagnosis.model.innovations import Noise
+from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.naming.likeness import Unlike
+from proxytune.diagnosis.naming.materiality import Worth
+from proxytune.diagnosis.remainder.learning import Learning
 from proxytune.driving.robot import Robot
 from proxytune.effects import PARAMETERS
 

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.drives import Drives, Floats
-from proxytune.diagnosis.floor import PoseNoise, noise_floor
-from proxytune.diagnosis.found import Found
-from proxytune.diagnosis.polish import FEWEST_BLOCKS
-from proxytune.diagnosis.repeats import repeated
+from proxytune.diagnosis.horizon.floor import PoseNoise, noise_floor
+from proxytune.diagnosis.horizon.polish import FEWEST_BLOCKS
+from proxytune.diagnosis.horizon.repeats import repeated
+from proxytune.diagnosis.horizon.windows import Ratio, Rmse, Windows, blocks_of, cut, ratio, rmse, strays
+from proxytune.diagnosis.measured.drives import Drives, Floats
+from proxytune.diagnosis.naming.found import Found
 from proxytune.diagnosis.verdict import Bracket, bracket
-from proxytune.diagnosis.windows import Ratio, Rmse, Windows, blocks_of, cut, ratio, rmse, strays
 from proxytune.space import Theta
 
 

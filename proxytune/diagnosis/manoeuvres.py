@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from proxytune.diagnosis.adoption import NATS_APART
-from proxytune.diagnosis.candidates import Candidate
-from proxytune.diagnosis.drives import Drives, Floats
-from proxytune.diagnosis.fitting import Fit, seen
-from proxytune.diagnosis.found import Adopted, Found
-from proxytune.diagnosis.visibility import trace_of
+from proxytune.diagnosis.measured.drives import Drives, Floats
+from proxytune.diagnosis.model.fitting import Fit, seen
+from proxytune.diagnosis.naming.adoption import NATS_APART
+from proxytune.diagnosis.naming.candidates import Candidate
+from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.naming.visibility import trace_of
 
 SECONDS = 60.0
 

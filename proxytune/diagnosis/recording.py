@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pandas as pd
 
-from proxytune.diagnosis.drives import Floats
 from proxytune.diagnosis.manoeuvres import LIBRARY
+from proxytune.diagnosis.measured.drives import Floats
 from proxytune.driving.family import LaneFollowing
 from proxytune.driving.recording import follow
 from proxytune.driving.robot import read_robot

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.repeats import Repeated
+from proxytune.diagnosis.horizon.repeats import Repeated
 
 AT_FLOOR = 1.15
 """An error of no more than so many times the floor is at it."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
 
-from proxytune.driving.texture import Floor
+from proxytune.driving.road.texture import Floor
 from proxytune.effects import CHANNELS, Stage
 from proxytune.errors import SettingsError
 

@@ -8,8 +8,8 @@ import numpy as np
 from proxytune.driving.agents.agent import Command, Picture
 from proxytune.driving.agents.pilots import duties
 from proxytune.driving.episode import Sight
-from proxytune.driving.lane import lane_point, lane_pose
-from proxytune.driving.maps import LoopMap
+from proxytune.driving.road.lane import lane_point, lane_pose
+from proxytune.driving.road.maps import LoopMap
 from proxytune.driving.robot import Robot
 from proxytune.effects import Signal
 

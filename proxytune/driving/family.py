@@ -22,12 +22,12 @@ from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import TICK_HZ, Course, Drive, Driver, Instance, Sight, drive, measured, picture_only
 from proxytune.driving.expert import Expert
-from proxytune.driving.lane import off_map
-from proxytune.driving.maps import MAPS
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
+from proxytune.driving.road.lane import off_map
+from proxytune.driving.road.maps import MAPS
+from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import Robot, read_robot, robot_names
-from proxytune.driving.texture import draw_floor
 from proxytune.effects import (
     PARAMETERS,
     Effect,

@@ -12,8 +12,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.lane import LanePose, lane_length, lane_pose
-from proxytune.driving.maps import LoopMap
+from proxytune.driving.road.lane import LanePose, lane_length, lane_pose
+from proxytune.driving.road.maps import LoopMap
 from proxytune.errors import EpisodeError
 
 Values = NDArray[np.float64]

@@ -3,21 +3,21 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from proxytune.effects.actuation import DriverMap, MotorLag, Trim, WheelGain
-from proxytune.effects.camera import CameraHeight, CameraPitch, CameraRoll, CameraYaw, FieldOfView, LensDistortion
+from proxytune.effects.body.floor import FloorSlope, SlipperyPatch
+from proxytune.effects.body.measurement import HeadingOffset, MarkerOffset
+from proxytune.effects.body.motion import LateralSlip, TurnSlip, YawScrub
+from proxytune.effects.body.turning import CrossCoupling, Understeer, YawLag
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.effect import Effect
-from proxytune.effects.floor import FloorSlope, SlipperyPatch
-from proxytune.effects.friction import Backlash, DeadBand, Stiction
-from proxytune.effects.image import Blur
-from proxytune.effects.learnt_table import is_learnt, learnt_effect
-from proxytune.effects.load import SlewRate, ThermalFade
-from proxytune.effects.measurement import HeadingOffset, MarkerOffset
+from proxytune.effects.learnt.table import is_learnt, learnt_effect
 from proxytune.effects.messages import DelayJitter, DroppedCommands
-from proxytune.effects.motion import LateralSlip, TurnSlip, YawScrub
-from proxytune.effects.power import BatterySag, Saturation
-from proxytune.effects.ripple import WheelRipple
-from proxytune.effects.turning import CrossCoupling, Understeer, YawLag
+from proxytune.effects.motors.actuation import DriverMap, MotorLag, Trim, WheelGain
+from proxytune.effects.motors.friction import Backlash, DeadBand, Stiction
+from proxytune.effects.motors.load import SlewRate, ThermalFade
+from proxytune.effects.motors.power import BatterySag, Saturation
+from proxytune.effects.motors.ripple import WheelRipple
+from proxytune.effects.sight.camera import CameraHeight, CameraPitch, CameraRoll, CameraYaw, FieldOfView, LensDistortion
+from proxytune.effects.sight.image import Blur
 from proxytune.errors import SettingsError
 from proxytune.settings import nearest
 from proxytune.space import Parameter, Theta

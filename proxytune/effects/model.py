@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, theta_names
-from proxytune.effects.learnt import Learnt
-from proxytune.effects.learnt_table import learnt_text, read_learnt
+from proxytune.effects.learnt.effect import Learnt
+from proxytune.effects.learnt.table import learnt_text, read_learnt
 from proxytune.logs import GEOMETRY
 from proxytune.settings import Section, nearest, read_settings
 

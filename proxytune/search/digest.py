@@ -6,19 +6,21 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-ROOM = "proxytune.search"
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).resolve().parent.parent
+ROOMS = ("search", "comparison")
+"""What a digest looks into: the ground floor and the simulators are not what proposes."""
 
 
 @cache
 def code_of(*modules: str) -> str:
-    """A digest of modules of the search and of all that they import of it, directly or not."""
+    """A digest of modules of the search or a comparison and of all that they import of these, directly or not."""
     found: dict[str, Path] = {}
     waiting = list(modules)
     while waiting:
         module = waiting.pop()
-        path = FOLDER / f"{module.removeprefix(ROOM).removeprefix('.')}.py"
-        if module not in found and path.is_file():
+        parts = module.split(".")[1:]
+        path = FOLDER.joinpath(*parts).with_suffix(".py")
+        if module not in found and parts[:1] and parts[0] in ROOMS and path.is_file():
             found[module] = path
             waiting.extend(_imported(path))
     files = [found[module] for module in sorted(found)]

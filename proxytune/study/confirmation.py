@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proxytune.domain import Episode
+from proxytune.domain import Episode, Outcome
+from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
-from proxytune.search.knowledge import Knowledge
-from proxytune.study.composition import knowledge_of
-from proxytune.study.evaluate import Spent, known_outcomes, plan, run_missing, score, table
-from proxytune.study.objective import FRESH
-from proxytune.study.progress import Watcher
+from proxytune.search.knowledge.knowledge import Knowledge
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import FRESH, Spent, known_outcomes, plan, run_missing, score, table
+from proxytune.study.outputs import knowledge_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.stopping import stopped
-from proxytune.study.store import Outcome, Store, TrialRecord
 from proxytune.study.study import Study
 from proxytune.usefulness import Assessment, assess, floor_of_repeats
 

@@ -18,13 +18,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.domain import Episode
+from proxytune.domain import Episode, Outcome
+from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
 from proxytune.search.surrogate import fit_surrogate
-from proxytune.study.evaluate import Instance, Spent, evaluation, known_outcomes, plan, run_missing, table
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import Instance, Spent, evaluation, known_outcomes, plan, run_missing, table
 from proxytune.study.history import as_trials, episodes_of
-from proxytune.study.progress import Watcher
-from proxytune.study.store import Outcome, Store, TrialRecord
 from proxytune.study.study import Study
 from proxytune.usefulness.prpv import dominance
 

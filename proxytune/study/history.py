@@ -6,9 +6,10 @@ from proxytune.domain import Episode
 from proxytune.errors import RunError
 from proxytune.search.proposer import Trial
 from proxytune.space import Space
-from proxytune.study.evaluate import plan
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import plan
 from proxytune.study.settings import StudySettings
-from proxytune.study.store import Store, TrialRecord
 
 
 def as_trials(space: Space, done: Sequence[TrialRecord]) -> list[Trial]:

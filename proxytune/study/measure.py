@@ -4,12 +4,11 @@ from pathlib import Path
 
 from proxytune.domain import Episode
 from proxytune.errors import EpisodeError
+from proxytune.running.episodes import running
+from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
-from proxytune.study.episodes import running
-from proxytune.study.evaluate import longest_first, plan, told
+from proxytune.study.evaluation import FRESH, longest_first, plan, told
 from proxytune.study.family import load_family
-from proxytune.study.objective import FRESH
-from proxytune.study.progress import Watcher
 from proxytune.study.settings import StudySettings
 
 SEED_OFFSET = 1000

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.scores import Array
+from proxytune.storage.store import Store
 from proxytune.study.preflight import placement_pairs
-from proxytune.study.store import Store
 from proxytune.study.study import Study
 from proxytune.usefulness.repeats import start_of
 

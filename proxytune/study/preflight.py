@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.domain import Episode, make_episode
+from proxytune.domain import Episode, Outcome, make_episode
+from proxytune.running.progress import Watcher
 from proxytune.space import Interval, Theta
-from proxytune.study.evaluate import Spent, episode_seed, known_outcomes, run_missing
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import Spent, episode_seed, known_outcomes, run_missing
 from proxytune.study.movement import LOOKS, Movement, judge
-from proxytune.study.progress import Watcher
 from proxytune.study.settings import StudySettings
-from proxytune.study.store import Outcome, Store
 from proxytune.study.study import Study
 
 PAIRS = 24

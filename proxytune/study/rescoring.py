@@ -6,11 +6,12 @@ from dataclasses import replace
 from proxytune.errors import InputError
 from proxytune.scores import Metric
 from proxytune.settings import nearest
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
 from proxytune.study.cutting import by_other_metrics
 from proxytune.study.result import StudyResult, known_evaluation, result_of
 from proxytune.study.run import record
 from proxytune.study.stopping import stopped
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study, read_target
 
 

@@ -4,19 +4,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from proxytune.errors import RunError
-from proxytune.search.importance import Importance, importances
-from proxytune.search.knowledge import Knowledge
+from proxytune.search.knowledge.importance import Importance, importances
+from proxytune.search.knowledge.knowledge import Knowledge
 from proxytune.search.surrogate import fit_surrogate
 from proxytune.space import Theta
-from proxytune.study.composition import knowledge_of
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
 from proxytune.study.confirmation import Confirmation, confirmation_of
 from proxytune.study.cutting import spared
-from proxytune.study.evaluate import Evaluation, evaluation, known_outcomes, told
+from proxytune.study.evaluation import Evaluation, evaluation, known_outcomes, told
 from proxytune.study.history import as_trials, episodes_of, lacks_episodes
 from proxytune.study.noise import noise_of
+from proxytune.study.outputs import knowledge_of
 from proxytune.study.preflight import Preflight, preflight_of
 from proxytune.study.stopping import stopped
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
 from proxytune.usefulness import Assessment, NoiseFloor, assess
 

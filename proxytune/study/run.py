@@ -5,14 +5,15 @@ from dataclasses import replace
 from typing import Any
 
 from proxytune.errors import RunError, SettingsError
+from proxytune.running.progress import Watcher
 from proxytune.search.proposer import Proposer, Trial, batch_at, propose_batch
-from proxytune.study.composition import trial_of
+from proxytune.storage.records import State, TrialRecord
+from proxytune.storage.store import Store
 from proxytune.study.cutting import Cut, Reference, reference, run_or_cut
-from proxytune.study.evaluate import Evaluation, Spent, evaluation, known_outcomes, run_missing
+from proxytune.study.evaluation import Evaluation, Spent, evaluation, known_outcomes, run_missing
 from proxytune.study.history import episodes_of
-from proxytune.study.progress import Watcher
+from proxytune.study.outputs import trial_of
 from proxytune.study.stopping import stopped
-from proxytune.study.store import State, Store, TrialRecord
 from proxytune.study.study import Study, changes, facts
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.errors import InputError
+from proxytune.learning.settings import TeachingSettings, read_teaching
 from proxytune.scores import Metric
-from proxytune.search.engines import DEFAULT_ENGINE, SCORE_ENGINE, STUDY_ENGINES
+from proxytune.search.engines.registry import DEFAULT_ENGINE, SCORE_ENGINE, STUDY_ENGINES
 from proxytune.settings import Section, read_settings
 from proxytune.space import Interval, Space
-from proxytune.study.teaching import TeachingSettings, read_teaching
 
 DEFAULT_FAMILY = "proxytune.driving.family:lane_following"
 FILE_NAME = "study.toml"

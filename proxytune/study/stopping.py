@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 
-from proxytune.search.composite import expected_gain
-from proxytune.search.engines import WITH_OUTPUTS
-from proxytune.search.gaussian_process import expected_improvement
+from proxytune.search.engines.composite import expected_gain
+from proxytune.search.engines.gaussian_process import expected_improvement
+from proxytune.search.engines.registry import WITH_OUTPUTS
 from proxytune.search.proposer import batch_at
-from proxytune.study.composition import goal_of, trials_of
-from proxytune.study.evaluate import plan
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import plan
 from proxytune.study.history import as_trials
+from proxytune.study.outputs import goal_of, trials_of
 from proxytune.study.settings import StudySettings
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import Study
 
 FILE_REMEDY = "raise it or take it out to go on"

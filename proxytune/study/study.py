@@ -11,7 +11,7 @@ from proxytune.domain import DomainFamily
 from proxytune.effects import read_model
 from proxytune.errors import InputError, ScoresError
 from proxytune.scores import ScoreTable, read_scores
-from proxytune.search.engines import WITH_OUTPUTS
+from proxytune.search.engines.registry import WITH_OUTPUTS
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.study.family import load_family

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from proxytune.diagnosis.diagnose import diagnose
-from proxytune.diagnosis.drives import gather
-from proxytune.diagnosis.innovations import FIRST_GUESS, fit_noise, whitener
-from proxytune.diagnosis.replay import increments
-from proxytune.diagnosis.search import fit_declared, search
-from proxytune.diagnosis.split import split
+from proxytune.diagnosis.measured.drives import gather
+from proxytune.diagnosis.measured.split import split
+from proxytune.diagnosis.model.innovations import FIRST_GUESS, fit_noise, whitener
+from proxytune.diagnosis.model.replay import increments
+from proxytune.diagnosis.naming.search import fit_declared, search
 from proxytune.driving.robot import read_robot
 
 sys.path.append(str(Path(__file__).parent.parent / "diagnosis"))

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import spearmanr
 
-from proxytune.search.composite import composed_scores
-from proxytune.search.output_model import fit_outputs
+from proxytune.search.engines.composite import composed_scores
+from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.surrogate import fit_surrogate, unit_array
-from proxytune.study.composition import goal_of, trial_of
+from proxytune.storage.store import Store
+from proxytune.study.outputs import goal_of, trial_of
 from proxytune.study.run import as_stored
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 

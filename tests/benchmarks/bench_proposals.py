@@ -15,14 +15,14 @@ from skopt.acquisition import gaussian_ei
 from skopt.learning import GaussianProcessRegressor
 from skopt.learning.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
-from proxytune.search.analytic import Analytic
-from proxytune.search.comparison import Run, RunKey
+from proxytune.comparison.analytic import Analytic
+from proxytune.comparison.judgement import Judgement
+from proxytune.comparison.ranking import METRICS, Ranking
+from proxytune.comparison.runs import Run, RunKey
+from proxytune.comparison.summary import summarise
 from proxytune.search.design import design_point, from_unit, unit_points
-from proxytune.search.gaussian_process import GaussianProcess, highest
-from proxytune.search.judgement import Judgement
+from proxytune.search.engines.gaussian_process import GaussianProcess, highest
 from proxytune.search.proposer import Trial, proposal_seed
-from proxytune.search.ranking import METRICS, Ranking
-from proxytune.search.summary import summarise
 from proxytune.search.surrogate import (
     AMPLITUDE,
     LENGTH_SCALE,

@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
+from proxytune.comparison.of_truths import MIDDLE, lacking_families
+from proxytune.running.progress import Bars
 from proxytune.search.design import from_unit, unit_points
-from proxytune.search.knowledge import learn
+from proxytune.search.knowledge.knowledge import learn
 from proxytune.search.proposer import Trial
-from proxytune.study.composition import goal_of, outputs_of
-from proxytune.study.evaluate import known_outcomes, plan, run_missing, table
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import known_outcomes, plan, run_missing, table
 from proxytune.study.measure import SEED_OFFSET
+from proxytune.study.outputs import goal_of, outputs_of
 from proxytune.study.preflight import run_preflight
-from proxytune.study.progress import Bars
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
-from proxytune.study.truths import MIDDLE, lacking_families
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "truths"
 DESIGN_SEED, TRUTH_SEED = 5, 77

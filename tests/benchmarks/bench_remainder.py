@@ -20,12 +20,12 @@ import rates
 from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, make_log
 
 from proxytune.diagnosis.diagnose import declared_effects, declared_parameters
-from proxytune.diagnosis.fitting import fit
-from proxytune.diagnosis.remainder import HORIZONS_S, remainder
-from proxytune.diagnosis.search import fit_declared, search
-from proxytune.diagnosis.split import split
-from proxytune.diagnosis.vehicle import robot_of
-from proxytune.diagnosis.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.measured.split import split
+from proxytune.diagnosis.measured.vehicle import robot_of
+from proxytune.diagnosis.model.fitting import fit
+from proxytune.diagnosis.naming.search import fit_declared, search
+from proxytune.diagnosis.remainder.remainder import HORIZONS_S, remainder
 from proxytune.effects import PARAMETERS
 from proxytune.logs import read_log
 

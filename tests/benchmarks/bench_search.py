@@ -8,16 +8,17 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from proxytune.domain import make_episode
+from proxytune.comparison.analytic import BOX, Analytic
+from proxytune.domain import Outcome, make_episode
 from proxytune.scores import Metric
-from proxytune.search.analytic import BOX, Analytic
 from proxytune.search.design import design_point, to_unit
-from proxytune.search.engines import make_proposer
+from proxytune.search.engines.registry import make_proposer
 from proxytune.search.goal import Goal
-from proxytune.search.knowledge import learn
+from proxytune.search.knowledge.knowledge import learn
 from proxytune.search.proposer import Trial
-from proxytune.study.evaluate import episode_seed
-from proxytune.study.store import Outcome, Store, TrialRecord
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import episode_seed
 from proxytune.usefulness.prpv import prpv_of_means
 
 COUNTS = (25, 100, 400)

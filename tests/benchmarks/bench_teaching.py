@@ -28,9 +28,9 @@ from proxytune.learning.cache import Cache
 from proxytune.learning.cloning import BehaviourCloning
 from proxytune.learning.lessons import Distribution, teach
 from proxytune.settings import Section
-from proxytune.study.school import Point, School
 from proxytune.study.settings import read_study_settings
-from proxytune.study.teach import open_school
+from proxytune.teaching.experiment import open_school
+from proxytune.teaching.points import Point, School
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "teacher"
 TWIN = STUDY / "twin.toml"

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import qmc
 
+from proxytune.comparison.calibrated import METRICS
+from proxytune.running.episodes import running
 from proxytune.scores import ScoreTable
-from proxytune.search.calibrated import METRICS
 from proxytune.search.design import from_unit
-from proxytune.search.output_model import fit_outputs
+from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.proposer import Trial
-from proxytune.study.episodes import running
-from proxytune.study.evaluate import plan
+from proxytune.study.evaluation import plan
 from proxytune.study.measure import SEED_OFFSET
 from proxytune.study.study import open_study
 

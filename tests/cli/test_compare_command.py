@@ -4,8 +4,8 @@ import pytest
 
 from proxytune.cli.compare import _engines, read_runs
 from proxytune.cli.main import main, parser
-from proxytune.search import engines
-from proxytune.search.judgement import judging_code
+from proxytune.comparison.judgement import judging_code
+from proxytune.search.engines import registry as engines
 
 FEW = ("--engines", "random,sobol", "--seeds", "2", "--budget", "7", "--initial", "5")
 

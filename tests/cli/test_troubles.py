@@ -12,11 +12,11 @@ from processes import episodes, start, trials
 from stopping import Stopping
 
 from proxytune.cli.main import main
-from proxytune.search.engines import make_proposer
-from proxytune.study.database import FORMAT
-from proxytune.study.progress import Silent
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import make_proposer
+from proxytune.storage.database import FORMAT
+from proxytune.storage.store import Store
 from proxytune.study.run import run_study
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 slow = pytest.mark.slow

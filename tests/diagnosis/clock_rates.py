@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, Case, make_log
 
-from proxytune.diagnosis.clocks import Clocks, read_clocks
-from proxytune.diagnosis.vehicle import robot_of
+from proxytune.diagnosis.measured.clocks import Clocks, read_clocks
+from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.driving.robot import read_robot
 from proxytune.logs import read_log
 

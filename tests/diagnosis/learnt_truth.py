@@ -1,7 +1,7 @@
 """A robot whose hidden motion is a learnt effect: what a fit should find again."""
 
-from proxytune.effects.learnt import Curve, Learnt, Seen
-from proxytune.effects.learnt_table import learnt_theta
+from proxytune.effects.learnt.effect import Curve, Learnt, Seen
+from proxytune.effects.learnt.table import learnt_theta
 
 SEEN = Seen((-0.6, 0.6), (-6.0, 6.0))
 

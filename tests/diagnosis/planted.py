@@ -9,10 +9,10 @@ import pandas as pd
 from manoeuvres import RATE_HZ, make_drives
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.drives import Drives, gather
-from proxytune.diagnosis.fitting import Fit, fit
-from proxytune.diagnosis.innovations import TURN_WEIGHT, Noise
-from proxytune.diagnosis.split import in_blocks
+from proxytune.diagnosis.measured.drives import Drives, gather
+from proxytune.diagnosis.measured.split import in_blocks
+from proxytune.diagnosis.model.fitting import Fit, fit
+from proxytune.diagnosis.model.innovations import TURN_WEIGHT, Noise
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.planar import integrate
 from proxytune.driving.robot import read_robot

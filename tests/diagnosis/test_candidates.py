@@ -10,9 +10,9 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import ROBOT, TRUTH
 
-from proxytune.diagnosis.candidates import MOTION_EFFECTS, candidates
-from proxytune.diagnosis.coordinates import placed
-from proxytune.diagnosis.replay import RANDOM_EFFECTS
+from proxytune.diagnosis.model.coordinates import placed
+from proxytune.diagnosis.model.replay import RANDOM_EFFECTS
+from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, candidates
 from proxytune.effects import CATALOGUE, PARAMETERS, Stage, effects_from
 
 THETA = {**ROBOT.theta, **TRUTH}

@@ -10,12 +10,12 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
-from proxytune.diagnosis.candidates import candidates
-from proxytune.diagnosis.choice import best_of
-from proxytune.diagnosis.coordinates import at_edge
-from proxytune.diagnosis.fitting import seen
-from proxytune.diagnosis.round import Round
-from proxytune.diagnosis.screening import Lead
+from proxytune.diagnosis.model.coordinates import at_edge
+from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.naming.candidates import candidates
+from proxytune.diagnosis.naming.choice import best_of
+from proxytune.diagnosis.naming.round import Round
+from proxytune.diagnosis.naming.screening import Lead
 from proxytune.driving.robot import read_robot
 
 FIGURES = read_robot("duckiebot").figures
@@ -65,7 +65,7 @@ def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little
 
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "yaw_scrub"), (40.0, "motor_lag")])
 def test_an_effect_within_its_range_is_preferred_to_one_at_its_end(drives, gain, wanted, monkeypatch):
-    monkeypatch.setattr("proxytune.diagnosis.choice.no_worse", lambda one, other: True)
+    monkeypatch.setattr("proxytune.diagnosis.naming.choice.no_worse", lambda one, other: True)
     lag = ("motor_lag", {"motor_lag.time_constant": 1.0, "motor_lag.imbalance": 0.0}, 90.0)
     assert chosen(drives, lag, ("yaw_scrub", {"yaw_scrub": 0.1601}, gain)) == wanted
 

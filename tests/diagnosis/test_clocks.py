@@ -11,9 +11,9 @@ sys.path.append(str(Path(__file__).parent))
 import hidden
 from planted import ROBOT, driven_log, planted_log
 
-from proxytune.diagnosis.clocks import in_step, read_clocks
-from proxytune.diagnosis.drives import gather
-from proxytune.diagnosis.stretches import Blocks, stretches
+from proxytune.diagnosis.measured.clocks import in_step, read_clocks
+from proxytune.diagnosis.measured.drives import gather
+from proxytune.diagnosis.measured.stretches import Blocks, stretches
 from proxytune.logs import read_log
 
 LOGS = Path(__file__).resolve().parents[2] / "../shared/data/logs"
@@ -145,7 +145,7 @@ def test_another_log_of_the_same_robot_is_put_on_the_same_latency():
 def test_measured_logs_are_on_one_clock(name):
     if not (LOGS / name).is_dir():
         pytest.skip(f"the measured log {name} is not here: it is not part of the project")
-    from proxytune.diagnosis.vehicle import robot_of
+    from proxytune.diagnosis.measured.vehicle import robot_of
 
     log = read_log(LOGS / name)
     assert not read_clocks(log, robot_of(log)).differ

@@ -10,9 +10,9 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import ROBOT, TRUTH, fitted, planted_drives
 
-from proxytune.diagnosis.candidates import candidates
-from proxytune.diagnosis.dense import part_of, with_dense_probes
-from proxytune.diagnosis.replay import increments
+from proxytune.diagnosis.model.replay import increments
+from proxytune.diagnosis.naming.candidates import candidates
+from proxytune.diagnosis.naming.dense import part_of, with_dense_probes
 
 SHORT = {"episodes": 4, "seconds": 30.0}
 

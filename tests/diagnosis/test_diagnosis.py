@@ -18,10 +18,10 @@ from proxytune.diagnosis.diagnose import (
     diagnose,
 )
 from proxytune.diagnosis.diagnosis import Estimate
-from proxytune.diagnosis.floor import PoseNoise
-from proxytune.diagnosis.found import Adopted, Found
+from proxytune.diagnosis.horizon.floor import PoseNoise
+from proxytune.diagnosis.horizon.polish import HORIZONS_S
 from proxytune.diagnosis.horizon_error import KeptAside, horizon_error
-from proxytune.diagnosis.polish import HORIZONS_S
+from proxytune.diagnosis.naming.found import Adopted, Found
 from proxytune.diagnosis.verdict import CHANCE
 from proxytune.driving.robot import read_robot
 from proxytune.effects import PARAMETERS

@@ -11,8 +11,8 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import ROBOT, planted_drives
 
-from proxytune.diagnosis.commands import duties_of
-from proxytune.diagnosis.drives import gather, number_of, relative, sum_by
+from proxytune.diagnosis.measured.commands import duties_of
+from proxytune.diagnosis.measured.drives import gather, number_of, relative, sum_by
 from proxytune.driving.robot import read_robot
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode

@@ -12,8 +12,8 @@ sys.path.append(str(Path(__file__).parent))
 from own_times import own_times_log
 from planted import TRUTH, drives_of, fitted, planted_drives
 
-from proxytune.diagnosis.events import _changed, _mixture, _without, random_effects, responses
-from proxytune.diagnosis.replay import RANDOM_EFFECTS
+from proxytune.diagnosis.model.events import _changed, _mixture, _without, random_effects, responses
+from proxytune.diagnosis.model.replay import RANDOM_EFFECTS
 
 SHORT = {"episodes": 4, "seconds": 25.0}
 

@@ -11,12 +11,12 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, fitted, planted_drives
 
-from proxytune.diagnosis import fitting
-from proxytune.diagnosis.coordinates import placed, span
-from proxytune.diagnosis.fitting import Fit, by_block, fit, loss_of, predictive, renoised, seen, slopes
-from proxytune.diagnosis.innovations import Whitener, whitener
-from proxytune.diagnosis.intervals import intervals
-from proxytune.diagnosis.replay import increments
+from proxytune.diagnosis.model import fitting
+from proxytune.diagnosis.model.coordinates import placed, span
+from proxytune.diagnosis.model.fitting import Fit, by_block, fit, loss_of, predictive, renoised, seen, slopes
+from proxytune.diagnosis.model.innovations import Whitener, whitener
+from proxytune.diagnosis.model.intervals import intervals
+from proxytune.diagnosis.model.replay import increments
 
 
 @pytest.fixture(scope="module")

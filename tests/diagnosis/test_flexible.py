@@ -14,11 +14,11 @@ sys.path.append(str(Path(__file__).parent))
 import hidden
 from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives
 
-from proxytune.diagnosis.candidates import MOTION_EFFECTS
-from proxytune.diagnosis.drives import gather
-from proxytune.diagnosis.flexible import curves
-from proxytune.diagnosis.round import LEAST_GAIN
-from proxytune.diagnosis.signals import hats, signal_groups
+from proxytune.diagnosis.measured.drives import gather
+from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS
+from proxytune.diagnosis.naming.flexible import curves
+from proxytune.diagnosis.naming.round import LEAST_GAIN
+from proxytune.diagnosis.naming.signals import hats, signal_groups
 from proxytune.effects import CATALOGUE, Cue
 
 SHORT = {"episodes": 3, "seconds": 30.0}

@@ -11,9 +11,9 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import NOISE, TRUTH, drives_of, planted_drives, planted_log
 
-from proxytune.diagnosis.floor import PoseNoise, noise_floor, pose_noise
-from proxytune.diagnosis.innovations import Noise
-from proxytune.diagnosis.windows import cut, strays
+from proxytune.diagnosis.horizon.floor import PoseNoise, noise_floor, pose_noise
+from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.model.innovations import Noise
 
 STILL = Noise((0.0, 0.0, 0.0), (0.003, 0.008))
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.group_choice import FIRMEST_ONLY, RIDGES, choose, sums
-from proxytune.diagnosis.window_slopes import Slopes
+from proxytune.diagnosis.horizon.window_slopes import Slopes
+from proxytune.diagnosis.remainder.group_choice import FIRMEST_ONLY, RIDGES, choose, sums
 
 PARTS = 12
 GROUPS = {"one": np.arange(3), "other": np.arange(3, 7), "speed_and_turn": np.arange(7, 15)}

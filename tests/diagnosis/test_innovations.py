@@ -13,8 +13,8 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import NOISE, planted_drives
 
-from proxytune.diagnosis.drives import relative
-from proxytune.diagnosis.innovations import (
+from proxytune.diagnosis.measured.drives import relative
+from proxytune.diagnosis.model.innovations import (
     FIRST_GUESS,
     HUBER,
     JITTER,
@@ -124,7 +124,7 @@ def test_noise_is_found_from_a_start_ten_times_too_large(drives):
 
 
 def test_the_innovations_of_a_model_that_is_right_are_white():
-    from proxytune.diagnosis.replay import increments
+    from proxytune.diagnosis.model.replay import increments
 
     drives = planted_drives({"trim": 0.03}, episodes=6, seconds=20.0)
     z = whitener(drives, NOISE).whiten(drives.measured - increments(drives, {"trim": 0.03})).reshape(-1, 3)

@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import drives_of, planted_log, with_poses
 
-from proxytune.diagnosis.latency import likeliest, measured_speeds, reaction, reaction_at
+from proxytune.diagnosis.measured.latency import likeliest, measured_speeds, reaction, reaction_at
 
 
 def answered(theta, change=lambda poses: poses):

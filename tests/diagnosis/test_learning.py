@@ -10,11 +10,11 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import TURNING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.fitting import seen
-from proxytune.diagnosis.found import Adopted, Found
-from proxytune.diagnosis.innovations import FIRST_GUESS
-from proxytune.diagnosis.learning import Learning, learn
-from proxytune.diagnosis.remainder import Remainder
+from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.innovations import FIRST_GUESS
+from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.remainder.learning import Learning, learn
+from proxytune.diagnosis.remainder.remainder import Remainder
 
 WRONG = Adopted("saturation", "", ("saturation.limit",), (), 100.0, 0.001, ())
 

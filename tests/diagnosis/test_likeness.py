@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 import hidden
 from planted import TRUTH, drives_of, fitted, planted_log
 
-from proxytune.diagnosis.likeness import two_robots
+from proxytune.diagnosis.naming.likeness import two_robots
 
 SHORT = {"episodes": 6, "seconds": 20.0}
 

@@ -12,11 +12,11 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import VEERING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis import lookalike as reading
-from proxytune.diagnosis.candidates import candidates
-from proxytune.diagnosis.lookalike import lookalike
-from proxytune.diagnosis.remainder import Remainder
-from proxytune.diagnosis.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.naming.candidates import candidates
+from proxytune.diagnosis.remainder.lookalike import lookalike
+from proxytune.diagnosis.remainder.remainder import Remainder
+from proxytune.diagnosis.remainder.remainder import lookalike as reading
 
 TAKEN = ("trim", "delay")
 FEW = ("lateral_slip", "turn_slip", "yaw_scrub")

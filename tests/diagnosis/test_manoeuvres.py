@@ -10,12 +10,12 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, ROBOT, TRUTH, driven_log, drives_of
 
-from proxytune.diagnosis.adoption import NATS_APART
-from proxytune.diagnosis.candidates import candidates
-from proxytune.diagnosis.fitting import seen
-from proxytune.diagnosis.found import Adopted, Found
 from proxytune.diagnosis.manoeuvres import LIBRARY, imagined, next_manoeuvre
-from proxytune.diagnosis.replay import increments
+from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.replay import increments
+from proxytune.diagnosis.naming.adoption import NATS_APART
+from proxytune.diagnosis.naming.candidates import candidates
+from proxytune.diagnosis.naming.found import Adopted, Found
 
 SIZES = {
     "dead_band": {"dead_band.width": 0.08, "dead_band.imbalance": 0.0},

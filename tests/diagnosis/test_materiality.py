@@ -9,10 +9,10 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
-from proxytune.diagnosis.fitting import seen
-from proxytune.diagnosis.found import Adopted, Found, Variant, lacking
-from proxytune.diagnosis.materiality import MATERIAL, Weighed, without_immaterial, worth
-from proxytune.diagnosis.windows import Ratio
+from proxytune.diagnosis.horizon.windows import Ratio
+from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.naming.found import Adopted, Found, Variant, lacking
+from proxytune.diagnosis.naming.materiality import MATERIAL, Weighed, without_immaterial, worth
 
 SCRUB, SLIP = (("yaw_scrub",),), (("lateral_slip",),)
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}

@@ -11,10 +11,10 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.offers import offered
-from proxytune.diagnosis.replay import twists_of
-from proxytune.effects.features import GROUPS
-from proxytune.effects.learnt_table import learnt_effect, learnt_theta
+from proxytune.diagnosis.model.replay import twists_of
+from proxytune.diagnosis.remainder.offers import offered
+from proxytune.effects.learnt.features import GROUPS
+from proxytune.effects.learnt.table import learnt_effect, learnt_theta
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import drives_of, planted_log, with_poses
 
-from proxytune.diagnosis.plausible import check_motion, check_units
+from proxytune.diagnosis.model.plausible import check_motion, check_units
 from proxytune.errors import LogError
 
 NOMINAL = {"trim": 0.0, "delay": 0.15}

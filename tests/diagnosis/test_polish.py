@@ -11,9 +11,9 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
-from proxytune.diagnosis.fitting import seen
-from proxytune.diagnosis.polish import HARMS, HELPS, fit_windows, held_out, horizons, polished
-from proxytune.diagnosis.windows import cut, strays
+from proxytune.diagnosis.horizon.polish import HARMS, HELPS, fit_windows, held_out, horizons, polished
+from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.model.fitting import seen
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +50,10 @@ def test_a_few_wild_poses_do_not_bend_the_parameters(drives):
 
 def test_long_logs_are_thinned(drives, monkeypatch):
     asked = []
-    monkeypatch.setattr("proxytune.diagnosis.polish.MOST_WINDOWS", 5)
+    monkeypatch.setattr("proxytune.diagnosis.horizon.polish.MOST_WINDOWS", 5)
     monkeypatch.setattr(
-        "proxytune.diagnosis.polish.misses", lambda d, t, w: asked.append(len(w.begin)) or np.zeros((len(w.window), 3))
+        "proxytune.diagnosis.horizon.polish.misses",
+        lambda d, t, w: asked.append(len(w.begin)) or np.zeros((len(w.window), 3)),
     )
     fit_windows(drives, TRUTH, DECLARED, cut(drives, 2.0))
     assert 3 <= max(asked) <= 5
@@ -89,7 +90,7 @@ def test_values_that_windows_do_not_mend_are_kept(drives):
 
 def test_values_that_would_do_harm_at_some_horizon_are_not_taken(drives, monkeypatch):
     poor = model(drives, trim=0.08, delay=0.2)
-    monkeypatch.setattr("proxytune.diagnosis.polish.HARMS", 0.01)
+    monkeypatch.setattr("proxytune.diagnosis.horizon.polish.HARMS", 0.01)
     assert polished(poor) == (poor, None)
 
 

@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import MANY, TURNING
 from planted import ROBOT, TRUTH, planted_log
 
-from proxytune.diagnosis.prediction import agreement, predict
+from proxytune.diagnosis.horizon.prediction import agreement, predict
 from proxytune.errors import LogError
 
 COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
-from proxytune.diagnosis.vehicle import robot_of
+from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.logs import read_log
 
 LOGS = Path(__file__).resolve().parents[2] / "../shared/data/logs"

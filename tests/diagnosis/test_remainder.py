@@ -11,8 +11,8 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import TURNING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.remainder import HARMS, HELPS, Remainder, _helps, remainder
-from proxytune.diagnosis.windows import Ratio, cut, strays
+from proxytune.diagnosis.horizon.windows import Ratio, cut, strays
+from proxytune.diagnosis.remainder.remainder import HARMS, HELPS, Remainder, _helps, remainder
 
 
 @pytest.fixture(scope="module")

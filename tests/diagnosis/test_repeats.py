@@ -12,8 +12,8 @@ sys.path.append(str(Path(__file__).parent))
 from manoeuvres import make_drives
 from planted import ROBOT, TRUTH, driven_log
 
-from proxytune.diagnosis.drives import gather
-from proxytune.diagnosis.repeats import repeated
+from proxytune.diagnosis.horizon.repeats import repeated
+from proxytune.diagnosis.measured.drives import gather
 
 
 def drives_of(log):

@@ -11,8 +11,8 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.drives import relative
-from proxytune.diagnosis.replay import (
+from proxytune.diagnosis.measured.drives import relative
+from proxytune.diagnosis.model.replay import (
     arrived_commands,
     between,
     disturbed,

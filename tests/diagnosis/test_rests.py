@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.rests import without_long_rests
+from proxytune.diagnosis.measured.rests import without_long_rests
 from proxytune.logs import Log, LogEpisode
 
 

@@ -11,8 +11,8 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives, planted_log, with_poses
 
-from proxytune.diagnosis.candidates import candidates
-from proxytune.diagnosis.screening import screen, stretches, without
+from proxytune.diagnosis.naming.candidates import candidates
+from proxytune.diagnosis.naming.screening import screen, stretches, without
 
 SHORT = {"episodes": 3, "seconds": 20.0}
 TAKEN = ("trim", "delay")

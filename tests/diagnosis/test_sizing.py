@@ -10,8 +10,8 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import TRUTH, fitted, planted_drives
 
-from proxytune.diagnosis.events import random_effects
-from proxytune.diagnosis.sizing import _inverted, sized
+from proxytune.diagnosis.model.events import random_effects
+from proxytune.diagnosis.model.sizing import _inverted, sized
 
 
 def told(effect, size, seed):

@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import ROBOT, TRUTH, planted_log, with_poses
 
-from proxytune.diagnosis.split import BLOCK_S, BLOCKS, split
+from proxytune.diagnosis.measured.split import BLOCK_S, BLOCKS, split
 from proxytune.errors import LogError
 
 

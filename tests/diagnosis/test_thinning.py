@@ -10,11 +10,11 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis import thinning
-from proxytune.diagnosis.replay import increments
-from proxytune.diagnosis.split import in_blocks
-from proxytune.diagnosis.thinning import joined, thinned
-from proxytune.diagnosis.windows import cut
+from proxytune.diagnosis.horizon.windows import cut
+from proxytune.diagnosis.measured import thinning
+from proxytune.diagnosis.measured.split import in_blocks
+from proxytune.diagnosis.measured.thinning import joined, thinned
+from proxytune.diagnosis.model.replay import increments
 
 
 @pytest.fixture(scope="module")

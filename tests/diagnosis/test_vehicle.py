@@ -11,8 +11,8 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import driven_log, planted_log
 
-from proxytune.diagnosis.commands import duties_of
-from proxytune.diagnosis.vehicle import robot_of
+from proxytune.diagnosis.measured.commands import duties_of
+from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.driving.robot import read_robot
 from proxytune.errors import LogError, SettingsError
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from proxytune.diagnosis.repeats import Repeated
+from proxytune.diagnosis.horizon.repeats import Repeated
+from proxytune.diagnosis.horizon.windows import Ratio
 from proxytune.diagnosis.verdict import bracket, verdict
-from proxytune.diagnosis.windows import Ratio
 
 KNOWN = Repeated(Ratio(0.97, (0.9, 1.05)), 0.0116, 0.8)
 BEYOND = Repeated(Ratio(0.5, (0.4, 0.6)), 0.006, 0.75)

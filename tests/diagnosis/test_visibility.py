@@ -10,8 +10,8 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import TRUTH, driven_log, drives_of, fitted, planted_drives
 
-from proxytune.diagnosis.candidates import MOTION_EFFECTS
-from proxytune.diagnosis.visibility import unseen
+from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS
+from proxytune.diagnosis.naming.visibility import unseen
 
 DECLARED = {"trim", "delay"}
 

@@ -11,8 +11,8 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import MANY, TURNING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.window_slopes import FITTED_S, POSES, compared, slopes_of
-from proxytune.effects.learnt_table import learnt_effect
+from proxytune.diagnosis.horizon.window_slopes import FITTED_S, POSES, compared, slopes_of
+from proxytune.effects.learnt.table import learnt_effect
 
 SIZE = 1e-4
 

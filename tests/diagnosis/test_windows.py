@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import TRUTH, drives_of, planted_drives, planted_log
 
-from proxytune.diagnosis.windows import SHORTEST, chosen, cut, ratio, rmse, strays
+from proxytune.diagnosis.horizon.windows import SHORTEST, chosen, cut, ratio, rmse, strays
 
 
 @pytest.fixture(scope="module")

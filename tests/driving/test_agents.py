@@ -8,9 +8,9 @@ from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.agents.perception import fit_lane, open_eye, white_pixels, yellow_pixels
 from proxytune.driving.agents.pilots import HALF_LANE_M, duties
 from proxytune.driving.cameras import GroundPlaneCamera
-from proxytune.driving.maps import SMALL_LOOP
+from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import read_robot
-from proxytune.driving.texture import draw_floor
 from proxytune.errors import SettingsError
 
 ROBOT = read_robot("duckiebot")

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from proxytune.driving import cameras
 from proxytune.driving.cameras import CAMERA_CHANNELS, SKY, CameraFigures, GroundPlaneCamera, ground_points
-from proxytune.driving.maps import SMALL_LOOP
-from proxytune.driving.texture import COLOURS, Floor, draw_floor
+from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.texture import COLOURS, Floor, draw_floor
 from proxytune.effects import PARAMETERS
 from proxytune.errors import SettingsError
 

@@ -10,9 +10,9 @@ import pytest
 from proxytune.driving.episode import TICK_HZ, Course, Sight, drive
 from proxytune.driving.expert import MEMORY, Expert
 from proxytune.driving.family import lane_following
-from proxytune.driving.lane import lane_point, off_map
-from proxytune.driving.maps import SMALL_LOOP as ROAD
 from proxytune.driving.planar import PlanarPlant
+from proxytune.driving.road.lane import lane_point, off_map
+from proxytune.driving.road.maps import SMALL_LOOP as ROAD
 from proxytune.driving.robot import read_robot
 from proxytune.driving.task import driving_score, start_pose
 from proxytune.effects import Stage, stage_chain

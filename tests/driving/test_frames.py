@@ -24,8 +24,8 @@ import pandas as pd
 import pytest
 
 from proxytune.driving.cameras import CameraFigures, GroundPlaneCamera, ground_points
-from proxytune.driving.maps import SMALL_LOOP
-from proxytune.driving.texture import draw_floor
+from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.texture import draw_floor
 
 LOG = Path(__file__).resolve().parents[2] / "../shared/data/logs/gym_duckietown_frames"
 CAMERA = CameraFigures(

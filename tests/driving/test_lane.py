@@ -8,8 +8,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from proxytune.driving.lane import lane_length, lane_point, lane_pose, off_map
-from proxytune.driving.maps import SMALL_LOOP as ROAD
+from proxytune.driving.road.lane import lane_length, lane_point, lane_pose, off_map
+from proxytune.driving.road.maps import SMALL_LOOP as ROAD
 
 TILE = ROAD.tile
 MIDDLE = np.array([ROAD.side / 2, ROAD.side / 2])

@@ -9,8 +9,8 @@ import pytest
 from proxytune.driving.bullet import renderer
 from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import SKY, CameraFigures, GroundPlaneCamera, ground_points
-from proxytune.driving.maps import SMALL_LOOP
-from proxytune.driving.texture import Floor, draw_floor
+from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.texture import Floor, draw_floor
 from proxytune.errors import SettingsError
 
 LEVEL = {"roll_deg": 0.0, "yaw_deg": 0.0, "k1": 0.0}

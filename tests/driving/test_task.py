@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.driving.lane import lane_length, lane_pose, off_map
-from proxytune.driving.maps import SMALL_LOOP as ROAD
+from proxytune.driving.road.lane import lane_length, lane_pose, off_map
+from proxytune.driving.road.maps import SMALL_LOOP as ROAD
 from proxytune.driving.task import METRICS, driving_score, score_trajectory, start_pose
 from proxytune.errors import EpisodeError
 

@@ -12,8 +12,8 @@ from proxytune.driving.agents.pupil import Pupil
 from proxytune.driving.episode import TICK_HZ, Course, Sight, drive
 from proxytune.driving.expert import Expert
 from proxytune.driving.family import LaneFollowing, lane_following
-from proxytune.driving.lane import off_map
-from proxytune.driving.maps import SMALL_LOOP as ROAD
+from proxytune.driving.road.lane import off_map
+from proxytune.driving.road.maps import SMALL_LOOP as ROAD
 from proxytune.driving.robot import read_robot
 from proxytune.driving.task import driving_score, start_pose
 from proxytune.errors import EpisodeError, SettingsError

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.driving.maps import SMALL_LOOP
-from proxytune.driving.texture import COLOURS, MARGIN, draw_floor
+from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.texture import COLOURS, MARGIN, draw_floor
 
 ROAD = SMALL_LOOP
 TILE = ROAD.tile

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.effects.bases import hats
-from proxytune.effects.features import GROUPS
+from proxytune.effects.learnt.bases import hats
+from proxytune.effects.learnt.features import GROUPS
 
 
 def test_a_hat_is_one_at_its_own_knot_and_nothing_at_the_others_and_at_rest():

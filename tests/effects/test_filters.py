@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
-from proxytune.effects.actuation import DriverMap, MotorLag, Trim, WheelGain
 from proxytune.effects.command import CommandQuantisation, Delay
-from proxytune.effects.image import Blur
-from proxytune.effects.wheels import per_wheel
+from proxytune.effects.motors.actuation import DriverMap, MotorLag, Trim, WheelGain
+from proxytune.effects.motors.wheels import per_wheel
+from proxytune.effects.sight.image import Blur
 
 NOMINAL: dict[str, float] = {}
 

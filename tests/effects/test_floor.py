@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
-from proxytune.effects.floor import FloorSlope, SlipperyPatch
+from proxytune.effects.body.floor import FloorSlope, SlipperyPatch
 
 RATE_HZ = 60.0
 PATCH = SlipperyPatch(0.5, 1.0, 0.0, 0.3)

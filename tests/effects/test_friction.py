@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
-from proxytune.effects.friction import Backlash, DeadBand, Stiction
+from proxytune.effects.motors.friction import Backlash, DeadBand, Stiction
 
 NOMINAL = {"full_speed": 0.6, "wheel_radius": 0.03}
 FULL_RAD_S = 20.0

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from proxytune.driving.robot import read_robot
 from proxytune.effects import Setting, effects_from
-from proxytune.effects.features import GROUPS
-from proxytune.effects.learnt import Curve, Learnt, Seen
+from proxytune.effects.learnt.effect import Curve, Learnt, Seen
+from proxytune.effects.learnt.features import GROUPS
 
 ROBOT = read_robot("duckiebot")
 RATE_HZ = 60.0

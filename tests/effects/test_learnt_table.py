@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from proxytune.driving.robot import read_robot
 from proxytune.effects import Model, effects_from, model_text, read_model
-from proxytune.effects.features import GROUPS
-from proxytune.effects.learnt import Curve, Learnt, Seen
-from proxytune.effects.learnt_table import LABEL, learnt_effect, learnt_theta
+from proxytune.effects.learnt.effect import Curve, Learnt, Seen
+from proxytune.effects.learnt.features import GROUPS
+from proxytune.effects.learnt.table import LABEL, learnt_effect, learnt_theta
 from proxytune.errors import SettingsError
 
 GOOD = """

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
-from proxytune.effects.load import SlewRate, ThermalFade
+from proxytune.effects.motors.load import SlewRate, ThermalFade
 
 RATE_HZ = 60.0
 

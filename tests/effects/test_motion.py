@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
-from proxytune.effects.floor import FloorSlope
-from proxytune.effects.measurement import HeadingOffset, MarkerOffset
-from proxytune.effects.motion import LateralSlip, TurnSlip, YawScrub
+from proxytune.effects.body.floor import FloorSlope
+from proxytune.effects.body.measurement import HeadingOffset, MarkerOffset
+from proxytune.effects.body.motion import LateralSlip, TurnSlip, YawScrub
 
 NOMINAL = {"effective_baseline": 0.16}
 RATE_HZ = 10.0

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.effects.past import low_passes, moved_since, play, rings, rolled_since
+from proxytune.effects.learnt.past import low_passes, moved_since, play, rings, rolled_since
 
 RATE_HZ = 10.0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
-from proxytune.effects.power import BatterySag, Saturation
+from proxytune.effects.motors.power import BatterySag, Saturation
 
 
 def run(effect, signal, rate_hz=10.0):

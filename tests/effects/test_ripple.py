@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
-from proxytune.effects.ripple import WheelRipple
+from proxytune.effects.motors.ripple import WheelRipple
 
 RATE_HZ, RADIUS, BASELINE = 600.0, 0.03, 0.16
 NOMINAL = {"wheel_radius": RADIUS, "effective_baseline": BASELINE}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.effects import Setting
-from proxytune.effects.turning import CrossCoupling, Understeer, YawLag
+from proxytune.effects.body.turning import CrossCoupling, Understeer, YawLag
 
 RATE_HZ = 60.0
 

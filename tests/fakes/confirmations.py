@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from proxytune.search.information import Information
-from proxytune.search.misfit import Misfit
-from proxytune.search.region import posterior_of
+from proxytune.search.knowledge.information import Information
+from proxytune.search.knowledge.misfit import Misfit
+from proxytune.search.knowledge.region import posterior_of
 from proxytune.study.confirmation import Candidate, Confirmation
 
 FITS, LACKS, UNTOLD = Misfit(1.0, 1.1, 0.4), Misfit(9.0, 1.1, 0.002), Misfit(1.0, None, None)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from proxytune.search.engines import why_not
+from proxytune.search.engines.registry import why_not
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Trial
 from proxytune.space import Interval, Space

@@ -1,6 +1,6 @@
 """A watcher that interrupts."""
 
-from proxytune.study.progress import Silent
+from proxytune.running.progress import Silent
 
 
 class Stopping(Silent):

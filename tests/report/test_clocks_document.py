@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.clocks import Clocks, Jump, Offset
-from proxytune.report.clocks_document import clocks_document, clocks_notes
+from proxytune.diagnosis.measured.clocks import Clocks, Jump, Offset
+from proxytune.report.diagnosis.clocks import clocks_document, clocks_notes
 
 NONE = Offset(0.0, (0.0, 0.0))
 

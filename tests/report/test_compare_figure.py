@@ -3,12 +3,12 @@ import io
 import numpy as np
 from rich.console import Console
 
-from proxytune.report.compare_document import compare_document, compare_lines, compare_tables, verdict
-from proxytune.report.compare_figure import LOOKS, compare_figure, spread
-from proxytune.search.comparison import Run, RunKey
-from proxytune.search.engines import ENGINES
-from proxytune.search.judgement import Judgement, Reading
-from proxytune.search.summary import Estimate, summarise
+from proxytune.comparison.judgement import Judgement, Reading
+from proxytune.comparison.runs import Run, RunKey
+from proxytune.comparison.summary import Estimate, summarise
+from proxytune.report.compare.document import compare_document, compare_lines, compare_tables, verdict
+from proxytune.report.compare.figure import LOOKS, compare_figure, spread
+from proxytune.search.engines.registry import ENGINES
 
 
 def runs(engine, *curves, reading=None):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from confirmations import confirmed
 
-from proxytune.report.convergence import convergence
+from proxytune.report.study.convergence import convergence
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
 from proxytune.study.result import result_of
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 
 

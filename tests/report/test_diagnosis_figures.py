@@ -11,21 +11,21 @@ sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
 import hidden
 
-from proxytune.diagnosis.candidates import MOTION_EFFECTS, candidates
 from proxytune.diagnosis.diagnose import diagnose
-from proxytune.diagnosis.found import Adopted
-from proxytune.diagnosis.innovations import huber
-from proxytune.diagnosis.replay import RANDOM_EFFECTS, disturbed, increments
-from proxytune.diagnosis.round import LEAST_GAIN
-from proxytune.diagnosis.signals import signal_groups
-from proxytune.diagnosis.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.model.innovations import huber
+from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, disturbed, increments
+from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, candidates
+from proxytune.diagnosis.naming.found import Adopted
+from proxytune.diagnosis.naming.round import LEAST_GAIN
+from proxytune.diagnosis.naming.signals import signal_groups
 from proxytune.driving.robot import read_robot
 from proxytune.effects import Means, theta_names
 from proxytune.effects.catalogue import CATALOGUE
-from proxytune.report.diagnosis_effect import effect_curve
-from proxytune.report.diagnosis_figures import SHOWN, diagnosis_figures
-from proxytune.report.diagnosis_means import ANY, GROUPS, MEASURED, retuned
-from proxytune.report.diagnosis_residual import MANY_WINDOWS, residual_map, residual_over_time, strayed
+from proxytune.report.diagnosis.effect_figure import effect_curve
+from proxytune.report.diagnosis.figures import SHOWN, diagnosis_figures
+from proxytune.report.diagnosis.means import ANY, GROUPS, MEASURED, retuned
+from proxytune.report.diagnosis.residual_figure import MANY_WINDOWS, residual_map, residual_over_time, strayed
 from proxytune.report.style import BEFORE
 
 WIDTH = 0.12
@@ -176,7 +176,7 @@ def test_a_path_on_the_map_is_where_the_window_was_measured(diagnosis, figures):
 
 
 def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monkeypatch):
-    monkeypatch.setattr("proxytune.report.diagnosis_residual.MANY_WINDOWS", 3)
+    monkeypatch.setattr("proxytune.report.diagnosis.residual_figure.MANY_WINDOWS", 3)
     both = {BEFORE: strayed(diagnosis)[BEFORE]}
     mesh = residual_map(diagnosis.parts.tested, both).axes[0].collections[0]
     shown = mesh.get_array().compressed()

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from proxytune.diagnosis.diagnosis import Estimate
-from proxytune.diagnosis.found import Adopted
-from proxytune.diagnosis.learning import Learning
+from proxytune.diagnosis.horizon.polish import Polish
+from proxytune.diagnosis.horizon.windows import Ratio
 from proxytune.diagnosis.manoeuvres import LIBRARY, Manoeuvre
-from proxytune.diagnosis.polish import Polish
-from proxytune.diagnosis.remainder import Remainder
-from proxytune.diagnosis.windows import Ratio
-from proxytune.report.diagnosis_notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
+from proxytune.diagnosis.naming.found import Adopted
+from proxytune.diagnosis.remainder.learning import Learning
+from proxytune.diagnosis.remainder.remainder import Remainder
+from proxytune.report.diagnosis.notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
 
 SLIP = Adopted("lateral_slip", "", ("lateral_slip",), (("lateral_slip",),), 75.2, 0.002, ())
 BAND = Adopted("dead_band", "left wheel", ("dead_band.width",), (("dead_band.width",),), 900.0, 0.002, ())

@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proxytune.report.importance_figure import importance_figure
-from proxytune.report.page import page
-from proxytune.report.search_lines import importance_line
-from proxytune.report.study_document import study_document
-from proxytune.search.importance import Importance
+from proxytune.report.study.document import study_document
+from proxytune.report.study.importance_figure import importance_figure
+from proxytune.report.study.page import page
+from proxytune.report.study.search_lines import importance_line
+from proxytune.search.knowledge.importance import Importance
+from proxytune.storage.store import Store
 from proxytune.study.result import result_of
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 

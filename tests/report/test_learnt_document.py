@@ -2,11 +2,11 @@
 
 import json
 
-from proxytune.diagnosis.learning import Learning, LearntError
-from proxytune.diagnosis.lookalike import Lookalike
-from proxytune.diagnosis.remainder import Remainder
-from proxytune.diagnosis.windows import Ratio, Rmse
-from proxytune.report.learnt_document import learnt_document, learnt_notes
+from proxytune.diagnosis.horizon.windows import Ratio, Rmse
+from proxytune.diagnosis.remainder.learning import Learning, LearntError
+from proxytune.diagnosis.remainder.lookalike import Lookalike
+from proxytune.diagnosis.remainder.remainder import Remainder
+from proxytune.report.diagnosis.learnt import learnt_document, learnt_notes
 
 RATIO = Ratio(0.5, (0.4, 0.6))
 ERROR = LearntError(2.0, Rmse(0.01, (0.009, 0.011)), Rmse(0.02, (0.01, 0.03)), RATIO)

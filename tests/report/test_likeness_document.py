@@ -2,8 +2,8 @@
 
 import json
 
-from proxytune.diagnosis.likeness import Unlike
-from proxytune.report.likeness_document import unlike_document, unlike_notes
+from proxytune.diagnosis.naming.likeness import Unlike
+from proxytune.report.diagnosis.likeness import unlike_document, unlike_notes
 
 FOUND = Unlike("left", (0.88, 1.02), ((0, 2), (1, 3)))
 NAMES = ("a", "b", "c", "d")

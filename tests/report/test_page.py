@@ -5,13 +5,13 @@ from dataclasses import replace
 import pytest
 from confirmations import TOLD, planted
 
-from proxytune.report.convergence import convergence
-from proxytune.report.finding import finding_of
-from proxytune.report.page import page
-from proxytune.report.verdict import sentence
+from proxytune.report.study.convergence import convergence
+from proxytune.report.study.finding import finding_of
+from proxytune.report.study.page import page
+from proxytune.report.study.verdict import sentence
 from proxytune.report.writing import save
+from proxytune.storage.store import Store
 from proxytune.study.result import result_of
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from confirmations import planted
 
-from proxytune.report.profiles_figure import density_of, profiles_figure
+from proxytune.report.study.profiles_figure import density_of, profiles_figure
+from proxytune.storage.store import Store
 from proxytune.study.result import result_of
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 

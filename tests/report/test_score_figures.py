@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.errors import RunError
-from proxytune.report.score_figures import FLIP_COLOURS, flipped_pairs, scatter
+from proxytune.report.scores.figures import FLIP_COLOURS, flipped_pairs, scatter
 from proxytune.report.writing import save
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import assess

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from confirmations import planted
 
-from proxytune.report.profiles_figure import profiles_figure
-from proxytune.report.search_figures import evaluations_figure
-from proxytune.search.knowledge import learn
+from proxytune.report.study.profiles_figure import profiles_figure
+from proxytune.report.study.search_figures import evaluations_figure
+from proxytune.search.knowledge.knowledge import learn
 from proxytune.search.proposer import Trial
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
 from proxytune.study.result import result_of
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 
 

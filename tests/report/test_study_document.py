@@ -7,20 +7,20 @@ import pytest
 from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
 
-from proxytune.report.finding import finding_of
-from proxytune.report.page import page
-from proxytune.report.search_lines import cut_lines, failure_lines, search_lines
-from proxytune.report.study_document import study_document
-from proxytune.report.study_table import floor_lines, misfit_line, study_table, worth_lines
-from proxytune.report.verdict import sentence
-from proxytune.search.engines import make_proposer
+from proxytune.report.study.document import study_document
+from proxytune.report.study.finding import finding_of
+from proxytune.report.study.page import page
+from proxytune.report.study.search_lines import cut_lines, failure_lines, search_lines
+from proxytune.report.study.table import floor_lines, misfit_line, study_table, worth_lines
+from proxytune.report.study.verdict import sentence
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
+from proxytune.storage.store import Store
 from proxytune.study.movement import Movement
 from proxytune.study.preflight import Preflight
-from proxytune.study.progress import Silent
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from proxytune.report.sweep_document import curve_csv, curve_document, curve_lines, curve_name, curve_tables, failures
-from proxytune.report.sweep_figure import bar_points, bars_figure, panels_figure, sweep_figure
-from proxytune.study.discrepancy import discrepancy_study
-from proxytune.study.progress import Silent
-from proxytune.study.store import Store
+from proxytune.report.sweep.document import curve_csv, curve_document, curve_lines, curve_name, curve_tables, failures
+from proxytune.report.sweep.figures import bar_points, bars_figure, panels_figure, sweep_figure
+from proxytune.running.progress import Silent
+from proxytune.storage.store import Store
 from proxytune.study.study import open_study
-from proxytune.study.sweep import curve_of, plan_sweep, run_sweep, sweep_interval, with_target
+from proxytune.sweep.discrepancy import discrepancy_study
+from proxytune.sweep.sweep import curve_of, plan_sweep, run_sweep, sweep_interval, with_target
 
 TRUTH = {"trim": 0.1, "delay": 0.12}
 

@@ -3,9 +3,9 @@ from dataclasses import replace
 import pytest
 from confirmations import TOLD, planted
 
-from proxytune.report.theta_table import theta_columns, theta_lines, theta_rows, told_rows
+from proxytune.report.study.theta_table import theta_columns, theta_lines, theta_rows, told_rows
+from proxytune.storage.store import Store
 from proxytune.study.result import result_of
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 

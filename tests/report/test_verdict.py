@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from confirmations import LACKS, TOLD, planted
 
-from proxytune.report.finding import Finding, Known, declared_of, finding_of
-from proxytune.report.verdict import sentence
+from proxytune.report.study.finding import Finding, Known, declared_of, finding_of
+from proxytune.report.study.verdict import sentence
 from proxytune.scores import Metric, ScoreTable
-from proxytune.search.information import Information
+from proxytune.search.knowledge.information import Information
+from proxytune.storage.store import Store
 from proxytune.study.result import result_of
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 from proxytune.usefulness import NoiseFloor
 from proxytune.usefulness.chance import Chance

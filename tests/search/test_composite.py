@@ -8,10 +8,10 @@ import pytest
 from steps import SPACE, WHOLE, goal, search, steps, whole
 
 from proxytune.errors import InputError, RunError
-from proxytune.search.composite import Composite, composed_scores
 from proxytune.search.design import design_point
-from proxytune.search.engines import make_proposer
-from proxytune.search.output_model import fit_outputs
+from proxytune.search.engines.composite import Composite, composed_scores
+from proxytune.search.engines.registry import make_proposer
+from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.proposer import Trial, with_failures_as_worst
 from proxytune.space import Interval, Space
 
@@ -47,7 +47,7 @@ def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
     code = (
         f"import sys; sys.path.append({str(FAKES)!r})\n"
         "from steps import WHOLE\n"
-        "from proxytune.search.composite import Composite\n"
+        "from proxytune.search.engines.composite import Composite\n"
         "from proxytune.search.proposer import Trial\n"
         "from proxytune.space import Interval, Space\n"
         f"print(repr(Composite(WHOLE).propose({SPACE!r}, {trials!r}, 4)))"

@@ -6,10 +6,10 @@ import pytest
 from steps import SPACE, WHOLE, lacking, search, steps
 
 from proxytune.errors import InputError
-from proxytune.search import engines
-from proxytune.search.after_design import AfterDesign
 from proxytune.search.design import design_point
-from proxytune.search.engines import ENGINES, NEEDS, STUDY_ENGINES, engine_code, make_proposer, why_not
+from proxytune.search.engines import registry as engines
+from proxytune.search.engines.after_design import AfterDesign
+from proxytune.search.engines.registry import ENGINES, NEEDS, STUDY_ENGINES, engine_code, make_proposer, why_not
 from proxytune.search.proposer import Trial
 
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None

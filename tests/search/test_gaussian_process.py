@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from steps import SPACE, search, steps
 
 from proxytune.search.design import design_point
-from proxytune.search.engines import make_proposer
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines.gaussian_process import GaussianProcess
+from proxytune.search.engines.registry import make_proposer
 
 
 @settings(derandomize=True, max_examples=4, deadline=None)
@@ -24,7 +24,7 @@ def test_a_proposal_does_not_depend_on_the_order_in_which_trials_are_told(order)
 def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
     trials = search(make_proposer("gp", 5), 8, seed=4)
     code = (
-        "from proxytune.search.gaussian_process import GaussianProcess as G\n"
+        "from proxytune.search.engines.gaussian_process import GaussianProcess as G\n"
         "from proxytune.search.proposer import Trial\n"
         "from proxytune.space import Interval, Space\n"
         f"print(repr(G().propose({SPACE!r}, {trials!r}, 4)))"

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from proxytune.search.design import design_point
-from proxytune.search.importance import importances
+from proxytune.search.knowledge.importance import importances
 from proxytune.search.proposer import Trial
 from proxytune.search.surrogate import fit_surrogate
 from proxytune.space import Interval, Space

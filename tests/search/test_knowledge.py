@@ -5,7 +5,7 @@ import pytest
 from steps import SPACE, goal
 
 from proxytune.search.design import design_point, from_unit, to_unit
-from proxytune.search.knowledge import learn
+from proxytune.search.knowledge.knowledge import learn
 from proxytune.search.proposer import Trial
 
 SENSITIVE = np.array([[3.0, 0.0], [0.0, 3.0], [2.0, 2.0], [1.0, -2.0]])

@@ -4,8 +4,8 @@ import numpy as np
 from steps import SPACE, goal, whole
 
 from proxytune.search.design import design_point, to_unit
-from proxytune.search.left_out import FEWEST, MARGIN, WIDENINGS, LeftOut, leave_out
-from proxytune.search.output_model import fit_outputs
+from proxytune.search.knowledge.left_out import FEWEST, MARGIN, WIDENINGS, LeftOut, leave_out
+from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.proposer import Trial
 
 AGENTS = np.random.default_rng(0).uniform(1.0, 4.0, (12, 2))

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from steps import SPACE, goal, whole
 
 from proxytune.search.design import design_point, to_unit
-from proxytune.search.likelihood import Likelihood, deviance, temper
-from proxytune.search.output_model import fit_outputs
+from proxytune.search.knowledge.likelihood import Likelihood, deviance, temper
+from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.proposer import Trial
 
 TRUTH = (0.12, 0.06)

@@ -5,7 +5,7 @@ import pytest
 from steps import SPACE, goal, whole
 
 from proxytune.search.design import design_point, from_unit, to_unit
-from proxytune.search.knowledge import learn
+from proxytune.search.knowledge.knowledge import learn
 from proxytune.search.proposer import Trial
 
 AGENTS = np.random.default_rng(0).uniform(1.0, 4.0, (12, 2))

@@ -11,8 +11,8 @@ from steps import SPACE, WHOLE, goal, search
 
 from proxytune.errors import InputError
 from proxytune.search.design import design_point, from_unit, to_unit
-from proxytune.search.engines import make_proposer
-from proxytune.search.outcomes import Outcomes
+from proxytune.search.engines.outcomes import Outcomes
+from proxytune.search.engines.registry import make_proposer
 from proxytune.search.proposer import Trial, propose_batch
 
 FAKES = Path(__file__).parent.parent / "fakes"
@@ -56,7 +56,7 @@ def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
         code = (
             f"import sys; sys.path.append({str(FAKES)!r})\n"
             "from steps import WHOLE\n"
-            "from proxytune.search.outcomes import Outcomes\n"
+            "from proxytune.search.engines.outcomes import Outcomes\n"
             "from proxytune.search.proposer import Trial\n"
             "from proxytune.space import Interval, Space\n"
             f"print(repr(Outcomes(WHOLE).propose({SPACE!r}, {trials!r}, 4)))"

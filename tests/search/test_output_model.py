@@ -8,7 +8,7 @@ from steps import SPACE
 
 from proxytune.errors import RunError
 from proxytune.search.design import design_point, to_unit
-from proxytune.search.output_model import fit_outputs
+from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.proposer import Trial
 from proxytune.search.surrogate import unit_array
 

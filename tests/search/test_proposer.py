@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from steps import SPACE, WHOLE, search, steps
 
 from proxytune.search.design import design_point
-from proxytune.search.engines import ENGINES, AfterDesign, make_proposer, why_not
-from proxytune.search.gaussian_process import GaussianProcess
+from proxytune.search.engines.gaussian_process import GaussianProcess
+from proxytune.search.engines.registry import ENGINES, AfterDesign, make_proposer, why_not
 from proxytune.search.proposer import Trial, batch_at, propose_batch, with_failures_as_worst
 
 HERE = [name for name in ENGINES if not why_not(name, composed=True)]

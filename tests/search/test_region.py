@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from proxytune.search.region import posterior_of
+from proxytune.search.knowledge.region import posterior_of
 
 
 def normal(centre, widths, correlation=0.0):

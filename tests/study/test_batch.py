@@ -9,16 +9,16 @@ from processes import episodes as stored_episodes
 from stopping import Stopping
 
 from proxytune.errors import SettingsError
-from proxytune.search.engines import STUDY_ENGINES, make_proposer
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import STUDY_ENGINES, make_proposer
 from proxytune.search.proposer import propose_batch
-from proxytune.study.composition import goal_of, trial_of
+from proxytune.storage.store import Store
 from proxytune.study.cutting import reference
-from proxytune.study.evaluate import evaluation, simulate
-from proxytune.study.progress import Silent
+from proxytune.study.evaluation import evaluation, simulate
+from proxytune.study.outputs import goal_of, trial_of
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
 from proxytune.study.stopping import stopped
-from proxytune.study.store import Store
 from proxytune.study.study import facts, open_study
 
 BATCH = 3

@@ -5,13 +5,15 @@ from dataclasses import replace
 import pytest
 from stopping import Stopping
 
+from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError
-from proxytune.report.study_document import study_document
-from proxytune.report.study_table import fresh_lines
-from proxytune.search.engines import make_proposer
-from proxytune.search.misfit import Misfit
+from proxytune.report.study.document import study_document
+from proxytune.report.study.table import fresh_lines
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import make_proposer
+from proxytune.search.knowledge.misfit import Misfit
+from proxytune.storage.store import Store
 from proxytune.study import confirmation
-from proxytune.study.composition import knowledge_of
 from proxytune.study.confirmation import (
     CANDIDATES,
     candidates,
@@ -19,13 +21,11 @@ from proxytune.study.confirmation import (
     most_episodes,
     run_confirmation,
 )
-from proxytune.study.evaluate import plan, table
-from proxytune.study.objective import FRESH
-from proxytune.study.progress import Silent
+from proxytune.study.evaluation import FRESH, plan, table
+from proxytune.study.outputs import knowledge_of
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
-from proxytune.study.store import Outcome, Store
 from proxytune.study.study import open_study
 from proxytune.usefulness import prpv
 

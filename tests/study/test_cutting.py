@@ -11,17 +11,18 @@ import pytest
 from partly_dead import ordered_study
 from stopping import Stopping
 
+from proxytune.running.progress import Silent
 from proxytune.scores import Metric
-from proxytune.search.engines import make_proposer
-from proxytune.study.composition import goal_of, trial_of
+from proxytune.search.engines.registry import make_proposer
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
 from proxytune.study.cutting import reference, spared
-from proxytune.study.evaluate import evaluation, simulate
+from proxytune.study.evaluation import evaluation, simulate
 from proxytune.study.history import as_trials, episodes_of
-from proxytune.study.progress import Silent
+from proxytune.study.outputs import goal_of, trial_of
 from proxytune.study.rescoring import rescored
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 
 BUDGET, ALL = 14, 8 * 3

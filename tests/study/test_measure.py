@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from proxytune.errors import EpisodeError
+from proxytune.running.progress import Silent
 from proxytune.study.measure import measure
-from proxytune.study.progress import Silent
 from proxytune.study.settings import read_study_settings
 from proxytune.usefulness import noise_floor
 

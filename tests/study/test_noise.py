@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from proxytune.study.composition import goal_of
+from proxytune.running.progress import Silent
+from proxytune.storage.store import Store
 from proxytune.study.noise import noise_of, shares_starts
+from proxytune.study.outputs import goal_of
 from proxytune.study.preflight import placement_pairs, run_preflight
-from proxytune.study.progress import Silent
 from proxytune.study.result import result_of
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 

@@ -7,13 +7,13 @@ import pytest
 from stopping import Stopping
 
 from proxytune.errors import EpisodeError
-from proxytune.search.engines import make_proposer
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
+from proxytune.storage.store import Store
 from proxytune.study.movement import LEVEL, LOOKS, judge
 from proxytune.study.preflight import PAIRS, most_episodes, preflight_of, run_preflight
-from proxytune.study.progress import Silent
 from proxytune.study.run import run_study
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 

@@ -4,11 +4,12 @@ import pytest
 
 from proxytune.errors import InputError, RunError
 from proxytune.scores import Metric
-from proxytune.study.evaluate import evaluation
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import evaluation
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import result_of
 from proxytune.study.settings import StopRules
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 
 COARSE = (Metric.parse("distance:max:20%"), Metric.parse("survival_time:max"))

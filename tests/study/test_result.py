@@ -3,12 +3,13 @@ from dataclasses import replace
 import pytest
 
 from proxytune.errors import RunError
-from proxytune.search.engines import make_proposer
-from proxytune.study.evaluate import simulate
-from proxytune.study.progress import Silent
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import make_proposer
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import simulate
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 from proxytune.usefulness import assess
 

@@ -12,11 +12,11 @@ import pytest
 from processes import ENVIRONMENT, FAKES, episodes, finished_episodes, start, trials, wait_for
 
 from proxytune.cli.main import main
-from proxytune.search.engines import STUDY_ENGINES, make_proposer
-from proxytune.study.composition import goal_of
-from proxytune.study.progress import Silent
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import STUDY_ENGINES, make_proposer
+from proxytune.storage.store import Store
+from proxytune.study.outputs import goal_of
 from proxytune.study.run import run_study
-from proxytune.study.store import Store
 from proxytune.study.study import open_study
 
 PER_TRIAL = 18

@@ -5,12 +5,13 @@ import pytest
 from stopping import Stopping
 
 from proxytune.errors import EpisodeError, RunError, SettingsError
-from proxytune.search.engines import make_proposer
-from proxytune.study.composition import goal_of
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import make_proposer
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
 from proxytune.study.history import as_trials
-from proxytune.study.progress import Silent
+from proxytune.study.outputs import goal_of
 from proxytune.study.run import as_stored, check_facts, run_study
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 
 

@@ -2,12 +2,13 @@ from dataclasses import replace
 
 import pytest
 
-from proxytune.search.engines import make_proposer
-from proxytune.study.progress import Silent
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import make_proposer
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
 from proxytune.study.stopping import stopped
-from proxytune.study.store import Store, TrialRecord
 from proxytune.study.study import open_study
 
 NEVER, ALWAYS = 1e-9, 1e9

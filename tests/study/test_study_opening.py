@@ -1,8 +1,8 @@
 import pytest
 
 from proxytune.errors import InputError
+from proxytune.storage.store import Store
 from proxytune.study.result import result_of
-from proxytune.study.store import Store
 from proxytune.study.study import changes, facts, open_study
 
 BAD = {

@@ -12,7 +12,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from proxytune.driving.cameras import SKY, CameraFigures, orientation
-from proxytune.driving.texture import Floor
+from proxytune.driving.road.texture import Floor
 from proxytune.errors import SettingsError
 
 OVERSAMPLING = 4

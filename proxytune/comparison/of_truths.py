@@ -1,0 +1,137 @@
+"""A study with a truth of its own for every seed: how well a search finds what made a target is then known."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from proxytune.comparison.of_study import StudyObjective
+from proxytune.domain import DomainFamily
+from proxytune.errors import EpisodeError
+from proxytune.running.progress import Watcher
+from proxytune.search.design import from_unit, to_unit
+from proxytune.search.goal import Goal
+from proxytune.search.proposer import Values
+from proxytune.space import Space
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import known_outcomes, plan, run_missing, table, told
+from proxytune.study.family import load_family
+from proxytune.study.measure import SEED_OFFSET
+from proxytune.study.study import Study
+
+MIDDLE = (0.1, 0.9)
+"""Truths are drawn from this part of every parameter's interval."""
+
+
+@dataclass(frozen=True)
+class TruthObjective:
+    """PRPV of a study whose target is simulated: in the domain instance θ* of the seed, under other placement noise.
+
+    Regret is PRPV above the truth's own: that of θ* in the proxy, the mean of the seed's and of fresh episodes. A
+    visited point that seems no worse is driven again in fresh episodes, so that it has to be lucky twice.
+
+    Attributes:
+        study: The study; its own target is not looked at.
+        store: Where all episodes are kept.
+        watcher: Is told of every episode.
+        lacking: What targets are measured in, one after the other by seed, if not in the proxy itself: families that
+            have effects which the proxy lacks.
+    """
+
+    study: Study
+    store: Store
+    watcher: Watcher
+    lacking: tuple[DomainFamily, ...] = ()
+    tolerance: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """The study's name."""
+        return self.study.settings.name
+
+    @property
+    def space(self) -> Space:
+        """The study's box."""
+        return self.study.settings.space
+
+    @property
+    def identity(self) -> str:
+        """All that its figures depend on, apart from the seed."""
+        proxy = StudyObjective(self.study, self.store, self.watcher, 0.0).identity_without(("target",))
+        return f"truths {MIDDLE} {proxy} {[family.identity for family in self.lacking]}"
+
+    def truth(self, seed: int) -> Values:
+        """The θ* that made the seed's target."""
+        return from_unit(self.space, np.random.default_rng([seed, 1]).uniform(*MIDDLE, len(self.space.intervals)))
+
+    def score(self, values: Values, seed: int) -> float | None:
+        """PRPV, with the placement noise of this seed; None where an agent has no episode that worked."""
+        return self._of(seed).score(values, seed)
+
+    def fresh_score(self, values: Values, seed: int) -> float | None:
+        """PRPV of episodes that no engine has seen."""
+        return self._of(seed).fresh_score(values, seed)
+
+    def outcome(self, values: Values, seed: int) -> Values | None:
+        """Every agent's mean metrics; None where an agent has no episode that worked."""
+        return self._of(seed).outcome(values, seed)
+
+    def goal(self, seed: int) -> Goal:
+        """The target's mean metrics, noise by this seed's pre-flight, and PRPV."""
+        return self._of(seed).goal(seed)
+
+    def regret(self, values: Values, seed: int, lowest: float = math.inf) -> float | None:
+        """PRPV above the truth's: where its own is not above that, the larger of its own and that of fresh episodes.
+
+        These are left out where its own is no lower than the lowest so far.
+        """
+        own, level = self.score(values, seed), self._level(seed)
+        if own is None or own > level or own - level >= lowest:
+            return None if own is None else own - level
+        fresh = self.fresh_score(values, seed)
+        return None if fresh is None else max(own, fresh) - level
+
+    def fresh_regret(self, values: Values, seed: int) -> float | None:
+        """PRPV of fresh episodes above the truth's, of the same fresh placements."""
+        found, at_truth = self.fresh_score(values, seed), self.fresh_score(self.truth(seed), seed)
+        return None if found is None or at_truth is None else found - at_truth
+
+    def error(self, values: Values, seed: int) -> float:
+        """Mean distance of the parameters from the true ones, in widths of the box."""
+        return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.truth(seed))).mean())
+
+    def _level(self, seed: int) -> float:
+        truth = self.truth(seed)
+        scores = [found for found in (self.score(truth, seed), self.fresh_score(truth, seed)) if found is not None]
+        if len(scores) < 2:
+            raise EpisodeError(
+                f"seed {seed}: the truth has no score in the proxy: an agent fails there from every start"
+            )
+        return float(np.mean(scores))
+
+    def _of(self, seed: int) -> StudyObjective:
+        """The study against this seed's target, which is measured when first asked for."""
+        family = self.lacking[seed % len(self.lacking)] if self.lacking else self.study.family
+        metrics = list(dict.fromkeys([*self.study.target.metrics, *family.metrics]))
+        place = replace(self.study, family=family, identity=family.identity)
+        planned = plan(place.settings, self.space.theta(self.truth(seed)), seed + SEED_OFFSET)
+        run_missing(place, self.store, planned, self.watcher, f"target of seed {seed}")
+        known = known_outcomes(place, self.store, planned)
+        for outcome in known.values():
+            if outcome.failure:
+                raise EpisodeError(f"target of seed {seed}: {told(outcome)}")
+        target = table([known[episode] for episode in planned]).select(metrics)
+        return StudyObjective(replace(self.study, target=target), self.store, self.watcher, 0.0)
+
+
+def lacking_families(study: Study, models: Sequence[Path]) -> tuple[DomainFamily, ...]:
+    """The study's family with the effects of each model besides its own.
+
+    Raises:
+        InputError: If a model cannot be used, or the proxy has a model already.
+    """
+    if models and study.settings.proxy:
+        raise study.settings.error("proxy", "is given, and a target cannot have two models; take it out to use --lacks")
+    return tuple(load_family(study.settings, model) for model in models)

@@ -1,0 +1,91 @@
+"""One engine on one seed of an objective, from the design to the end of its budget."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from proxytune.comparison.analytic import Objective
+from proxytune.comparison.judgement import Judgement, judge, judgement_from
+from proxytune.search.engines.registry import WITH_OUTPUTS, make_proposer
+from proxytune.search.proposer import Trial, Values
+
+
+@dataclass(frozen=True)
+class RunKey:
+    """What a run is a function of.
+
+    Attributes:
+        objective: Identity of the objective.
+        engine: Name of the engine.
+        seed: The instance of the problem, its noise, the design, and what the engine draws.
+        budget: How many evaluations.
+        initial: How many of them are the design, which all engines share.
+        code: Digest of the code that the engine's proposals depend on.
+    """
+
+    objective: str
+    engine: str
+    seed: int
+    budget: int
+    initial: int
+    code: str
+
+
+@dataclass(frozen=True)
+class Run:
+    """What an engine did, and what that is worth.
+
+    Attributes:
+        key: Which run it was.
+        visited: The points in order.
+        seconds: Mean time per proposal after the design.
+        judgement: What they are worth.
+    """
+
+    key: RunKey
+    visited: tuple[Values, ...]
+    seconds: float
+    judgement: Judgement
+
+
+def run_engine(objective: Objective, key: RunKey) -> Run:
+    """Spend the budget, and judge what came of it.
+
+    Raises:
+        InputError: If there is no such engine, or it needs a library that is not installed.
+        RunError: If no trial has a score.
+    """
+    goal = objective.goal(key.seed) if key.engine in WITH_OUTPUTS else None
+    proposer, space, spent = make_proposer(key.engine, key.initial, goal), objective.space, 0.0
+    trials: list[Trial] = []
+    for number in range(key.budget):
+        begun = time.perf_counter()
+        values = proposer.propose(space, trials, key.seed)
+        spent += time.perf_counter() - begun if number >= key.initial else 0.0
+        trials.append(Trial(values, objective.score(values, key.seed), objective.outcome(values, key.seed)))
+    visited = tuple(trial.values for trial in trials)
+    found = judge(objective, visited, key.seed, by_outputs=key.engine in WITH_OUTPUTS)
+    return Run(key, visited, spent / max(1, key.budget - key.initial), found)
+
+
+def judged_again(objective: Objective, run: Run) -> Run:
+    """A finished run, judged by the code of today: nothing is proposed, and nothing of a point is evaluated twice."""
+    found = judge(objective, run.visited, run.key.seed, by_outputs=run.key.engine in WITH_OUTPUTS)
+    return Run(run.key, run.visited, run.seconds, found)
+
+
+def run_document(run: Run) -> dict[str, Any]:
+    """A run as plain JSON."""
+    return asdict(run)
+
+
+def run_from(document: Mapping[str, Any]) -> Run:
+    """The run that was written so.
+
+    Raises:
+        KeyError: If something is missing.
+        TypeError: If something is of another kind.
+    """
+    visited = tuple(tuple(values) for values in document["visited"])
+    return Run(RunKey(**document["key"]), visited, document["seconds"], judgement_from(document["judgement"]))

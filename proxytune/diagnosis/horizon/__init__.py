@@ -1,0 +1,1 @@
+"""Prediction over windows: errors, floor, repeats, and parameters polished on them."""

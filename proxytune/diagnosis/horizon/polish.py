@@ -1,0 +1,215 @@
+"""Parameters fitted to windows of prediction, instead of to single steps.
+
+Single steps tell most where the model is right. Where it lacks something, parameters that are best for one step can be
+poor over seconds: fitted to windows they make up for what they can.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from proxytune.diagnosis.horizon.windows import (
+    Ratio,
+    Windows,
+    blocks_of,
+    chosen,
+    cut,
+    measured_since,
+    misses,
+    ratio,
+    strays,
+)
+from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
+from proxytune.diagnosis.model.coordinates import Coordinate, placed, smooth, span
+from proxytune.diagnosis.model.fitting import STEP, Fit, seen
+from proxytune.space import Theta
+
+HORIZONS_S = (1.0, 2.0, 5.0)
+"""Horizons at which errors are compared."""
+
+FITTED_S = (5.0, 2.0)
+"""Windows of these lengths are fitted to."""
+
+FEWEST_BLOCKS = 3
+"""No error is told over windows from fewer blocks: it would have no interval."""
+
+FOLDS = 4
+"""Blocks are dealt out to so many folds; each is predicted by what was fitted to the others."""
+
+ROBUST = 1.5
+"""Misses beyond so many times the median count linearly."""
+
+MOST_WINDOWS = 400
+MOST_TRIALS = 20
+"""A fit takes no more windows, and looks no more often: it stays within seconds on long logs."""
+
+HELPS, HARMS = 0.98, 1.02
+"""Fitted values are taken where they lower the held-out error to this share at some horizon and raise it so far at
+none: where they change nothing, single steps tell the parameters more sharply."""
+
+
+class Polish(NamedTuple):
+    """What fitting to windows came to.
+
+    Attributes:
+        horizon_s: Length of the windows [s].
+        ratios: Held-out error of the new values by that of the old ones, by horizon [s].
+        intervals: 95 % intervals of the new values, by name in θ; none of what was not fitted to windows.
+    """
+
+    horizon_s: float
+    ratios: Mapping[float, Ratio]
+    intervals: Mapping[str, tuple[float, float]]
+
+
+def horizons(drives: Drives) -> tuple[float, ...]:
+    """The horizons of which these drives have windows in enough blocks."""
+    return tuple(h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= FEWEST_BLOCKS)
+
+
+def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
+    """θ with its free coordinates where the model misses the poses in these windows least.
+
+    Args:
+        drives: The measured drives.
+        theta: Where to start.
+        free: What is fitted, except where it changes the motion by steps: single steps tell that far more sharply.
+        windows: Windows over the drives; long logs are thinned to MOST_WINDOWS of them.
+    """
+    fitted = smooth(free)
+    if not fitted or len(windows.begin) == 0:
+        return dict(theta)
+    problem = _problem(drives, theta, fitted, _thinned(windows))
+    found = least_squares(
+        problem.left,
+        problem.start,
+        problem.slopes,
+        (0.0, 1.0),
+        loss="soft_l1",
+        f_scale=problem.scale,
+        ftol=1e-6,
+        max_nfev=MOST_TRIALS,
+    )
+    return problem.at(np.clip(found.x, 0.0, 1.0))
+
+
+class _Problem(NamedTuple):
+    """A least-squares problem in fractions of the coordinates' ranges."""
+
+    drives: Drives
+    theta: Theta
+    free: tuple[Coordinate, ...]
+    windows: Windows
+    weights: Floats
+
+    @property
+    def start(self) -> Floats:
+        low, high = np.array([span(coordinate) for coordinate in self.free]).T
+        here = np.array([self.theta[coordinate[0]] for coordinate in self.free])
+        return np.asarray(np.clip((here - low) / (high - low), 1e-6, 1.0 - 1e-6))
+
+    @property
+    def scale(self) -> float:
+        return max(1e-6, ROBUST * float(np.median(np.abs(self.left(self.start)))))
+
+    def at(self, fractions: Floats) -> dict[str, float]:
+        low, high = np.array([span(coordinate) for coordinate in self.free]).T
+        return placed(self.theta, self.free, low + fractions * (high - low))
+
+    def left(self, fractions: Floats) -> Floats:
+        return np.asarray((misses(self.drives, self.at(fractions), self.windows) * self.weights).ravel())
+
+    def slopes(self, fractions: Floats) -> Floats:
+        here, columns = self.left(fractions), []
+        for number in range(len(fractions)):
+            step = STEP if fractions[number] + STEP <= 1.0 else -STEP
+            moved = fractions.copy()
+            moved[number] += step
+            columns.append((self.left(moved) - here) / step)
+        return np.stack(columns, axis=1)
+
+
+def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows) -> _Problem:
+    """Headings count as the way that they lead astray over the median chord."""
+    chord = float(np.median(np.hypot(*measured_since(drives, windows)[:, :2].T)))
+    return _Problem(drives, theta, free, windows, np.array((1.0, 1.0, max(chord, 1e-3))))
+
+
+def _thinned(windows: Windows) -> Windows:
+    every = -(-len(windows.begin) // MOST_WINDOWS)
+    return chosen(windows, np.arange(len(windows.begin)) % every == 0)
+
+
+def held_out(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
+    """Squared distance [m²] at every compared pose, by horizon [s].
+
+    No pose is predicted by what was fitted to its own fold.
+
+    Args:
+        drives: The measured drives.
+        theta: Where fits start.
+        free: What is fitted.
+        fitted_s: Length of the windows that are fitted to [s].
+    """
+    fold = _folds(drives)
+    windows = cut(drives, fitted_s)
+    asked = {horizon: cut(drives, horizon) for horizon in horizons(drives)}
+    found = {horizon: np.zeros(len(one.increment)) for horizon, one in asked.items()}
+    for own in range(fold.max() + 1):
+        values = fit_windows(drives, theta, free, chosen(windows, fold[windows.begin] != own))
+        for horizon, one in asked.items():
+            here = fold[one.begin] == own
+            if here.any():
+                found[horizon][here[one.window]] = strays(drives, values, chosen(one, here))[:, 0] ** 2
+    return found
+
+
+def _folds(drives: Drives) -> Whole:
+    """The fold of each increment (N,)."""
+    return np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
+
+
+def compared(drives: Drives, one: Mapping[float, Floats], other: Mapping[float, Floats]) -> dict[float, Ratio]:
+    """The ratio of two errors over the same windows, by horizon [s]."""
+    return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h))) for h, squares in one.items()}
+
+
+def polished(fitted: Fit) -> tuple[Fit, Polish | None]:
+    """The model with its parameters fitted to windows, if held-out windows show that this helps and nowhere harms."""
+    drives = fitted.drives
+    plain = {h: strays(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
+    best: tuple[float, float, dict[float, Ratio]] | None = None
+    for length in [s for s in FITTED_S if s in plain]:
+        ratios = compared(drives, held_out(drives, fitted.theta, fitted.free, length), plain)
+        values = [one.value for one in ratios.values()]
+        if min(values) < HELPS and max(values) <= HARMS and (best is None or sum(values) < best[0]):
+            best = (sum(values), length, ratios)
+    if best is None:
+        return fitted, None
+    windows = cut(drives, best[1])
+    theta = fit_windows(drives, fitted.theta, fitted.free, windows)
+    polish = Polish(best[1], best[2], _intervals(drives, theta, smooth(fitted.free), windows))
+    return seen(drives, theta, fitted.free, fitted.noise), polish
+
+
+def _intervals(
+    drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows
+) -> dict[str, tuple[float, float]]:
+    """95 % intervals from the spread between blocks (sandwich)."""
+    problem = _problem(drives, theta, free, windows)
+    here = problem.start
+    left, slopes, scale = problem.left(here), problem.slopes(here), problem.scale
+    pull = slopes * (left / np.sqrt(1.0 + (left / scale) ** 2))[:, None]
+    curve = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
+    _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)
+    pulls = np.stack([np.bincount(block, column) for column in pull.T], axis=1)
+    inverse = np.linalg.pinv(curve, hermitian=True)
+    spread = inverse @ (pulls.T @ pulls) @ inverse * len(pulls) / max(1, len(pulls) - len(free))
+    found: dict[str, tuple[float, float]] = {}
+    for coordinate, variance in zip(free, np.diag(spread), strict=True):
+        low, high = span(coordinate)
+        half = 1.96 * float(np.sqrt(variance)) * (high - low)
+        found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
+    return found

@@ -1,0 +1,44 @@
+"""Coordinates of a fit: one or several parameters of θ that share a value, within their range."""
+
+from collections.abc import Mapping, Sequence
+
+from proxytune.diagnosis.measured.drives import Floats
+from proxytune.effects import CATALOGUE, PARAMETERS, effect_of
+from proxytune.space import Theta
+
+Coordinate = tuple[str, ...]
+"""Parameters of θ that share one value."""
+
+
+EDGE = 0.01
+"""A value this near to an end of its range, as a share of the range, is at the end."""
+
+
+def span(coordinate: Coordinate) -> tuple[float, float]:
+    """Lowest and highest value of a coordinate."""
+    return PARAMETERS[coordinate[0]].low, PARAMETERS[coordinate[0]].high
+
+
+def placed(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:
+    """θ with its free coordinates at these values."""
+    given = {name: float(value) for names, value in zip(free, values, strict=True) for name in names}
+    return {**theta, **given}
+
+
+def at_edge(name: str, value: float, figures: Mapping[str, float]) -> bool:
+    """Whether a value lies at an end of its parameter's range that is not neutral."""
+    parameter = PARAMETERS[name]
+    reach = EDGE * (parameter.high - parameter.low)
+    ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(figures)]
+    return any(abs(value - end) <= reach for end in ends)
+
+
+def is_stepwise(coordinate: Coordinate) -> bool:
+    """Whether it changes the motion by steps: no slope leads to its best value, so that is scanned for."""
+    trace = CATALOGUE[effect_of(coordinate[0])].trace
+    return trace is not None and trace.stepwise
+
+
+def smooth(free: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
+    """Those of the coordinates that do not."""
+    return tuple(coordinate for coordinate in free if not is_stepwise(coordinate))

@@ -1,0 +1,186 @@
+"""Effects that strike at random: what they do to single commands, weighed as a mixture over all commands.
+
+A mean model cannot see them: a command that is lost now and then changes the motion after it, not on average.
+"""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, sum_by
+from proxytune.diagnosis.model.fitting import Fit
+from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, between, paths
+from proxytune.effects.trace import Draws
+
+MEMORY_S = 2.5
+"""A command moves nothing any more after so long."""
+
+GRID = 25
+"""Sizes that are tried at first, evenly in their logarithm."""
+
+SHIFTS = 99
+"""How often the null distribution is drawn."""
+
+
+class Responses(NamedTuple):
+    """What would have happened had a command been lost: one row per command that changed anything.
+
+    Attributes:
+        pull: Inner product of the change of the innovations with the innovations.
+        size: Inner product of the change with itself.
+        others: The pull had the innovations been others (columns, commands).
+    """
+
+    pull: Floats
+    size: Floats
+    others: Floats
+
+
+class RandomEffect(NamedTuple):
+    """A random effect weighed.
+
+    Attributes:
+        effect: Its name in the catalogue.
+        parameter: The name of its parameter in θ.
+        value: Its likeliest size.
+        interval: Where the size lies; all sizes that are looked for, until `sized` has told.
+        gain: Its gain in log-likelihood beyond what chance gives on average [nats].
+        p_value: How often chance gains as much.
+    """
+
+    effect: str
+    parameter: str
+    value: float
+    interval: tuple[float, float]
+    gain: float
+    p_value: float
+
+
+def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
+    """Every effect that draws, weighed on what the model leaves over."""
+    z = fitted.innovations.reshape(-1, 3)
+    shifts = _shifts(len(z), seed)
+    answered = responses(fitted, np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1))
+    if len(answered.size) == 0:
+        return ()
+    rate = fitted.drives.rate_hz
+    return tuple(_weighed(name, draws, rate, answered) for name, draws in RANDOM_EFFECTS.items())
+
+
+def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats:
+    """Log-likelihood ratio of being late by one of these times, in commands, with these log-weights."""
+    ratios = [w - step * pull - 0.5 * step**2 * size for step, w in zip(late, weight, strict=True)]
+    return np.asarray(np.logaddexp.reduce(ratios, axis=0))
+
+
+def _weighed(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
+    best, gain = likeliest_size(draws, rate_hz, answered.pull, answered.size)
+    chance = np.max([_ratio(draws, rate_hz, size, answered.others, answered.size) for size in _grid(draws)], axis=0)
+    p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
+    return RandomEffect(effect, effect, best, draws.sizes, gain - max(0.0, float(chance.mean())), p_value)
+
+
+def likeliest_size(draws: Draws, rate_hz: float, pull: Floats, energy: Floats) -> tuple[float, float]:
+    """The size of an effect that the responses of commands (commands,) speak for most, and what it gains [nats]."""
+    grid = _grid(draws)
+    here = int(np.argmax([_ratio(draws, rate_hz, size, pull, energy) for size in grid]))
+    ends = np.log((grid[max(0, here - 1)], grid[min(len(grid) - 1, here + 1)]))
+    found = minimize_scalar(
+        lambda log: -float(_ratio(draws, rate_hz, float(np.exp(log)), pull, energy)),
+        bounds=(float(ends[0]), float(ends[1])),
+        method="bounded",
+    )
+    return float(np.exp(found.x)), -float(found.fun)
+
+
+def _grid(draws: Draws) -> Floats:
+    return np.geomspace(*draws.sizes, GRID)
+
+
+def _ratio(draws: Draws, rate_hz: float, size: float, pull: Floats, energy: Floats) -> Floats:
+    """The log-likelihood ratio of an effect of this size, over all commands (…,)."""
+    late = draws.lateness(size, rate_hz)
+    return np.asarray(_mixture(late.commands, late.log_weights, pull, energy).sum(axis=-1))
+
+
+def responses(fitted: Fit, others: Floats) -> Responses:
+    """What the loss of each command would have changed.
+
+    Commands far apart are lost together, so that one replay tells of many.
+
+    Args:
+        fitted: The model, and what it leaves over.
+        others: Other innovations, for which the same is asked (3N, columns).
+    """
+    drives = fitted.drives
+    changed, phase = _changed(drives)
+    here = between(drives, paths(drives, fitted.theta))
+    found = [_lost_together(fitted, changed[phase == number], here, others) for number in np.unique(phase)]
+    if not found:
+        return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
+    pull, size, pulls = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
+    kept = size > 1e-3
+    return Responses(pull[kept], size[kept], pulls[:, kept])
+
+
+def _changed(drives: Drives) -> tuple[Whole, Whole]:
+    """Episode and tick of every command that differs from the one before it (C, 2), and its phase (C,).
+
+    Those of one phase are at least MEMORY_S apart: of commands closer together than usual the first counts.
+    """
+    before = np.concatenate((drives.rest[:, None], drives.duties[:, :-1]), axis=1)
+    found = np.argwhere(drives.issued & np.any(np.abs(drives.duties - before) > 1e-9, axis=-1))
+    number = np.floor(found[:, 1] * drives.rate_hz / drives.tick_hz + 1e-6).astype(int)
+    _, first = np.unique(found[:, 0] * (number.max(initial=0) + 1) + number, return_index=True)
+    return found[first], number[first] % math.ceil(MEMORY_S * drives.rate_hz)
+
+
+def _without(drives: Drives, lost: Whole) -> Floats:
+    """Duties without some commands: the one before stays in force until the next."""
+    duties = drives.duties.copy()
+    for episode, tick in lost:
+        later = np.flatnonzero(drives.issued[episode, tick + 1 :])
+        end = tick + 1 + int(later[0]) if len(later) else duties.shape[1]
+        duties[episode, tick:end] = drives.rest[episode] if tick == 0 else drives.duties[episode, tick - 1]
+    return duties
+
+
+def _lost_together(fitted: Fit, lost: Whole, here: Floats, others: Floats) -> tuple[Floats, Floats, Floats]:
+    """Pull, size and other pulls of commands of one phase."""
+    drives = fitted.drives
+    other = replace(drives, duties=_without(drives, lost))
+    change = fitted.whiten.whiten(here - between(other, paths(other, fitted.theta)))
+    label = np.repeat(_label(drives, lost), 3)
+    size = sum_by(label, change**2, len(lost))
+    both = np.concatenate((fitted.innovations[:, None], others), axis=1)
+    pulls = sum_by(label, change[:, None] * both, len(lost))
+    pulls /= _loudness(label, change, both, pulls / (size[:, None] + 1e-12))
+    return pulls[:, 0], size, pulls[:, 1:].T
+
+
+def _loudness(label: Whole, change: Floats, innovations: Floats, share: Floats) -> Floats:
+    """Standard deviation of what the loss of a command does not explain, where it acts, at least 1 (commands, columns).
+
+    After a command all motion may be harder to predict: only what points its way speaks for its loss.
+    """
+    weight = np.abs(change)
+    count = len(share)
+    total = sum_by(label, weight, count)[:, None] + 1e-12
+    along = sum_by(label, (weight * change)[:, None] * innovations, count)
+    cubes = sum_by(label, weight * change**2, count)[:, None]
+    energy = sum_by(label, weight[:, None] * innovations**2, count) - 2.0 * share * along + share**2 * cubes
+    return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
+
+
+def _label(drives: Drives, lost: Whole) -> Whole:
+    """Which lost command each increment comes after, −1 where none (N,)."""
+    length = drives.duties.shape[1]
+    at = np.searchsorted(lost @ (length, 1), drives.episode * length + drives.last - 1, side="right") - 1
+    return np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
+
+
+def _shifts(length: int, seed: int) -> Whole:
+    return np.random.default_rng(seed).integers(length // 20 + 1, length - length // 20, size=SHIFTS)

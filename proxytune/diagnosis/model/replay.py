@@ -1,0 +1,209 @@
+"""What a model says of the recorded commands: the planar plant over whole batches of drives."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, relative
+from proxytune.driving.drivetrain import Drivetrain, drivetrain
+from proxytune.driving.planar import integrate
+from proxytune.effects import CATALOGUE, PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
+from proxytune.effects.learnt.effect import Learnt
+from proxytune.effects.trace import Draws
+from proxytune.space import Theta
+
+RANDOM_EFFECTS: Mapping[str, Draws] = {
+    name: effect.trace.draws for name, effect in CATALOGUE.items() if effect.trace and effect.trace.draws
+}
+"""Effects that draw, each of one parameter; to first order they make commands late by their mean lateness."""
+
+
+def lateness(theta: Theta, rate_hz: float) -> float:
+    """How late random effects make commands on average [s], at this many commands per second."""
+    drawn = ((draws, theta.get(name, 0.0)) for name, draws in RANDOM_EFFECTS.items())
+    return sum((draws.lateness(value, rate_hz).mean_s for draws, value in drawn if value > 0.0), 0.0)
+
+
+def expected(theta: Theta, rate_hz: float) -> dict[str, float]:
+    """θ without random effects, their mean lateness added to the delay."""
+    late = lateness(theta, rate_hz)
+    calm = {name: value for name, value in theta.items() if name not in RANDOM_EFFECTS}
+    if late > 0.0:
+        calm["delay"] = min(PARAMETERS["delay"].high, calm.get("delay", 0.0) + late)
+    return calm
+
+
+def paths(drives: Drives, theta: Theta) -> Floats:
+    """The measured poses that a model expects from the origin (E, T + 1, 3), each episode in one go.
+
+    Args:
+        drives: The commands.
+        theta: Values of effects besides the robot's nominal ones.
+
+    Raises:
+        SettingsError: If a value is out of its parameter's bounds.
+    """
+    return _seen(drives, twists_of(drives, theta), _model(drives, theta)[1])
+
+
+def twists_of(drives: Drives, theta: Theta) -> Floats:
+    """The motion that a model asks of the plant, tick by tick (E, T, 3): [m/s], [m/s], [rad/s]."""
+    train, _ = _model(drives, theta)
+    return np.asarray(train.apply(drives.duties, train.begin(_setting(drives)))[0])
+
+
+def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
+    """Poses after each tick (E, T, 3) from the origin on, as a model's tracker sees them (E, T + 1, 3)."""
+    return _tracked(drives, poses, _model(drives, theta)[1])
+
+
+def increments(drives: Drives, theta: Theta) -> Floats:
+    """The motion between the measured poses (N, 3): forward, left [m], turn [rad], in the body frame."""
+    return between(drives, paths(drives, theta))
+
+
+def between(drives: Drives, walked: Floats) -> Floats:
+    """The increments of paths (E, T + 1, 3) between the measured poses."""
+    return relative(walked[drives.episode, drives.first], walked[drives.episode, drives.last])
+
+
+def moved_by(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+    """The increments that these twists of every tick (E, T, 3) make, as a model's tracker sees them."""
+    return between(drives, _seen(drives, twists, _model(drives, theta)[1]))
+
+
+def disturbed(drives: Drives, theta: Theta, extra: Floats) -> Floats:
+    """The increments when something adds to the twist of every tick (E, T, 3)."""
+    return moved_by(drives, theta, twists_of(drives, theta) + extra)
+
+
+def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
+    """Measured poses from windows' beginnings on, each from the origin (W, length + 1, 3).
+
+    A window starts from the measured pose, and from measured wheel speeds where there are any. The commands before it
+    count; nothing measured after it does.
+
+    Args:
+        drives: The commands.
+        theta: Values of effects besides the robot's nominal ones.
+        begin: The increments at whose beginnings the windows start (W,).
+        length: Ticks to go on for; commands after an episode's end are those at its end.
+    """
+    return _seen(drives, window_twists(drives, theta, begin, length), _model(drives, theta)[1])
+
+
+def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
+    """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s]."""
+    train, _ = _model(drives, theta)
+    setting = _setting(drives)
+    memory = train.begin(setting)
+    arrived = np.clip(train.command.apply(drives.duties, memory.command)[0], -1.0, 1.0)
+    episode, start = drives.episode[begin], drives.first[begin]
+    ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
+    whole = train.actuation.apply(arrived, memory.actuation)[0]
+    if drives.wheels is None:
+        wheels = whole[episode[:, None], ticks]
+    else:
+        turning = replace(setting, rest=drives.wheels[episode, start])
+        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
+    ahead = _ahead(drives, begin, _before(drives, theta, train))
+    driven = replace(setting, rest=np.zeros((len(whole), 3)))
+    past = train.motion.begin_amid(ahead, driven, train.ideal(whole), episode, start)
+    return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
+
+
+def window_features(
+    drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
+) -> list[tuple[Floats, Floats]]:
+    """What each weight of a learnt effect beside a model adds to its motion in such windows, curve by curve.
+
+    Returns:
+        Features (W, length, knots) and the twist that one unit of them makes (3,).
+    """
+    whole = twists_of(drives, theta)
+    past = learnt.recall(_ahead(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
+    return learnt.features(window_twists(drives, theta, begin, length), past)
+
+
+def tracked(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+    """Measured poses, from the origin on, that twists lead to (W, length + 1, 3)."""
+    return _seen(drives, twists, _model(drives, theta)[1])
+
+
+def _ahead(drives: Drives, begin: Whole, before: Floats) -> Setting:
+    """What the motion effects of windows are told: the motion before each one, where it is, and how its wheels are."""
+    episode, start = drives.episode[begin], drives.first[begin]
+    return replace(
+        _setting(drives),
+        rest=before[episode, start],
+        headings=drives.poses[begin, 0, 2:],
+        places=drives.poses[begin, :1, :2],
+        angles=drives.angles[episode, start][:, None],
+    )
+
+
+def _before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:
+    """The motion in the tick before each (E, T, 3), as effects that remember it need it; none before the first."""
+    still = np.zeros((*drives.duties.shape[:2], 3))
+    if train.motion.effects:
+        still[:, 1:] = twists_of(drives, theta)[:, :-1]
+    return still
+
+
+def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
+    """The wheel speeds that a model says (E, T, 2), as fractions of full speed."""
+    return _wheel_speeds(drives, _model(drives, theta)[0], _setting(drives))
+
+
+def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
+    """The same with random effects as one seed draws them, instead of as expected."""
+    robot = drives.robot
+    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
+    return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
+
+
+def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
+    """The paths (E, T + 1, 3) with random effects as one seed draws them, instead of as expected."""
+    robot = drives.robot
+    effects = effects_from({**robot.theta, **theta}, robot.figures)
+    train = drivetrain(robot, effects)
+    twists, _ = train.apply(drives.duties, train.begin(replace(_setting(drives), seed=seed)))
+    return _seen(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
+
+
+def _wheel_speeds(drives: Drives, train: Drivetrain, setting: Setting) -> Floats:
+    memory = train.begin(setting)
+    arrived, _ = train.command.apply(drives.duties, memory.command)
+    return np.asarray(train.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)[0])
+
+
+def arrived_commands(drives: Drives, theta: Theta) -> Floats:
+    """The commands that reach the motors (E, T, 2)."""
+    train, _ = _model(drives, theta)
+    return np.asarray(train.command.apply(drives.duties, train.begin(_setting(drives)).command)[0])
+
+
+def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
+    robot = drives.robot
+    effects = effects_from(expected({**robot.theta, **theta}, drives.rate_hz), robot.figures)
+    return drivetrain(robot, effects), stage_chain(effects, Stage.MEASUREMENT)
+
+
+def _setting(drives: Drives) -> Setting:
+    nominal: Mapping[str, float] = {**drives.robot.figures, "control_rate": drives.rate_hz}
+    setting = Setting(drives.tick_hz, drives.rest, nominal)
+    return replace(setting, headings=drives.headings, places=drives.places, angles=drives.angles)
+
+
+def _seen(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
+    return _tracked(drives, integrate(np.zeros((len(twists), 3)), twists, 1.0 / drives.tick_hz), measurement)
+
+
+def _tracked(drives: Drives, poses: Floats, measurement: Chain) -> Floats:
+    start = np.zeros((len(poses), 1, 3))
+    walked = np.concatenate((start, poses), axis=1)
+    if not measurement.effects:
+        return walked
+    rest = replace(_setting(drives), rest=start[:, 0])
+    return np.asarray(measurement.apply(walked, measurement.begin(rest))[0])

@@ -1,0 +1,120 @@
+"""Which of the effects that were looked at is adopted next, if any."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from proxytune.diagnosis.horizon.windows import blocks_of, cut, ratio, strays
+from proxytune.diagnosis.model.coordinates import at_edge
+from proxytune.diagnosis.model.events import RandomEffect
+from proxytune.diagnosis.model.fitting import Fit, fit
+from proxytune.diagnosis.model.replay import lateness
+from proxytune.diagnosis.naming.round import Round
+from proxytune.diagnosis.naming.screening import Lead
+from proxytune.effects import CATALOGUE, theta_names
+
+CLEAR_GAIN = 30.0
+"""Nats that a random effect must gain: its chance is drawn from shifted innovations, which is rough."""
+
+P_VALUE = 0.01
+"""Chance must gain as much as rarely as this."""
+
+PLAIN_SHARE = 0.8
+"""An effect of both wheels is preferred to one of a single wheel if it gains this share."""
+
+WITHIN_SHARE = 0.8
+"""An effect within its range is preferred to one at an end of it if it gains this share and predicts no worse."""
+
+MOST_PLACES = 0.9
+"""A part of the map that holds more of the drives than this is no part."""
+
+ERROR_HORIZON_S = 2.0
+ERROR_FACTOR = 1.05
+"""A model predicts worse if its error over windows of this horizon is shown to be larger by more than this factor: such
+an effect is not adopted, whatever the evidence of single steps."""
+
+
+class Choice(NamedTuple):
+    """An effect that may be adopted: one that draws (`random`) or another (`lead`), and the model with it.
+
+    Attributes:
+        gain: Evidence for it [nats].
+        fitted: The model with it.
+        lead: Where it was seen, None for one that draws.
+        random: What it draws, None for any other.
+    """
+
+    gain: float
+    fitted: Fit
+    lead: Lead | None = None
+    random: RandomEffect | None = None
+
+
+def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
+    """The effect with most evidence, if that is more than chance and predicts no worse."""
+    fits = [Choice(gain, fitted, lead) for lead, fitted, gain in looked.fits.values() if lead.p_value <= P_VALUE]
+    named = [choice for choice in fits if not _is_everywhere(choice)]
+    clear = [effect for effect in looked.random if effect.p_value <= P_VALUE and effect.gain >= CLEAR_GAIN]
+    everything: list[Choice | RandomEffect] = [*named, *clear]
+    ranked = sorted(everything, key=lambda one: -one.gain)
+    enough = (choice_of(model, found) for found in ranked if found.gain >= least)
+    best = next((choice for choice in enough if no_worse(choice.fitted, model)), None)
+    if best is None:
+        return None
+    plain = next((choice for choice in named if _is_plain_form_of(choice, best)), best)
+    return plain if not _is_at_edge(plain) else _within(model, plain, ranked)
+
+
+def choice_of(model: Fit, found: Choice | RandomEffect) -> Choice:
+    """A choice, for a random effect too, whose model is only fitted once it is asked for."""
+    return found if isinstance(found, Choice) else Choice(found.gain, _drawing(model, found), random=found)
+
+
+def _within(model: Fit, best: Choice, ranked: Sequence[Choice | RandomEffect]) -> Choice:
+    """The first that gains nearly as much as the best, is not at an end of its range, and predicts no worse."""
+    near = (choice_of(model, found) for found in ranked if found.gain > WITHIN_SHARE * best.gain)
+    inside = next((choice for choice in near if not _is_at_edge(choice)), None)
+    return inside if inside is not None and no_worse(inside.fitted, best.fitted) else best
+
+
+def _is_everywhere(choice: Choice) -> bool:
+    """Whether it acts in a part of the map that holds most of the drives: then it is no matter of place."""
+    effect = CATALOGUE[choice.lead.candidate.effect] if choice.lead else None
+    if effect is None or effect.trace is None or not effect.trace.placed:
+        return False
+    _, x, y, radius = (choice.fitted.theta[name] for name in theta_names(effect))
+    places = choice.fitted.drives.poses[:, 0, :2]
+    return float((np.hypot(*(places - (x, y)).T) < radius).mean()) > MOST_PLACES
+
+
+def _is_at_edge(choice: Choice) -> bool:
+    """Whether a value of it was fitted to an end of its range: it then stands for something else."""
+    free = choice.lead.candidate.free if choice.lead else ()
+    figures = choice.fitted.drives.robot.figures
+    return any(at_edge(name, choice.fitted.theta[name], figures) for names in free for name in names)
+
+
+def _is_plain_form_of(choice: Choice, best: Choice) -> bool:
+    """Whether it says the same of both wheels what the best says of one, at little loss."""
+    if choice.lead is None or best.lead is None or choice is best or choice.lead.candidate.form:
+        return False
+    same = choice.lead.candidate.effect == best.lead.candidate.effect
+    return same and choice.gain > PLAIN_SHARE * best.gain
+
+
+def _drawing(model: Fit, effect: RandomEffect) -> Fit:
+    """The model with an effect that draws; its mean lateness has so far passed for a part of the delay."""
+    theta = {**model.theta, effect.parameter: effect.value}
+    late = lateness(theta, model.drives.rate_hz) - lateness(model.theta, model.drives.rate_hz)
+    theta["delay"] = max(0.0, model.theta["delay"] - late)
+    return fit(model.drives, theta, model.free, model.noise)
+
+
+def no_worse(one: Fit, other: Fit) -> bool:
+    """Whether one model's error over windows is not shown to be larger than the other's by more than ERROR_FACTOR."""
+    windows = cut(other.drives, ERROR_HORIZON_S)
+    if len(windows.begin) < 2:
+        return True
+    squares = [strays(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
+    return ratio(squares[0], squares[1], blocks_of(other.drives, windows)).interval[0] <= ERROR_FACTOR

@@ -1,0 +1,99 @@
+"""What a search for missing effects came to."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from proxytune.diagnosis.model.coordinates import Coordinate
+from proxytune.diagnosis.model.fitting import Fit
+from proxytune.diagnosis.model.replay import lateness
+from proxytune.diagnosis.naming.candidates import Candidate
+from proxytune.diagnosis.naming.flexible import Curve
+from proxytune.space import Theta
+
+
+class Tried(NamedTuple):
+    """An effect that was tried.
+
+    Attributes:
+        effect: Its name.
+        form: What is special about the form.
+        gain: Evidence: log-likelihood gained on blocks it was not fitted to [nats].
+        p_value: How often chance gains as much.
+    """
+
+    effect: str
+    form: str
+    gain: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Adopted:
+    """An effect that was added to the model.
+
+    Attributes:
+        effect: Its name.
+        form: What is special about the form.
+        names: Its parameters in θ.
+        free: Those of them that were fitted, by coordinate.
+        gain: Evidence for it when it was adopted [nats].
+        p_value: How often chance gains as much.
+        rivals: Other effects that these drives cannot tell from it, with a form of each.
+        interval: The interval of a random effect's parameter.
+    """
+
+    effect: str
+    form: str
+    names: tuple[str, ...]
+    free: tuple[Coordinate, ...]
+    gain: float
+    p_value: float
+    rivals: tuple[Candidate, ...]
+    interval: tuple[float, float] | None = None
+
+
+class Variant(NamedTuple):
+    """A model's values in θ, and which of them are free."""
+
+    theta: Theta
+    free: tuple[Coordinate, ...]
+
+
+def lacking(variant: Variant, effect: Adopted, rate_hz: float) -> Variant:
+    """A model less an effect; the mean lateness of one that draws becomes a part of the delay again."""
+    theta = {name: value for name, value in variant.theta.items() if name not in effect.names}
+    late = lateness(variant.theta, rate_hz) - lateness(theta, rate_hz)
+    if late > 0.0:
+        theta["delay"] = theta.get("delay", 0.0) + late
+    return Variant(theta, tuple(coordinate for coordinate in variant.free if coordinate not in effect.free))
+
+
+class Dropped(NamedTuple):
+    """An effect that was dropped, the model that had it, and whether it is shown to have done harm to predictions."""
+
+    effect: Adopted
+    beside: Variant
+    harmful: bool = False
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the search came to.
+
+    Attributes:
+        declared: The model with declared parameters only.
+        model: The model with the adopted effects.
+        adopted: Those effects, in the order of adoption.
+        tried: Every effect tried in the first round, best first.
+        remainder: Curves over signals that explain what no named effect does, best first.
+        curves: Curves over every signal before anything was added, best first.
+        immaterial: Effects that were adopted and dropped again, each with the model that it was dropped from.
+    """
+
+    declared: Fit
+    model: Fit
+    adopted: tuple[Adopted, ...]
+    tried: tuple[Tried, ...]
+    remainder: tuple[Curve, ...]
+    curves: tuple[Curve, ...]
+    immaterial: tuple[Dropped, ...] = ()

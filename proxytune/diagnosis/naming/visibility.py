@@ -1,0 +1,45 @@
+"""What these drives could have shown: effects whose usual sizes would have left too little trace."""
+
+import numpy as np
+
+from proxytune.diagnosis.measured.drives import Floats
+from proxytune.diagnosis.model.coordinates import placed
+from proxytune.diagnosis.model.events import responses
+from proxytune.diagnosis.model.fitting import Fit
+from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, increments
+from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, Candidate, candidates
+from proxytune.diagnosis.naming.screening import without
+
+CLEAR_NATS = 10.0
+"""An effect counts as visible if its middle probe changes the log-likelihood by so much."""
+
+LOST_SHARE = 0.1
+"""A random effect is asked to strike one command in ten."""
+
+
+def unseen(model: Fit, taken: set[str]) -> tuple[str, ...]:
+    """The motion effects that would have left fewer than CLEAR_NATS at the middle of their probes."""
+    forms = candidates(model.drives.robot.figures, model.theta, taken)
+    best: dict[str, float] = {}
+    plain = {form.effect for form in forms if not form.form}
+    for form in (form for form in forms if not form.form or form.effect not in plain):
+        best[form.effect] = max(best.get(form.effect, 0.0), _trace(model, form))
+    strike = LOST_SHARE * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
+    best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}
+    return tuple(name for name in MOTION_EFFECTS if name not in taken and best.get(name, 0.0) < CLEAR_NATS)
+
+
+def _trace(model: Fit, form: Candidate) -> float:
+    """Nats that the middle probe would have changed, free parameters having done what they can."""
+    if not form.probes:
+        return 0.0
+    direction = trace_of(model, form, form.probes[len(form.probes) // 2])
+    return 0.5 * float(direction @ direction)
+
+
+def trace_of(model: Fit, form: Candidate, values: tuple[float, ...]) -> Floats:
+    """What a form of an effect does to the innovations that the free parameters cannot (3N,)."""
+    moved = placed({**model.theta, **form.fixed}, form.free, np.array(values))
+    change = increments(model.drives, model.theta) - increments(model.drives, moved)
+    column = model.whiten.whiten(change)[:, None]
+    return without(model.slopes, column, np.ones(len(column)))[:, 0]

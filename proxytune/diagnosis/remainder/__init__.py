@@ -1,0 +1,1 @@
+"""What no name explains, learnt as curves."""

@@ -1,0 +1,157 @@
+"""The learnt remainder: what no named effect explains, as curves over features; used only if shown to help."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from proxytune.diagnosis.horizon.polish import HORIZONS_S
+from proxytune.diagnosis.horizon.window_slopes import FITTED_S, slopes_of
+from proxytune.diagnosis.horizon.windows import Ratio, Windows, blocks_of, chosen, cut, ratio, strays
+from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
+from proxytune.diagnosis.remainder.group_choice import Choice, Sums, choose, sums
+from proxytune.diagnosis.remainder.offers import offered
+from proxytune.effects.learnt.effect import Learnt
+from proxytune.effects.learnt.features import GROUPS, LEVEL
+from proxytune.effects.learnt.table import learnt_theta
+from proxytune.space import Theta
+
+PARTS = 16
+"""No more parts are left out in turn."""
+
+FOLDS = 4
+"""The whole fit, choice of groups included, is repeated so often for the guard, each time without one fold."""
+
+ROUNDS = 2
+"""It is linearised and its weights are made robust so often."""
+
+HELPS, HARMS = 0.95, 1.02
+"""It is used if it lowers the error beneath the first share at some horizon, and raises it above the second at none."""
+
+FEWEST_PARTS = 6
+"""With fewer blocks nothing is learnt: no held-out error would have an interval."""
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What was learnt beside a model.
+
+    Attributes:
+        theta: Its values by their names in θ, empty where no group pays.
+        share: The share of each chosen group, by its title, in what is gained on blocks that are left out.
+        guard: By horizon, the error with it over that without, each block predicted by a fit to others.
+        used: Whether the guard lets it in.
+        held_out: Squared distance at the poses of windows of FITTED_S, predicted by fits to other blocks (M,) [m²].
+    """
+
+    theta: Mapping[str, float] = field(default_factory=dict)
+    share: Mapping[str, float] = field(default_factory=dict)
+    guard: Mapping[float, Ratio] = field(default_factory=dict)
+    used: bool = False
+    held_out: Floats = field(default_factory=lambda: np.empty(0))
+
+
+def remainder(drives: Drives, theta: Theta) -> Remainder:
+    """Fit what a model leaves over of its windows, and say whether that helps.
+
+    Args:
+        drives: What the model was fitted to.
+        theta: The model.
+    """
+    windows = cut(drives, FITTED_S)
+    blocks = len(np.unique(drives.block[windows.begin]))
+    before = strays(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
+    if blocks < FEWEST_PARTS:
+        return Remainder(held_out=before)
+    whole, folds = _fitted(drives, theta)
+    if not whole.gains:
+        return Remainder(held_out=before)
+    guard = _guard(drives, theta, folds)
+    total = sum(whole.gains.values())
+    share = {GROUPS[group].title: gain / total for group, gain in whole.gains.items()}
+    after = _crossed(drives, theta, folds, windows)
+    return Remainder(whole.theta, share, guard, _helps(guard), after)
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A fit's values by their names in θ, and what each group gained."""
+
+    theta: Mapping[str, float]
+    gains: Mapping[str, float]
+
+
+def _fitted(drives: Drives, theta: Theta) -> tuple[_Fitted, list[_Fitted]]:
+    """The fit to all parts, and those without each fold."""
+    offer, parts = offered(drives, theta), _parts(drives)
+    groups = _columns(offer)
+    weights = np.zeros(sum(len(curve.knots) for curve in offer.curves))
+    now: Mapping[str, float] = {}
+    for _ in range(ROUNDS):
+        slopes = slopes_of(drives, {**theta, **now}, offer)
+        given = sums(slopes, weights, slopes.block % parts, parts)
+        choice = choose(given, groups)
+        weights, now = choice.weights, _theta(offer, choice)
+        if not choice.gains:
+            break
+    folds = [_without(offer, given, groups, fold) for fold in range(FOLDS)] if now else []
+    return _Fitted(now, choice.gains), folds
+
+
+def _without(offer: Learnt, given: Sums, groups: Mapping[str, Whole], fold: int) -> _Fitted:
+    choice = choose(given.only(np.arange(len(given.size)) % FOLDS != fold), groups)
+    return _Fitted(_theta(offer, choice), choice.gains)
+
+
+def _columns(offer: Learnt) -> dict[str, Whole]:
+    """The columns of each group."""
+    names = np.array([curve.group for curve in offer.curves for _ in curve.knots])
+    return {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist())}
+
+
+def _theta(offer: Learnt, choice: Choice) -> dict[str, float]:
+    """The chosen groups with their weights, by their names in θ."""
+    if not choice.gains:
+        return {}
+    ends = np.cumsum([len(curve.knots) for curve in offer.curves])[:-1]
+    parts = zip(offer.curves, np.split(choice.weights, ends), strict=True)
+    curves = tuple(
+        curve._replace(weights=tuple(weights.tolist()))
+        for curve, weights in parts
+        if curve.group in choice.gains or curve.group == LEVEL
+    )
+    return learnt_theta(Learnt(offer.seen, curves))
+
+
+def _guard(drives: Drives, theta: Theta, folds: list[_Fitted]) -> dict[float, Ratio]:
+    found = {}
+    for horizon_s in HORIZONS_S:
+        windows = cut(drives, horizon_s)
+        blocks = blocks_of(drives, windows)
+        if len(np.unique(blocks)) >= FEWEST_PARTS:
+            before = strays(drives, theta, windows)[:, 0] ** 2
+            after = _crossed(drives, theta, folds, windows)
+            found[horizon_s] = ratio(after, before, blocks)
+    return found
+
+
+def _crossed(drives: Drives, theta: Theta, folds: list[_Fitted], windows: Windows) -> Floats:
+    """Squared distance at every compared pose (M,), each predicted by the fit that left its block out."""
+    squares = np.empty(len(windows.increment))
+    fold_of = drives.block[windows.begin] % _parts(drives) % FOLDS
+    for number, fold in enumerate(folds):
+        own = fold_of == number
+        if own.any():
+            part = chosen(windows, own)
+            squares[own[windows.window]] = strays(drives, {**theta, **fold.theta}, part)[:, 0] ** 2
+    return squares
+
+
+def _parts(drives: Drives) -> int:
+    """How many parts blocks are dealt out to."""
+    return min(PARTS, int(drives.block.max()) + 1)
+
+
+def _helps(guard: Mapping[float, Ratio]) -> bool:
+    helps = any(one.value < HELPS and one.below for one in guard.values())
+    return helps and all(one.value <= HARMS for one in guard.values())

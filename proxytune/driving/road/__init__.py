@@ -1,0 +1,1 @@
+"""The road: maps, lanes, and how they are drawn."""

@@ -1,0 +1,1 @@
+"""Effects on how the body moves, and on how its pose is measured."""

@@ -1,0 +1,1 @@
+"""The learnt remainder as an effect like any other."""

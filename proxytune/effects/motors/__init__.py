@@ -1,0 +1,1 @@
+"""Effects between a command and the speed of a wheel."""

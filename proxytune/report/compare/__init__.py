@@ -1,0 +1,1 @@
+"""A comparison of engines: JSON, tables and the figure."""

@@ -1,0 +1,97 @@
+"""The figure of a comparison: how fast each engine gets near the optimum."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from proxytune.comparison.runs import Run
+from proxytune.comparison.summary import median_curve
+from proxytune.report.style import BLUE, GREEN, GREY, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
+
+SOLID, DASHED, DOTTED, MIXED = "-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1))
+LOOKS = {
+    "outcomes": (VERMILLION, SOLID),
+    "gp": (BLUE, SOLID),
+    "composite": (ORANGE, SOLID),
+    "random": (GREY, DOTTED),
+    "sobol": (GREY, MIXED),
+    "tpe": (GREEN, DASHED),
+    "skopt": (PURPLE, DASHED),
+    "gpsampler": (LIGHT_BLUE, DASHED),
+    "qlognei": ("0.15", MIXED),
+}
+"""Colour and line: those a reader looks for first are solid; no two of one line have colours that could be confused."""
+WIDE, PANEL, APART = (3.35, 3.0), (0.13, 0.14, 0.67, 0.83), 0.05
+"""Size [inch], which is 85 mm wide; what of it the panel takes, leaving room for names; how far these are apart at
+least, as a share of the panel's height."""
+
+BEYOND = 0.8
+"""So much of an evaluation is drawn after the last, so that one sees where it ended."""
+
+
+def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure:
+    """Draw the median over seeds of the lowest regret so far, one line per engine, named where it ends.
+
+    The first engine has its 95 % band. Up to the vertical line all engines share the design; below the dashed line a θ
+    cannot be told from the optimum.
+    """
+    figure = Figure(figsize=WIDE)
+    axes = figure.add_axes(PANEL)
+    key = engines[0][0].key
+    for number, runs in enumerate(engines):
+        _curve(axes, runs, banded=number == 0)
+    axes.axvline(key.initial + 0.5, color="0.6", linewidth=0.8)
+    axes.axhline(tolerance, color="0.3", linewidth=0.8, linestyle="--", label="noise floor")
+    axes.annotate("noise floor", (1.2, tolerance), (0, 2), textcoords="offset points", fontsize=6, color="0.3")
+    axes.set_xlabel("evaluations", fontsize=8)
+    axes.set_ylabel("lowest regret so far [ordered pairs]", fontsize=8)
+    axes.set_xlim(1, key.budget + BEYOND)
+    axes.set_ylim(*_range(engines, tolerance))
+    dress(axes)
+    _name(axes, [runs[0].key.engine for runs in engines], [float(median_curve(runs)[0][-1]) for runs in engines])
+    return figure
+
+
+def _curve(axes: Axes, runs: Sequence[Run], *, banded: bool) -> None:
+    colour, line = LOOKS[runs[0].key.engine]
+    middle, low, high = median_curve(runs)
+    places = np.append(np.arange(1, len(middle) + 1), len(middle) + BEYOND)
+    middle, low, high = (np.append(curve, curve[-1]) for curve in (middle, low, high))
+    if banded:
+        axes.fill_between(places, low, high, step="post", color=colour, alpha=0.15, linewidth=0)
+    label = f"{runs[0].key.engine} ({len(runs)} seeds)"
+    axes.step(places, middle, where="post", color=colour, linestyle=line, lw=1.3, label=label)
+
+
+def _range(engines: Sequence[Sequence[Run]], tolerance: float) -> tuple[float, float]:
+    """From below the lowest median, the floor and 0 to above the highest median that is finite."""
+    medians = np.concatenate([median_curve(runs)[0] for runs in engines])
+    finite = medians[np.isfinite(medians)]
+    low, high = min(0.0, tolerance, *finite), max(1.0, tolerance, *finite)
+    return low - 0.04 * (high - low) if low < 0.0 else 0.0, high + 0.04 * (high - low)
+
+
+def _name(axes: Axes, names: Sequence[str], ends: Sequence[float]) -> None:
+    """Write each engine's name beside the end of its line, moved apart where lines end together."""
+    bottom, top = axes.get_ylim()
+    places = spread([(min(max(end, bottom), top) - bottom) / (top - bottom) for end in ends], APART)
+    for name, place in zip(names, places, strict=True):
+        axes.text(1.02, place, name, transform=axes.transAxes, fontsize=7, color=LOOKS[name][0], va="center", ha="left")
+
+
+def spread(places: Sequence[float], apart: float) -> list[float]:
+    """Places moved as little as it takes to be so far apart, in the same order, not below 0."""
+    order = sorted(range(len(places)), key=lambda row: places[row])
+    moved = np.array([places[row] for row in order])
+    steps = apart * np.arange(len(moved))
+    # Least squares with the order kept: pools of places that touch share their mean.
+    pools: list[list[float]] = []
+    for value in moved - steps:
+        pools.append([float(value)])
+        while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
+            last = pools.pop()
+            pools[-1] += last
+    found = np.concatenate([np.full(len(pool), max(0.0, float(np.mean(pool)))) for pool in pools]) + steps
+    return [float(found[order.index(row)]) for row in range(len(places))]

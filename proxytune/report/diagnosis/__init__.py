@@ -1,0 +1,1 @@
+"""A diagnosis: JSON, notes and figures."""

@@ -1,0 +1,117 @@
+"""The learnt curves: what they add to the motion, over the signal that each depends on."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from proxytune.diagnosis.remainder.learning import Learning
+from proxytune.effects.learnt.effect import Curve, Learnt
+from proxytune.effects.learnt.features import GROUPS, HEADING, LEVEL
+from proxytune.effects.learnt.table import learnt_effect
+from proxytune.report.style import BLUE, GREY, dress
+
+SHOWN_AS = {
+    "m/s": (1e3, "mm/s"),
+    "rad/s": (180.0 / np.pi, "deg/s"),
+    "rad/m": (180.0 / np.pi, "deg/m"),
+}
+"""How weights are told, by their unit: a factor and its unit; shares in per cent."""
+
+FADING = {
+    "transients": "time constant",
+    "load": "time constant",
+    "reversal": "fading over",
+    "start": "fading over",
+    "ringing": "frequency",
+    "play": "half the play",
+}
+"""Groups whose weights are points, each of something that fades, and what their knots are."""
+
+PAIRS = "speed_and_turn"
+
+
+def learnt_figure(learning: Learning) -> Figure | None:
+    """A row of panels for each learnt group, largest share first; nothing where none is used."""
+    effect = learnt_effect(learning.theta)
+    if effect is None:
+        return None
+    order = list(learning.remainder.share)
+    shown = {curve.group for curve in effect.curves} - {LEVEL}
+    groups = sorted(shown, key=lambda group: order.index(GROUPS[group].title))
+    rows = [[curve for curve in effect.curves if curve.group == group] for group in groups]
+    rows = [_courses(row) if row[0].group == HEADING else row for row in rows]
+    across = max(len(row) for row in rows)
+    figure = Figure(figsize=(0.6 + 2.3 * across, 0.5 + 1.9 * len(rows)), layout="constrained")
+    grid = figure.subplots(len(rows), across, squeeze=False)
+    for row, panels in zip(rows, grid, strict=True):
+        for curve, axes in zip(row, panels, strict=False):
+            _draw(axes, effect, curve)
+        for axes in panels[len(row) :]:
+            axes.set_visible(False)
+    figure.suptitle("learnt from drives, not physics: what is added", fontsize=9)
+    return figure
+
+
+def _courses(curves: Sequence[Curve]) -> list[Curve]:
+    """Harmonics of the heading as curves over it, one for each direction."""
+    around = np.linspace(0.0, 360.0, 73)
+    found = []
+    for to in dict.fromkeys(curve.channel.split("_")[0] for curve in curves):
+        total = np.zeros(len(around))
+        for curve in curves:
+            if curve.channel.startswith(to):
+                wave = np.cos if curve.channel.endswith("cos") else np.sin
+                total += wave(np.radians(around)[:, None] * np.asarray(curve.knots)) @ np.asarray(curve.weights)
+        found.append(Curve(HEADING, to, tuple(around.tolist()), tuple(total.tolist())))
+    return found
+
+
+def _draw(axes: Axes, effect: Learnt, curve: Curve) -> None:
+    group = GROUPS[curve.group]
+    unit = group.channels[curve.channel if curve.group != HEADING else f"{curve.channel}_cos"].unit
+    factor, told = SHOWN_AS.get(unit, (100.0, f"% {unit}"))
+    label = f"{curve.channel} [{told}]"
+    if curve.group == PAIRS:
+        _surface(axes, curve, factor, label)
+    else:
+        _line(axes, curve, factor)
+        of = f"{group.title}, {FADING[curve.group]}" if curve.group in FADING else group.title
+        axes.set_xlabel(f"{of} [{'deg' if curve.group == HEADING else group.unit}]", fontsize=8)
+        axes.set_ylabel(label, fontsize=8)
+        axes.axhline(0.0, color=GREY, lw=0.6)
+    if curve.group == "turn_rate":
+        axes.axvspan(*effect.seen.yaw, color=GREY, alpha=0.12, lw=0)
+    dress(axes)
+
+
+def _line(axes: Axes, curve: Curve, factor: float) -> None:
+    """A curve through its knots, and through 0 at 0; what fades is points."""
+    knots, weights = np.array(curve.knots), factor * np.array(curve.weights)
+    if curve.group in FADING:
+        axes.set_xscale("log")
+        axes.set_xticks(knots, [f"{knot:g}" for knot in knots])
+        axes.set_xticks([], minor=True)
+        axes.vlines(knots, 0.0, weights, color=BLUE, lw=1.0)
+        axes.plot(knots, weights, "o", color=BLUE, ms=4)
+        return
+    if curve.group != HEADING:
+        order = np.argsort(np.append(knots, 0.0))
+        knots, weights = np.append(knots, 0.0)[order], np.append(weights, 0.0)[order]
+    axes.plot(knots, weights, "-" if curve.group == HEADING else ".-", color=BLUE, lw=1.3, ms=5)
+
+
+def _surface(axes: Axes, curve: Curve, factor: float, label: str) -> None:
+    """Colours over speed and yaw rate."""
+    places, weights = np.array(curve.knots), factor * np.array(curve.weights)
+    speeds, turns = (np.unique(np.append(axis, 0.0)) for axis in places.T)
+    values = np.zeros((len(turns), len(speeds)))
+    values[np.searchsorted(turns, places[:, 1]), np.searchsorted(speeds, places[:, 0])] = weights
+    most = float(np.abs(values).max()) or 1.0
+    drawn = axes.pcolormesh(speeds, turns, values, shading="gouraud", cmap="RdBu_r", vmin=-most, vmax=most)
+    axes.set_xlabel("forward speed [m/s]", fontsize=8)
+    axes.set_ylabel("yaw rate [rad/s]", fontsize=8)
+    bar = axes.figure.colorbar(drawn, ax=axes)
+    bar.set_label(label, fontsize=8)
+    bar.ax.tick_params(labelsize=7)

@@ -1,0 +1,31 @@
+"""What a diagnosis says of drives that seem to be of two robots."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from proxytune.diagnosis.naming.likeness import Unlike
+
+
+def unlike_document(unlike: Unlike | None, names: Sequence[str]) -> dict[str, Any] | None:
+    """The wheel that differs, and its gain in each of two groups of drives; None where all drives are alike."""
+    if unlike is None:
+        return None
+    groups = [
+        {"gain": gain, "drives": [names[number] for number in group]}
+        for gain, group in zip(unlike.gains, unlike.groups, strict=True)
+    ]
+    return {"wheel": unlike.wheel, "groups": groups}
+
+
+def unlike_notes(unlike: Unlike | None, names: Sequence[str]) -> list[str]:
+    """One sentence that names the groups and says what to do."""
+    if unlike is None:
+        return []
+    parts = [
+        f"{gain:.2f} in {', '.join(names[number] for number in group)}"
+        for gain, group in zip(unlike.gains, unlike.groups, strict=True)
+    ]
+    return [
+        f"drives disagree: the {unlike.wheel} wheel's gain is {' but '.join(parts)}, as if of two robots, or of "
+        "one on two floors; nothing told here holds for both: diagnose each group alone, or find what was changed"
+    ]

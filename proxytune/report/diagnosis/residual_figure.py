@@ -1,0 +1,180 @@
+"""How far predictions stray from what was measured, over time and over the floor."""
+
+import textwrap
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import Collection, LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from proxytune.diagnosis.diagnosis import Diagnosis
+from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
+from proxytune.report.style import BEFORE, BLUE, GREY, VERMILLION, after, dress, legend_below
+from proxytune.space import Theta
+
+HORIZON_S = 2.0
+"""Length of the windows [s], where drives last so long; else the nearest at which an error is told."""
+
+FEW_WINDOWS = 3
+"""With fewer windows at a time than this, each episode has a line of its own."""
+
+TIMES = 60
+"""No more times than this along a curve of medians."""
+
+SHORT_TIMES = 10
+"""Times within episodes that are hardly longer than a window."""
+
+MANY_WINDOWS = 400
+"""More windows than this would hide each other on a map: the floor is cut into squares."""
+
+WIDE = 1.6
+"""Floors longer in x than so many times their length in y are drawn above each other."""
+
+TITLE = 36
+"""Characters in a line above a map."""
+
+SQUARES = 60
+"""So many squares along the longer side of the floor."""
+
+
+class Strayed(NamedTuple):
+    """How far predictions strayed in windows (W,) and at the poses (M,) in them.
+
+    Attributes:
+        horizon_s: How long the windows are [s].
+        window: The window of each pose (M,).
+        increment: The increment that ends with it (M,).
+        distance: From the predicted pose to the measured one (M,) [mm].
+        rms: Its root mean square over each window (W,) [mm].
+    """
+
+    horizon_s: float
+    window: Whole
+    increment: Whole
+    distance: Floats
+    rms: Floats
+
+
+def strayed(diagnosis: Diagnosis) -> dict[str, Strayed]:
+    """How far the models stray on the tested drives, by what a legend calls them: one model if nothing was added."""
+    tested, found = diagnosis.parts.tested, diagnosis.found
+    models = {BEFORE: found.declared.theta}
+    if diagnosis.effects:
+        models[after(diagnosis)] = found.model.theta
+    horizon = min((error.horizon_s for error in diagnosis.errors), key=lambda length: abs(length - HORIZON_S))
+    return {name: _strayed(tested, theta, horizon) for name, theta in models.items()}
+
+
+def _strayed(drives: Drives, theta: Theta, horizon_s: float) -> Strayed:
+    windows = cut(drives, horizon_s)
+    distance = 1e3 * strays(drives, dict(theta), windows)[:, 0]
+    rms = np.sqrt(np.bincount(windows.window, distance**2) / np.bincount(windows.window))
+    return Strayed(horizon_s, windows.window, windows.increment, distance, rms)
+
+
+def residual_over_time(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
+    """Median and band where there are enough windows at a time, else a line per episode."""
+    figure = Figure(figsize=(5.2, 2.6), layout="constrained")
+    axes = figure.subplots()
+    for (name, one), colour, width in zip(both.items(), (VERMILLION, BLUE), (2.0, 1.2), strict=False):
+        for number, (times, distance) in enumerate(_lines(axes, drives, one, colour)):
+            axes.plot(times, distance, color=colour, lw=width, label=name if number == 0 else None)
+    axes.set_xlabel("time in the episode [s]", fontsize=8)
+    axes.set_ylabel(f"distance to prediction\nin {one.horizon_s:g}-s windows [mm]", fontsize=8)
+    axes.set_ylim(bottom=0.0)
+    dress(axes)
+    legend_below(figure, axes)
+    return figure
+
+
+def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tuple[Floats, Floats]]:
+    """Times and distances: the median after its band is drawn, or those of each episode."""
+    times, distance, episode = _in_time(drives, strayed)
+    edges = _edges(times, strayed.horizon_s)
+    place = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(edges) - 2)
+    if np.median(np.bincount(place)) < FEW_WINDOWS:
+        return [(times[episode == own], distance[episode == own]) for own in np.unique(episode)]
+    low, middle, high = _quantiles(place, distance)
+    centres = ((edges[:-1] + edges[1:]) / 2.0)[np.unique(place)]
+    axes.fill_between(centres, low, high, color=colour, alpha=0.18, linewidth=0)
+    if not axes.get_legend_handles_labels()[1]:
+        axes.fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="10 to 90 % round the median")
+    return [(centres, middle)]
+
+
+def _in_time(drives: Drives, strayed: Strayed) -> tuple[Floats, Floats, Whole]:
+    """Time [s], distance [mm] and episode: of windows, or of poses where episodes last hardly longer than a window."""
+    ends = drives.last[strayed.increment] / drives.tick_hz
+    if ends.max() < 2.0 * strayed.horizon_s:
+        return ends, strayed.distance, drives.episode[strayed.increment]
+    first = np.flatnonzero(np.diff(strayed.window, prepend=-1))
+    middle = (drives.first[strayed.increment][first] / drives.tick_hz + np.maximum.reduceat(ends, first)) / 2.0
+    return middle, strayed.rms, drives.episode[strayed.increment][first]
+
+
+def _edges(times: Floats, horizon_s: float) -> Floats:
+    """Steps of time of a window's length, longer where that were too many, shorter where all is within two windows."""
+    span = float(np.ptp(times))
+    step = max(horizon_s, span / TIMES) if span > 2.0 * horizon_s else max(span / SHORT_TIMES, 1e-3)
+    return np.arange(times.min() - step / 2.0, times.max() + step, step)
+
+
+def _quantiles(place: Whole, distance: Floats) -> Floats:
+    """Tenth, median and ninetieth percentile at each place that is taken (3, places)."""
+    return np.transpose([np.quantile(distance[place == taken], (0.1, 0.5, 0.9)) for taken in np.unique(place)])
+
+
+def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
+    """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap."""
+    before = next(iter(both.values()))
+    extent = np.ptp(drives.poses[before.increment, 1, :2], axis=0)
+    figure, panels = _panels(len(both), extent[0] > WIDE * extent[1])
+    scale = Normalize(0.0, float(np.quantile(before.rms, 0.98)))
+    for axes, (name, one) in zip(panels, both.items(), strict=True):
+        drawn = (_paths if len(one.rms) <= MANY_WINDOWS else _floor)(axes, drives, one, scale)
+        axes.set_title(textwrap.fill(name, TITLE), fontsize=8)
+        axes.set_aspect("equal")
+        dress(axes)
+    bar = figure.colorbar(drawn, ax=list(panels), extend="max", shrink=0.85)
+    bar.set_label(f"distance to prediction\nin {before.horizon_s:g}-s windows [mm]", fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    return figure
+
+
+def _panels(count: int, stacked: bool) -> tuple[Figure, list[Axes]]:
+    """Maps above each other or side by side."""
+    size = (5.2, 0.6 + 1.9 * count) if stacked else (0.9 + 2.7 * count, 3.0)
+    figure = Figure(figsize=size, layout="constrained")
+    grid = figure.subplots(*((count, 1) if stacked else (1, count)), sharex=True, sharey=True, squeeze=False)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("y [m]", fontsize=8)
+    for axes in grid[-1]:
+        axes.set_xlabel("x [m]", fontsize=8)
+    return figure, list(grid.ravel())
+
+
+def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: Normalize) -> LineCollection:
+    rows = np.split(strayed.increment, np.flatnonzero(np.diff(strayed.window)) + 1)
+    lines = [np.concatenate((drives.poses[own[:1], 0, :2], drives.poses[own, 1, :2])) for own in rows]
+    drawn = LineCollection(lines, array=strayed.rms, cmap="viridis", norm=scale, linewidths=1.2, capstyle="round")
+    axes.add_collection(drawn)
+    axes.autoscale_view()
+    return drawn
+
+
+def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: Normalize) -> Collection:
+    """The mean over squares of the floor."""
+    places = drives.poses[strayed.increment, 1, :2]
+    side = float(np.ptp(places, axis=0).max()) / SQUARES
+    edges = [np.arange(along.min(), along.max() + 2.0 * side, side) for along in places.T]
+    place, shape = np.zeros(len(places), dtype=int), [len(edge) - 1 for edge in edges]
+    for along, edge, cells in zip(places.T, edges, shape, strict=True):
+        place = place * cells + np.clip(np.searchsorted(edge, along, side="right") - 1, 0, cells - 1)
+    count = np.bincount(place, minlength=shape[0] * shape[1])
+    total = np.bincount(place, strayed.rms[strayed.window], minlength=len(count))
+    mean = np.ma.masked_array(total / np.maximum(1, count), count == 0).reshape(shape)
+    return axes.pcolormesh(*edges, mean.T, cmap="viridis", norm=scale, rasterized=True)

@@ -1,0 +1,1 @@
+"""Usefulness from two tables of scores: JSON, table and figures."""

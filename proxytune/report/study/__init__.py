@@ -1,0 +1,1 @@
+"""A study: JSON, tables, figures and the page."""

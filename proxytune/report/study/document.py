@@ -1,0 +1,120 @@
+"""What `study --json` prints; its keys are promises."""
+
+from typing import Any
+
+from proxytune.report.scores.document import document_of
+from proxytune.report.study.finding import finding_of
+from proxytune.report.study.knowledge_document import intervals_document, knowledge_document
+from proxytune.report.study.verdict import sentence
+from proxytune.search.knowledge.importance import Importance
+from proxytune.storage.records import TrialRecord
+from proxytune.study.confirmation import Confirmation
+from proxytune.study.preflight import Preflight
+from proxytune.study.result import StudyResult
+from proxytune.study.settings import as_document
+
+
+def study_document(result: StudyResult) -> dict[str, Any]:
+    """A study's result as plain JSON; None where a figure is undefined."""
+    return {
+        "name": result.study.settings.name,
+        "sentence": sentence(finding_of(result)),
+        "best": _best(result),
+        **_worth(result),
+        **knowledge_document(result.knowledge),
+        "truth": None if result.truth is None else dict(result.truth),
+        "cautions": list(result.cautions),
+        "importance": {found.name: _importance(found) for found in result.importances},
+        "preflight": _preflight(result.preflight),
+        "stopped": result.stopped or None,
+        "cut_off": {"trials": len(result.cut), "episodes": result.spared[0], "seconds": result.spared[1]},
+        "trials": [_trial(trial) for trial in result.trials],
+        "failures": list(result.failures),
+        "target": _target(result),
+        "settings": dict(as_document(result.study.settings)),
+    }
+
+
+def _best(result: StudyResult) -> dict[str, Any]:
+    """The answer, what is known of it, and its measures in the trial's own episodes and in fresh ones."""
+    best, learnt, measures = result.best, result.knowledge, document_of(result.best.assessment)
+    shared = ("prpv", "prpv_normalised", "prpv_interval", "ppv")
+    return {
+        "index": best.trial.number,
+        "theta": dict(best.trial.theta),
+        "theta_interval": intervals_document(learnt.intervals),
+        "region_share": float(learnt.posterior.share),
+        "unidentified": list(learnt.unidentified),
+        **{key: measures[key] for key in shared},
+        "fresh": _fresh(result.confirmation),
+        "posterior_mean": best.posterior_mean,
+        "posterior_deviation": best.posterior_deviation,
+        "usefulness": measures,
+    }
+
+
+def _worth(result: StudyResult) -> dict[str, Any]:
+    """What PRPV of the answer is held against: of its fresh episodes where they were driven."""
+    measures = document_of(result.judged)
+    levels = ("noise_floor", "noise_floor_interval", "noise_floor_kind", "at_noise_floor", "chance", "chance_deviation")
+    return {
+        **{key: measures[key] for key in (*levels, "p_value", "notes")},
+        "cannot_be_told_from_perfect": bool(result.perfect),
+    }
+
+
+def _importance(found: Importance) -> dict[str, Any]:
+    return {"share": found.share, "interval": list(found.interval), "alone": found.alone}
+
+
+def _fresh(found: Confirmation | None) -> dict[str, Any] | None:
+    """What fresh episodes say of the answer and of its rivals."""
+    if found is None:
+        return None
+    measures = document_of(found.answer.assessment) if found.answer.assessment else {}
+    return {
+        **{key: measures.get(key) for key in ("prpv", "prpv_normalised", "prpv_interval", "ppv")},
+        "optimism": found.answer.optimism,
+        "episodes": found.episodes,
+        "candidates": [
+            {"index": one.trial.number, "prpv": round(one.trial.prpv or 0.0), "fresh_prpv": list(one.scores)}
+            for one in found.candidates
+        ],
+    }
+
+
+def _preflight(found: Preflight | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    keys = ("moves", "p_value", "metric", "change", "noise", "pairs")
+    moved = {one.interval.name: {key: getattr(one, key) for key in keys} for one in found.movements}
+    return {
+        "base": dict(found.base),
+        "episodes": found.episodes,
+        "parameters": moved,
+        "warnings": list(found.warnings),
+    }
+
+
+def _trial(trial: TrialRecord) -> dict[str, Any]:
+    return {
+        "index": trial.number,
+        "theta": dict(trial.theta),
+        "prpv": None if trial.prpv is None else round(trial.prpv),
+        "ppv": trial.ppv,
+        "failed_episodes": trial.failed_episodes,
+        "failure": trial.failure or None,
+        "cut_off": _cut(trial),
+    }
+
+
+def _cut(trial: TrialRecord) -> dict[str, Any] | None:
+    if trial.state != "cut":
+        return None
+    return {"prpv_at_least": trial.bound, "prpv_estimate": trial.estimate, "agents": list(trial.decided)}
+
+
+def _target(result: StudyResult) -> dict[str, Any]:
+    target = result.study.target
+    counts = [int(target.counts.min()), int(target.counts.max())]
+    return {"path": str(result.study.settings.target), "agents": len(target.agents), "episodes_per_agent": counts}

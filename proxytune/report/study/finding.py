@@ -1,0 +1,131 @@
+"""What a study has found out, as the plain figures that its first sentence is made of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS
+from proxytune.report.numbers import Ends
+from proxytune.search.knowledge.information import Information
+from proxytune.study.result import StudyResult
+from proxytune.usefulness import NoiseFloor
+from proxytune.usefulness.chance import Chance
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of one parameter.
+
+    Attributes:
+        name: Its name.
+        unit: Its unit, empty where it has none.
+        best: Its value in the best θ.
+        interval: The 95 % interval.
+        share: How much of its range that fills.
+        identified: Whether it is identified.
+    """
+
+    name: str
+    unit: str
+    best: float
+    interval: Ends
+    share: float
+    identified: bool
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the sentence is made of.
+
+    Attributes:
+        parameters: In the order of the box.
+        region: The 95 % region's share of the box.
+        inside: Whether the best θ lies in it.
+        prpv: PRPV of the best θ.
+        fresh: Whether that is of fresh episodes.
+        floor: What a perfect proxy would score.
+        chance: What a proxy that knows nothing would score.
+        perfect: Whether it is shown that the proxy cannot be told from a perfect one.
+        misfit: p-value of the misfit; None where that cannot be told.
+        fits: Whether some θ explains the target's scores; None where that cannot be told.
+        informed: What the scores tell of the least known parameter; None where nothing is known of that.
+        left: Trials that are still to be run; 0 where the search has ended.
+        budget: Trials that the study may take, or has taken where that was more.
+        ruled: Whether a rule ended the search before its budget.
+        starts: From how many starts each agent drives.
+        most_starts: From how many it can.
+        confirm: How often the study drives its best θ again.
+        declared: The effects on motion that θ belongs to, which `diagnose` is to tune in any case.
+    """
+
+    parameters: tuple[Known, ...]
+    region: float
+    inside: bool
+    prpv: int
+    fresh: bool
+    floor: NoiseFloor
+    chance: Chance
+    perfect: bool
+    misfit: float | None
+    fits: bool | None
+    informed: Information | None
+    left: int
+    budget: int
+    ruled: bool
+    starts: int
+    most_starts: int
+    confirm: int
+    declared: tuple[str, ...]
+
+    @property
+    def least(self) -> Known:
+        """The least known parameter."""
+        return max(self.parameters, key=lambda known: known.share)
+
+
+def finding_of(result: StudyResult) -> Finding:
+    """What the sentence of a study is made of."""
+    settings, learnt, judged = result.study.settings, result.knowledge, result.judged
+    parameters = known_parameters(result)
+    least = max(parameters, key=lambda known: known.share).name
+    return Finding(
+        parameters=parameters,
+        region=learnt.posterior.share,
+        inside=result.inside,
+        prpv=judged.prpv.value,
+        fresh=judged is not result.best.assessment,
+        floor=result.floor,
+        chance=judged.chance,
+        perfect=bool(result.perfect),
+        misfit=learnt.misfit.p_value,
+        fits=learnt.misfit.fits,
+        informed=next((one for one in learnt.information if one.name == least and _tells(one)), None),
+        left=0 if result.stopped else settings.budget - len(result.trials),
+        budget=max(settings.budget, len(result.trials)),
+        ruled=bool(result.stopped) and len(result.trials) < settings.budget,
+        starts=settings.starts,
+        most_starts=result.study.family.starts,
+        confirm=settings.confirm,
+        declared=declared_of(settings.space.names),
+    )
+
+
+def _tells(found: Information) -> bool:
+    return any(share > 0.0 for _, share in found.agents)
+
+
+def known_parameters(result: StudyResult) -> tuple[Known, ...]:
+    """What is known of each parameter, in the order of the box."""
+    units, learnt = result.study.family.parameters, result.knowledge
+    found = []
+    for interval in result.study.settings.space.intervals:
+        name, ends = interval.name, learnt.intervals[interval.name]
+        share = (ends[1] - ends[0]) / (interval.high - interval.low)
+        best = result.best.trial.theta[name]
+        found.append(Known(name, units[name].unit, best, ends, share, name not in learnt.unidentified))
+    return tuple(found)
+
+
+def declared_of(names: Sequence[str]) -> tuple[str, ...]:
+    """The effects on motion that these parameters belong to, each once."""
+    effects = dict.fromkeys(name.partition(".")[0] for name in names)
+    return tuple(effect for effect in effects if effect in MOTION_EFFECTS)

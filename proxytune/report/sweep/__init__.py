@@ -1,0 +1,1 @@
+"""A sweep: JSON, CSV, tables and figures."""

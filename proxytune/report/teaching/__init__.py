@@ -1,0 +1,1 @@
+"""Learning value: JSON, tables and figures."""

@@ -1,0 +1,1 @@
+"""Running episodes: in this process or several, with progress."""

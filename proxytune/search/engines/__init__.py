@@ -1,0 +1,1 @@
+"""What proposes the next θ, one module each, and the registry of all."""

@@ -1,0 +1,1 @@
+"""What the finished trials say of θ."""

@@ -1,0 +1,1 @@
+"""What a study keeps: study.db, its rows and its lock."""

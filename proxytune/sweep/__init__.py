@@ -1,0 +1,1 @@
+"""Usefulness along one parameter: the curves and what they show."""

@@ -1,0 +1,199 @@
+"""The learning experiment: learning curves with and without each proxy, and what each is worth as a teacher."""
+
+import hashlib
+import inspect
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from proxytune.domain import Classroom
+from proxytune.errors import InputError
+from proxytune.learning.cache import Cache
+from proxytune.learning.learner import Learner
+from proxytune.learning.lessons import Distribution
+from proxytune.learning.plv import Convergence, Curve, Teaching, converged_level, settled, teaching
+from proxytune.learning.settings import NONE, TeachingSettings
+from proxytune.running.progress import Watcher
+from proxytune.study.family import check_bounds, import_beside, load_family
+from proxytune.study.settings import StudySettings
+from proxytune.teaching.points import Point, School, examined, prepared
+
+CACHE = "teaching"
+"""The folder, within a study's, where all that was taught is kept."""
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """One proxy as a teacher.
+
+    Attributes:
+        name: What it is called.
+        proxy: Its p(θ).
+        curve: Scores in the target after so many target samples, having learnt from the proxy first.
+        worth: PLV and what it is made of; None where the learner without a proxy has not converged.
+    """
+
+    name: str
+    proxy: Distribution
+    curve: Curve
+    worth: Teaching | None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What a learning experiment has found.
+
+    Attributes:
+        settings: Of the study.
+        best_score: What a flawless examination scores.
+        without: The learning curve without a proxy.
+        when: When a learner counts as converged.
+        settled: Whether it has, without a proxy: over the last doubling of samples it gains no more than the tolerance.
+        lessons: One per proxy, in the order of study.toml.
+    """
+
+    settings: StudySettings
+    best_score: float
+    without: Curve
+    when: Convergence
+    settled: bool
+    lessons: tuple[Lesson, ...]
+
+
+def open_school(settings: StudySettings) -> School:
+    """Load both domain families and the learner that a study's [teaching] table names.
+
+    Raises:
+        InputError: If any of it cannot be used, with file, key and remedy.
+    """
+    taught = teaching_settings(settings)
+    learner, identity = _load_learner(settings, taught.learner)
+    return School(
+        proxy=_classroom(settings, settings.proxy),
+        target=_classroom(settings, taught.target),
+        learner=learner,
+        learner_identity=identity,
+        settings=taught,
+        seed=settings.seed,
+        starts=settings.starts,
+        cache=Cache(settings.folder / CACHE),
+    )
+
+
+def teaching_settings(settings: StudySettings) -> TeachingSettings:
+    """The [teaching] table of a study.
+
+    Raises:
+        SettingsError: If it has none.
+    """
+    if settings.teaching is None:
+        raise settings.error("teaching", "is missing; add the table, as in studies/teacher/study.toml")
+    return settings.teaching
+
+
+def run_experiment(settings: StudySettings, school: School, watcher: Watcher) -> Experiment:
+    """Teach every proxy's learner and the one without, from wherever an earlier run was left.
+
+    Raises:
+        InputError: If there is no proxy, or one's expert cannot drive.
+        RunError: If a domain, the learner or the machine fails; all that was finished is kept.
+    """
+    proxies = school.settings.proxies
+    if not proxies:
+        raise settings.error("teaching.proxies", "is missing; name at least one, as in [teaching.proxies.nominal]")
+    check_proxies(settings, school, proxies)
+    curves = learning_curves(school, {NONE: None, **proxies}, settings.jobs, watcher)
+    return judged(settings, school, curves)
+
+
+def judged(settings: StudySettings, school: School, curves: Mapping[str, Curve]) -> Experiment:
+    """What the curves say: a pure function of them and of what counts as converged."""
+    taught, without = school.settings, curves[NONE]
+    when = convergence(taught, without)
+    steady = settled(without, taught.tolerance)
+    lessons = [
+        Lesson(
+            name, proxy, curves[name], teaching(without=without, with_proxy=curves[name], when=when) if steady else None
+        )
+        for name, proxy in taught.proxies.items()
+    ]
+    return Experiment(settings, school.target.best_score, without, when, steady, tuple(lessons))
+
+
+def convergence(taught: TeachingSettings, without: Curve) -> Convergence:
+    """When a learner counts as converged: at the level stated, or at what it comes to without a proxy."""
+    level = converged_level(without) if taught.level is None else taught.level
+    return Convergence(level, taught.tolerance)
+
+
+def learning_curves(
+    school: School, proxies: Mapping[str, Distribution | None], jobs: int, watcher: Watcher
+) -> dict[str, Curve]:
+    """The learning curve of each proxy, by name; what is cached is not made again."""
+    points = [
+        Point(name, proxy, repetition, count)
+        for name, proxy in proxies.items()
+        for repetition in range(school.settings.seeds)
+        for count in school.settings.target_samples
+    ]
+    missing = [point for point in points if not school.known(point)]
+    watcher.begin("demonstrations", len(points) - len(missing))
+    with prepared(school, missing, jobs) as made:
+        for _ in made:
+            pass
+    watcher.begin("learning", 0)
+    with examined(school, missing, jobs) as scored:
+        for _ in scored:
+            watcher.episode()
+    return {name: _curve(school, [point for point in points if point.name == name]) for name in proxies}
+
+
+def points_of(school: School, proxies: int) -> int:
+    """How many points the learning curves of so many proxies have, with the one of no proxy."""
+    return (proxies + 1) * school.settings.seeds * len(school.settings.target_samples)
+
+
+def _curve(school: School, points: Sequence[Point]) -> Curve:
+    scores = np.array([school.score(point) for point in points])
+    return Curve(school.settings.target_samples, scores.reshape(school.settings.seeds, -1))
+
+
+def check_proxies(settings: StudySettings, school: School, proxies: Mapping[str, Distribution]) -> None:
+    """Refuse a parameter that the family has not, or a value beyond its bounds.
+
+    Raises:
+        SettingsError: With the proxy and the parameter.
+    """
+    for proxy, where in proxies.items():
+        for name, (low, high) in where.bounds.items():
+            key, given = f"teaching.proxies.{proxy}.{name}", f"{low:g} to {high:g}"
+            check_bounds(settings, school.proxy, key, name, (low, high), given)
+
+
+def _classroom(settings: StudySettings, model: Path | None) -> Classroom:
+    family = load_family(settings, model)
+    lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
+    if lacks:
+        raise settings.error("family", f"{settings.family} cannot teach: it lacks {', '.join(lacks)}")
+    return cast(Classroom, family)
+
+
+def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
+    """The learner and a digest of its code and settings."""
+    module, _, attribute = name.partition(":")
+    try:
+        found: Any = getattr(import_beside(settings, module), attribute)
+        made = found() if inspect.isclass(found) or inspect.isfunction(found) else found
+    except Exception as problem:
+        raise _no_learner(settings, f"'{name}' cannot be loaded: {problem}; write module:attribute") from None
+    if not (hasattr(made, "train") and hasattr(made, "act")):
+        raise _no_learner(settings, f"'{name}' has no train and act; see proxytune.learning.learner.Learner")
+    source = Path(inspect.getfile(type(made))).read_bytes()
+    return cast(Learner, made), hashlib.sha256(source + repr(made).encode()).hexdigest()[:16]
+
+
+def _no_learner(settings: StudySettings, problem: str) -> InputError:
+    return settings.error("teaching.learner", problem)

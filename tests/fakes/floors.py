@@ -1,0 +1,21 @@
+"""The rooms of the package, from the ground up: imports go downwards."""
+
+FLOORS = (
+    {"errors"},
+    {"settings", "space", "shipped", "scores", "logs"},
+    {"usefulness", "effects"},
+    {"domain"},
+    {"driving"},
+    {"search", "learning"},
+    {"storage", "running"},
+    {"study"},
+    {"sweep", "teaching", "comparison", "diagnosis"},
+    {"report"},
+    {"cli"},
+    {"__main__", "__init__"},
+)
+
+
+def floor(room: str) -> int:
+    """How high above the ground a room is."""
+    return next(height for height, rooms in enumerate(FLOORS) if room in rooms)

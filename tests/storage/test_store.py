@@ -1,0 +1,134 @@
+import sqlite3
+from dataclasses import replace
+
+import pytest
+
+from proxytune.domain import Outcome, make_episode
+from proxytune.errors import InputError, StoreError
+from proxytune.storage.records import SweepRecord, TrialRecord
+from proxytune.storage.store import Store, theta_json
+
+THETA = {"trim": 0.1, "delay": 1 / 3}
+EPISODE = make_episode(THETA, agent="agent1", start=2, seed=11)
+WORKED = Outcome(EPISODE, {"distance": 0.1 + 0.2}, "", 1.5)
+
+
+def test_theta_is_stored_in_one_form_with_every_digit():
+    assert theta_json({"trim": 0.1, "delay": 1 / 3}) == theta_json({"delay": 1 / 3, "trim": 0.1})
+    assert theta_json(THETA) == '{"delay": 0.3333333333333333, "trim": 0.1}'
+
+
+def test_an_outcome_comes_back_to_the_last_bit(tmp_path):
+    with Store.open(tmp_path) as store:
+        store.save_outcome("identity", WORKED)
+    with Store.read(tmp_path) as store:
+        assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
+        assert store.outcomes("another identity", THETA) == {}
+        assert store.outcomes("identity", {"trim": 0.1}) == {}
+
+
+def test_an_outcome_is_there_for_others_at_once(tmp_path):
+    with Store.open(tmp_path) as store:
+        store.save_outcome("identity", WORKED)
+        with sqlite3.connect(tmp_path / "study.db") as plain:
+            assert plain.execute("SELECT agent, start, seed FROM episodes").fetchall() == [("agent1", 2, 11)]
+
+
+def test_a_failure_is_kept_until_the_episode_works(tmp_path):
+    failed = Outcome(EPISODE, None, "it lost its way", 0.5)
+    with Store.open(tmp_path) as store:
+        store.save_outcome("identity", failed)
+        assert store.outcomes("identity", THETA) == {EPISODE: failed}
+        store.save_outcome("identity", WORKED)
+        assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
+
+
+def test_trials_come_back_in_order_and_the_last_word_counts(tmp_path):
+    finished = TrialRecord(1, THETA, "finished", 4.0, 0.25, 1, "")
+    with Store.open(tmp_path) as store:
+        store.save_trial("identity", TrialRecord(2, {"trim": 0.2, "delay": 0.0}))
+        store.save_trial("identity", TrialRecord(1, THETA))
+        store.save_trial("identity", finished)
+        assert store.trials() == [finished, TrialRecord(2, {"trim": 0.2, "delay": 0.0})]
+
+
+def test_beginning_afresh_drops_trials_but_no_episode(tmp_path):
+    with Store.open(tmp_path) as store:
+        store.save_trial("identity", TrialRecord(1, THETA))
+        store.save_outcome("identity", WORKED)
+        store.begin({"seed": 2, "parameters.trim": [-0.3, 0.3]})
+        assert store.trials() == []
+        assert store.facts() == {"seed": 2, "parameters.trim": [-0.3, 0.3]}
+        assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
+
+
+def test_seconds_are_averaged_over_domain_instances(tmp_path):
+    with Store.open(tmp_path) as store:
+        store.save_outcome("identity", WORKED)
+        elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
+        store.save_outcome("identity", Outcome(elsewhere, {"distance": 1.0}, "", 0.5))
+        assert store.seconds() == {("agent1", 2): 1.0}
+
+
+def test_the_time_of_trials_is_that_of_their_own_episodes(tmp_path):
+    elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
+    with Store.open(tmp_path) as store:
+        assert store.seconds_of_trials(9, {11}) == 0.0
+        store.save_outcome("identity", WORKED)
+        store.save_outcome("another identity", WORKED)
+        store.save_outcome("identity", Outcome(elsewhere, {"distance": 1.0}, "", 0.25))
+        store.save_outcome("identity", Outcome(replace(EPISODE, seed=12), {"distance": 1.0}, "", 8.0))
+        store.save_trial("identity", TrialRecord(1, THETA, "finished"))
+        store.save_trial("identity", TrialRecord(2, {"trim": 0.2}, "finished"))
+        assert [store.seconds_of_trials(last, {11, 13}) for last in (0, 1, 2)] == [0.0, 1.5, 1.75]
+
+
+SWEEP = SweepRecord("trim", {"delay": 0.1}, (-0.3, 0.0, 0.3))
+
+
+def test_a_sweep_is_remembered_once_with_the_identity_of_its_domain_family(tmp_path):
+    with Store.open(tmp_path) as store:
+        store.save_sweep("identity", SWEEP)
+        store.save_sweep("identity", SWEEP)
+        store.save_sweep("another identity", SWEEP)
+        assert store.sweeps() == [("identity", SWEEP), ("another identity", SWEEP)]
+
+
+def test_the_sweep_asked_for_last_comes_last_also_if_it_is_an_old_one(tmp_path):
+    other = replace(SWEEP, parameter="blur")
+    with Store.open(tmp_path) as store:
+        for sweep in (SWEEP, other, SWEEP):
+            store.save_sweep("identity", sweep)
+        assert store.sweeps() == [("identity", other), ("identity", SWEEP)]
+
+
+def test_a_sweep_keeps_the_target_model_of_its_pod_beside_the_same_without(tmp_path):
+    against = replace(SWEEP, target_model='robot = "duckiebot"\n', replays="both")
+    with Store.open(tmp_path) as store:
+        store.save_sweep("identity", against)
+        store.save_sweep("identity", SWEEP)
+    with Store.read(tmp_path) as store:
+        assert store.sweeps() == [("identity", against), ("identity", SWEEP)]
+
+
+def test_a_study_that_has_not_been_run_is_told_how_to_run_it(tmp_path):
+    with pytest.raises(InputError, match=r"study\.db: no such file; run the study first"), Store.read(tmp_path):
+        pass
+
+
+def test_what_cannot_be_written_leaves_everything_as_it_was(tmp_path):
+    with Store.open(tmp_path) as store:
+        store.save_outcome("identity", WORKED)
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            store.begin({"seed": 1, "bound": float("nan")})
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            store.save_outcome("identity", Outcome(EPISODE, {"distance": float("nan")}, "", 1.0))
+        assert store.outcomes("identity", THETA) == {EPISODE: WORKED}
+        store.save_trial("identity", TrialRecord(1, THETA))
+
+
+def test_reading_cannot_write(tmp_path):
+    with Store.open(tmp_path) as store:
+        store.save_outcome("identity", WORKED)
+    with Store.read(tmp_path) as store, pytest.raises(StoreError, match="cannot be written"):
+        store.save_outcome("identity", WORKED)

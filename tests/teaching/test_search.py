@@ -1,0 +1,83 @@
+"""A study of learning value looks where asked, finds the proxy that teaches, and goes on where it was left."""
+
+import pytest
+from taught import make_taught
+
+from proxytune.errors import RunError, SettingsError
+from proxytune.running.progress import Silent
+from proxytune.search.engines.registry import make_proposer
+from proxytune.study.settings import read_study_settings
+from proxytune.teaching.experiment import open_school
+from proxytune.teaching.search import distribution, run_plv_study, search_space
+
+BOX = {"trim": "[-0.3, 0.3]"}
+
+
+def run(folder, left=None):
+    settings = read_study_settings(folder)
+    school = open_school(settings)
+    space = search_space(settings, school.settings.widths, left or {})
+    return run_plv_study(settings, school, make_proposer("gp", settings.initial), space, Silent())
+
+
+def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(make_study):
+    found = run(make_taught(make_study, parameters=BOX, more="budget = 8", initial="4"))
+    assert len(found.trials) == 8
+    assert found.best.worth.plv.value == max(trial.worth.plv.value for trial in found.trials)
+    assert found.best.worth.plv.value > min(trial.worth.plv.value for trial in found.trials)
+    assert abs(found.best.theta["trim"] - 0.12) < 0.15
+
+
+def test_a_raised_budget_goes_on_after_the_very_same_trials(make_study, tmp_path):
+    journal = tmp_path / "journal"
+    domain = {"teaching_journal": f'"{journal}"'}
+    folder = make_taught(make_study, parameters=BOX, domain=domain, more="budget = 3", initial="2")
+    short, driven = run(folder), len(journal.read_text().splitlines())
+    again = run(folder)
+    assert len(journal.read_text().splitlines()) == driven
+    path = folder / "study.toml"
+    path.write_text(path.read_text().replace("budget = 3", "budget = 5"))
+    longer = run(folder)
+    thetas = [[dict(trial.theta) for trial in found.trials] for found in (short, again, longer)]
+    assert thetas[0] == thetas[1] == thetas[2][:3]
+    assert len(thetas[2]) == 5
+
+
+def test_the_width_of_a_parameter_is_searched_beside_its_centre(make_study):
+    width = "budget = 2\n[teaching.width]\ntrim = [0.0, 0.2]\n"
+    found = run(make_taught(make_study, parameters=BOX, more=width, initial="2"))
+    assert found.space.names == ("trim", "trim width")
+    for trial in found.trials:
+        low, high = trial.proxy.bounds["trim"]
+        centre, half = trial.theta["trim"], trial.theta["trim width"] / 2
+        assert (low, high) == pytest.approx((max(-0.3, centre - half), min(0.3, centre + half)))
+        assert low < high
+
+
+def test_a_distribution_is_cut_off_at_what_a_parameter_can_be(make_study):
+    school = open_school(read_study_settings(make_taught(make_study)))
+    bounds = distribution(school, {"trim": 0.25, "trim width": 0.2, "delay": 0.1}).bounds
+    assert bounds["trim"] == pytest.approx((0.15, 0.3))
+    assert bounds["delay"] == (0.1, 0.1)
+
+
+def test_it_searches_only_what_prpv_has_left(make_study):
+    settings = read_study_settings(make_taught(make_study, parameters=BOX))
+    whole = search_space(settings, {}, {})
+    left = search_space(settings, {}, {"trim": (0.04, 0.16)})
+    pinned = search_space(settings, {}, {"trim": (0.1, 0.1)})
+    assert (whole.intervals[0].low, whole.intervals[0].high) == (-0.3, 0.3)
+    assert (left.intervals[0].low, left.intervals[0].high) == pytest.approx((0.04, 0.16))
+    assert pinned.intervals[0].low < 0.1 < pinned.intervals[0].high
+    assert pinned.intervals[0].high - pinned.intervals[0].low == pytest.approx(0.04)
+
+
+def test_a_width_without_its_parameter_is_one_line(make_study):
+    settings = read_study_settings(make_taught(make_study, parameters=BOX))
+    with pytest.raises(SettingsError, match=r"teaching\.width\.delay: is not among \[parameters\]"):
+        search_space(settings, {"delay": (0.0, 0.1)}, {})
+
+
+def test_where_the_target_alone_is_not_learnt_there_is_no_plv_to_search_for(make_study):
+    with pytest.raises(RunError, match=r"has not|PLV is not known; raise teaching\.target_samples"):
+        run(make_taught(make_study, parameters=BOX, grid=[0, 3, 6]))

@@ -13,11 +13,12 @@ from proxytune.comparison.of_study import StudyObjective, noise_floor
 from proxytune.comparison.of_truths import TruthObjective, lacking_families
 from proxytune.comparison.ranking import Ranking
 from proxytune.errors import InputError
-from proxytune.running.progress import Bars, Watcher
+from proxytune.running.progress import Bars
 from proxytune.storage.store import Store
 from proxytune.study.preflight import most_episodes
 from proxytune.study.settings import StudySettings
-from proxytune.study.study import Study, open_study
+from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking(), "calibrated": Calibrated()}
 BUDGET, INITIAL = 40, 10
@@ -37,7 +38,7 @@ def objective_of(
     episodes = per_run * arguments.seeds * engines
     print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
     with Store.open(output) as store, Bars(episodes) as bars:
-        yield _on_study(arguments, study, store, bars), budget, initial, 1
+        yield _on_study(arguments, StudyRun(study, store, bars)), budget, initial, 1
 
 
 def check_truths(arguments: argparse.Namespace) -> None:
@@ -52,10 +53,10 @@ def check_truths(arguments: argparse.Namespace) -> None:
         raise InputError(f"--truths: '{arguments.study}' has a truth for every seed; leave it out")
 
 
-def _on_study(arguments: argparse.Namespace, study: Study, store: Store, watcher: Watcher) -> Objective:
+def _on_study(arguments: argparse.Namespace, run: StudyRun) -> Objective:
     if arguments.truths:
-        return TruthObjective(study, store, watcher, lacking_families(study, arguments.lacks))
-    return StudyObjective(study, store, watcher, noise_floor(study))
+        return TruthObjective(run, lacking_families(run.study, arguments.lacks))
+    return StudyObjective(run, noise_floor(run.study))
 
 
 def _episodes_per_run(arguments: argparse.Namespace, settings: StudySettings, budget: int) -> int:

@@ -19,7 +19,8 @@ from proxytune.storage.store import Store
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import as_stored
-from proxytune.study.study import Study, open_study
+from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.sweep.sweep import Curve, all_curves
 
 RESCORED = "rescored"
@@ -43,7 +44,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     metrics = [Metric.parse(text) for text in arguments.metric]
     opened = open_study(arguments.path)
     with Store.read(opened.settings.folder) as store:
-        result, curves = _found(as_stored(opened, store), store, metrics)
+        result, curves = _found(StudyRun(as_stored(opened, store), store), metrics)
     folder = _folder(opened.settings.folder, metrics)
     figures = draw_curves(curves, folder / "figures")
     document: dict[str, Any] = {}
@@ -56,12 +57,12 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer({**document, "figures": paths}, _by_other_metrics(result, files) if result and metrics else files)
 
 
-def _found(study: Study, store: Store, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:
+def _found(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:
     """The study's result, if it has any trial or no sweep either, and its curves."""
-    curves = all_curves(with_metrics(study, metrics) if metrics else study, store)
-    if curves and not store.trials():
+    curves = all_curves(run.of(with_metrics(run.study, metrics)) if metrics else run)
+    if curves and not run.store.trials(run.study.objective.name):
         return None, curves
-    return rescored(study, store, metrics) if metrics else result_of(study, store), curves
+    return rescored(run, metrics) if metrics else result_of(run), curves
 
 
 def _folder(study: Path, metrics: Sequence[Metric]) -> Path:

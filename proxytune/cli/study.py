@@ -17,16 +17,17 @@ from proxytune.report.study.profiles_figure import profiles_figure
 from proxytune.report.study.search_figures import evaluations_figure
 from proxytune.report.study.table import study_table
 from proxytune.report.writing import save, write_text
-from proxytune.running.progress import Bars, Watcher
+from proxytune.running.progress import Bars
 from proxytune.search.engines.registry import make_proposer, why_not
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
 from proxytune.study import confirmation, preflight
 from proxytune.study.evaluation import Spent
-from proxytune.study.outputs import goal_of
+from proxytune.study.knowledge import goal_of
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import check_facts, run_study
 from proxytune.study.study import Study, open_study
+from proxytune.study.study_run import StudyRun
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -59,22 +60,21 @@ def searched(study: Study, folder: Path) -> tuple[StudyResult, Spent]:
     episodes += settings.budget * len(settings.agents) * settings.starts
     with locked(folder), Store.open(folder) as store:
         with Bars(episodes) as bars:
-            spent = _prepared(study, store, bars)
+            run = StudyRun(study, store, bars)
+            _prepare(run)
             # The pre-flight tells the noise that the proposer is to forgive.
-            proposer = make_proposer(settings.engine, settings.initial, goal_of(study, store))
-            spent += run_study(study, store, proposer, bars)
-            spent += confirmation.run_confirmation(study, store, bars)
-        return result_of(study, store), spent
+            run_study(run, make_proposer(settings.engine, settings.initial, goal_of(run)))
+            confirmation.run_confirmation(run)
+        return result_of(run), run.spent
 
 
-def _prepared(study: Study, store: Store, watcher: Watcher) -> Spent:
+def _prepare(run: StudyRun) -> None:
     """Run the pre-flight and say at once which parameters do nothing: the study may be stopped for that."""
-    check_facts(study, store)
-    spent = preflight.run_preflight(study, store, watcher)
-    found = preflight.preflight_of(study, store) if spent.episodes else None
-    for warning in found.warnings if found else ():
+    check_facts(run)
+    preflight.run_preflight(run)
+    learnt = preflight.preflight_of(run) if run.spent.episodes else None
+    for warning in learnt.warnings if learnt else ():
         print(f"proxytune study: {warning}", file=sys.stderr)
-    return spent
 
 
 def _check_engine(study: Study) -> None:

@@ -31,6 +31,7 @@ from proxytune.storage.records import SweepRecord
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import Spent
 from proxytune.study.study import Study, open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.sweep.discrepancy import discrepancy_study
 from proxytune.sweep.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval, with_target
 
@@ -66,14 +67,14 @@ def run(arguments: argparse.Namespace) -> Answer:
         sweeps = [with_target(sweep, arguments.target_model, discrepancy) for sweep in sweeps]
     per_point = len(study.settings.agents) + (discrepancy is not None)
     points = sum(len(sweep.points) for sweep in sweeps)
-    spent = Spent()
     with locked(folder), Store.open(folder) as store:
         with Bars(points * per_point * study.settings.starts) as bars:
+            run = StudyRun(study, store, bars)
             for sweep in sweeps:
-                spent += run_sweep(study, store, sweep, bars, discrepancy)
-        curves = [curve for sweep in sweeps if (curve := curve_of(study, store, sweep))]
+                run_sweep(run, sweep, discrepancy)
+        curves = [curve for sweep in sweeps if (curve := curve_of(run, sweep))]
     output = arguments.output or folder / "figures"
-    return _answer(curves, spent, draw_curves(curves, output), write_curves(curves, output))
+    return _answer(curves, run.spent, draw_curves(curves, output), write_curves(curves, output))
 
 
 def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:

@@ -13,6 +13,7 @@ from proxytune.running.progress import Bars
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.teaching.experiment import open_school, points_of, run_experiment
 from proxytune.teaching.predictivity import predictivity
 
@@ -35,7 +36,7 @@ def run(arguments: argparse.Namespace) -> Answer:
             found = run_experiment(study.settings, school, bars)
         agents = len(study.settings.agents) * study.settings.starts
         with Bars(agents * sum(proxy.fixed for proxy in proxies.values())) as bars:
-            prpv = predictivity(study, store, proxies, bars)
+            prpv = predictivity(StudyRun(study, store, bars), proxies)
     figure = folder / "figures" / "teach.png"
     save(teach_figure(found), figure)
     document = {**teach_document(found, prpv), "figure": str(figure)}

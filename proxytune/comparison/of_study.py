@@ -2,48 +2,47 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
-from proxytune.running.progress import Watcher
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Values
 from proxytune.space import Space
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import FRESH, Evaluation, evaluation, known_outcomes, plan, simulate
-from proxytune.study.outputs import goal_of, outputs_of
+from proxytune.study.evaluation import FRESH, plan
+from proxytune.study.knowledge import goal_of
+from proxytune.study.outputs import outputs_of
 from proxytune.study.preflight import run_preflight
 from proxytune.study.study import Study, facts
+from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import assess
 
 
 @dataclass(frozen=True)
 class StudyObjective:
-    """PRPV of a study; its episodes are simulated when first asked for, and kept in the store.
+    """PRPV of a study.
 
     Regret is PRPV above the target's noise floor: the optimum is not known.
 
     Attributes:
-        study: The study.
-        store: Where its episodes are kept.
-        watcher: Is told of every episode.
+        run: The study, whose episodes are simulated when first asked for.
         floor: The target's noise floor, 0 where its episodes do not tell.
+        tolerance: A regret not above this cannot be told from none.
+        runs: The same study by seed, as they were first asked for.
     """
 
-    study: Study
-    store: Store
-    watcher: Watcher
+    run: StudyRun
     floor: float
     tolerance: float = 0.0
+    runs: dict[int, StudyRun] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def name(self) -> str:
         """The study's name."""
-        return self.study.settings.name
+        return self.run.settings.name
 
     @property
     def space(self) -> Space:
         """The study's box."""
-        return self.study.settings.space
+        return self.run.settings.space
 
     @property
     def identity(self) -> str:
@@ -53,24 +52,22 @@ class StudyObjective:
     def identity_without(self, named: Sequence[str]) -> str:
         """The same, but for some of the study's facts."""
         left_out = {"seed", "initial", "batch", "engine", "cut_off", *named}
-        return repr(sorted((key, value) for key, value in facts(self.study).items() if key not in left_out))
+        return repr(sorted((key, value) for key, value in facts(self.run.study).items() if key not in left_out))
 
     def score(self, values: Values, seed: int) -> float | None:
-        """PRPV, with the placement noise of this seed; None where an agent has no episode that worked."""
-        return self._evaluated(values, seed).prpv
+        """What the study makes small, with the placement noise of this seed; None where an agent has no score."""
+        return self._seeded(seed).evaluate(self.space.theta(values), f"seed {seed}").score
 
     def outcome(self, values: Values, seed: int) -> Values | None:
         """Every agent's mean metrics; None where an agent has no episode that worked."""
-        self._evaluated(values, seed)
-        seeded = self._seeded(seed)
-        planned = plan(seeded.settings, self.space.theta(values), seed)
-        return outputs_of(seeded, known_outcomes(seeded, self.store, planned).values())
+        run, theta = self._seeded(seed), self.space.theta(values)
+        run.evaluate(theta, f"seed {seed}")
+        return outputs_of(run.study, run.known(plan(run.settings, theta, seed)).values())
 
     def goal(self, seed: int) -> Goal:
-        """The target's mean metrics, noise by this seed's pre-flight, and PRPV."""
-        seeded = self._seeded(seed)
-        run_preflight(seeded, self.store, self.watcher)
-        return goal_of(seeded, self.store)
+        """The target's mean metrics, noise by this seed's pre-flight, and what the study makes small."""
+        run_preflight(self._seeded(seed))
+        return goal_of(self._seeded(seed))
 
     def regret(self, values: Values, seed: int, lowest: float = math.inf) -> float | None:
         """The score above the noise floor."""
@@ -93,18 +90,11 @@ class StudyObjective:
     def _above(self, score: float | None) -> float | None:
         return None if score is None else score - self.floor
 
-    def _seeded(self, seed: int) -> Study:
-        return replace(self.study, settings=replace(self.study.settings, seed=seed))
-
-    def _evaluated(self, values: Values, seed: int) -> Evaluation:
-        seeded = self._seeded(seed)
-        theta = self.space.theta(values)
-        found = evaluation(seeded, self.store, theta)
-        if found is None:
-            simulate(seeded, self.store, theta, self.watcher, f"seed {seed}")
-            found = evaluation(seeded, self.store, theta)
-        assert found is not None
-        return found
+    def _seeded(self, seed: int) -> StudyRun:
+        if seed not in self.runs:
+            study = self.run.study
+            self.runs[seed] = self.run.of(replace(study, settings=replace(study.settings, seed=seed)))
+        return self.runs[seed]
 
 
 def noise_floor(study: Study) -> float:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +10,16 @@ import numpy as np
 from proxytune.comparison.of_study import StudyObjective
 from proxytune.domain import DomainFamily
 from proxytune.errors import EpisodeError
-from proxytune.running.progress import Watcher
+from proxytune.scores import ScoreTable
 from proxytune.search.design import from_unit, to_unit
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Values
 from proxytune.space import Space
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import known_outcomes, plan, run_missing, table, told
+from proxytune.study.evaluation import failure_of, plan, table
 from proxytune.study.family import load_family
 from proxytune.study.measure import SEED_OFFSET
 from proxytune.study.study import Study
+from proxytune.study.study_run import StudyRun
 
 MIDDLE = (0.1, 0.9)
 """Truths are drawn from this part of every parameter's interval."""
@@ -33,33 +33,32 @@ class TruthObjective:
     visited point that seems no worse is driven again in fresh episodes, so that it has to be lucky twice.
 
     Attributes:
-        study: The study; its own target is not looked at.
-        store: Where all episodes are kept.
-        watcher: Is told of every episode.
+        run: The study; its own target is not looked at.
         lacking: What targets are measured in, one after the other by seed, if not in the proxy itself: families that
             have effects which the proxy lacks.
+        tolerance: A regret not above this cannot be told from none.
+        objectives: The study against each seed's target, as they were first asked for.
     """
 
-    study: Study
-    store: Store
-    watcher: Watcher
+    run: StudyRun
     lacking: tuple[DomainFamily, ...] = ()
     tolerance: float = 0.0
+    objectives: dict[int, StudyObjective] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def name(self) -> str:
         """The study's name."""
-        return self.study.settings.name
+        return self.run.settings.name
 
     @property
     def space(self) -> Space:
         """The study's box."""
-        return self.study.settings.space
+        return self.run.settings.space
 
     @property
     def identity(self) -> str:
         """All that its figures depend on, apart from the seed."""
-        proxy = StudyObjective(self.study, self.store, self.watcher, 0.0).identity_without(("target",))
+        proxy = StudyObjective(self.run, 0.0).identity_without(("target",))
         return f"truths {MIDDLE} {proxy} {[family.identity for family in self.lacking]}"
 
     def truth(self, seed: int) -> Values:
@@ -113,17 +112,21 @@ class TruthObjective:
 
     def _of(self, seed: int) -> StudyObjective:
         """The study against this seed's target, which is measured when first asked for."""
-        family = self.lacking[seed % len(self.lacking)] if self.lacking else self.study.family
-        metrics = list(dict.fromkeys([*self.study.target.metrics, *family.metrics]))
-        place = replace(self.study, family=family, identity=family.identity)
-        planned = plan(place.settings, self.space.theta(self.truth(seed)), seed + SEED_OFFSET)
-        run_missing(place, self.store, planned, self.watcher, f"target of seed {seed}")
-        known = known_outcomes(place, self.store, planned)
-        for outcome in known.values():
+        if seed not in self.objectives:
+            study = replace(self.run.study, target=self._target(seed))
+            self.objectives[seed] = StudyObjective(self.run.of(study), 0.0)
+        return self.objectives[seed]
+
+    def _target(self, seed: int) -> ScoreTable:
+        study = self.run.study
+        family = self.lacking[seed % len(self.lacking)] if self.lacking else study.family
+        place = self.run.of(replace(study, family=family, identity=family.identity))
+        planned = plan(study.settings, self.space.theta(self.truth(seed)), seed + SEED_OFFSET)
+        outcomes = place.outcomes(planned, f"target of seed {seed}")
+        for outcome in outcomes.values():
             if outcome.failure:
-                raise EpisodeError(f"target of seed {seed}: {told(outcome)}")
-        target = table([known[episode] for episode in planned]).select(metrics)
-        return StudyObjective(replace(self.study, target=target), self.store, self.watcher, 0.0)
+                raise EpisodeError(f"target of seed {seed}: {failure_of(outcome)}")
+        return table(list(outcomes.values())).select(list(dict.fromkeys([*study.target.metrics, *family.metrics])))
 
 
 def lacking_families(study: Study, models: Sequence[Path]) -> tuple[DomainFamily, ...]:

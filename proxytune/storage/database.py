@@ -4,11 +4,14 @@ The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_versi
 
     facts      key, value (JSON)                  what determines the trials: settings, target and domain family
     instances  id, identity, theta (JSON)         domain instances S_θ: the family's identity and the parameters
-    trials     number (from 1), instance, state   'open', 'finished', 'failed' or 'cut'
-               prpv, ppv, failed_episodes         its scores, and how many of its episodes failed
-               failure                            why it has no score
-               decided (JSON), bound, estimate    of one that was cut off: the agents driven, what its PRPV cannot be
-                                                  below, what it is expected to be
+    trials     objective, number (from 1)         which search it belongs to, and its place there
+               instance, state                    'open', 'finished', 'failed' or 'cut'
+               score                              what the search makes small (of one that was cut off: the estimate)
+               measures (JSON)                    every measure by name, the objective's among them
+               failed_episodes, failure           how many of its episodes failed; why it has no score
+               decided (JSON), bound              of one that was cut off: the agents driven, what its PRPV cannot be
+                                                  below
+               seconds                            how long it took, where its episodes do not tell
     episodes   instance, agent, start, seed       what determines an episode: the key, so none is ever run twice
                metrics (JSON) or failure          what it scored, or why it failed
                seconds                            how long it took
@@ -20,19 +23,22 @@ The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_versi
 `study.db-wal` first (SQLite's write-ahead log: a commit costs no wait for the disk, and survives a `kill -9`). That
 file belongs to study.db until the next clean end of a run, which leaves the one file.
 
-Earlier formats are still read, and become the present one when next written to. Format 1 had neither `target_model`
+Earlier formats are still read, from a converted copy in memory, and become the present one when next written to.
+Format 1 had neither `target_model`
 nor `replays`; its sweeps are drawn again without POD until they are asked for once more, which simulates nothing anew.
-Up to format 2 no trial was cut off.
+Up to format 2 no trial was cut off. Up to format 3 the objective of every trial was PRPV, and its measures were two
+columns.
 """
 
+import json
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from proxytune.errors import StoreError
 
-FORMAT = 3
+FORMAT = 4
 APPLICATION = 0x70747564  # "ptud"
 PATIENCE_S = 30.0
 
@@ -41,12 +47,19 @@ CREATE TABLE sweeps (
     number INTEGER PRIMARY KEY, parameter TEXT NOT NULL, base TEXT NOT NULL, points TEXT NOT NULL,
     identity TEXT NOT NULL, target_model TEXT NOT NULL DEFAULT '', replays TEXT NOT NULL DEFAULT '',
     UNIQUE (parameter, base, points, identity, replays));"""
-TRIALS = """
+TRIALS_3 = """
 CREATE TABLE trials (
     number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
     state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed', 'cut')),
     prpv REAL, ppv REAL, failed_episodes INTEGER NOT NULL DEFAULT 0, failure TEXT NOT NULL DEFAULT '',
     decided TEXT NOT NULL DEFAULT '[]', bound REAL, estimate REAL);"""
+TRIALS = """
+CREATE TABLE trials (
+    objective TEXT NOT NULL, number INTEGER NOT NULL, instance INTEGER NOT NULL REFERENCES instances (id),
+    state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed', 'cut')),
+    score REAL, measures TEXT NOT NULL DEFAULT '{}', failed_episodes INTEGER NOT NULL DEFAULT 0,
+    failure TEXT NOT NULL DEFAULT '', decided TEXT NOT NULL DEFAULT '[]', bound REAL, seconds REAL NOT NULL DEFAULT 0,
+    PRIMARY KEY (objective, number)) WITHOUT ROWID;"""
 SCHEMA = f"""
 BEGIN;
 CREATE TABLE facts (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -71,21 +84,22 @@ DROP TABLE sweeps_1;
 """
 FROM_2 = f"""
 ALTER TABLE trials RENAME TO trials_2;
-{TRIALS}
+{TRIALS_3}
 INSERT INTO trials (number, instance, state, prpv, ppv, failed_episodes, failure)
     SELECT number, instance, state, prpv, ppv, failed_episodes, failure FROM trials_2;
 DROP TABLE trials_2;
 """
-AS_FROM_1 = """
-CREATE TEMP VIEW sweeps AS
-    SELECT row_number() OVER (ORDER BY parameter, base, points, identity) AS number,
-        *, '' AS target_model, '' AS replays FROM main.sweeps;
+FROM_3 = f"""
+ALTER TABLE trials RENAME TO trials_3;
+{TRIALS}
+INSERT INTO trials
+    SELECT 'prpv', number, instance, state, coalesce(estimate, prpv),
+        CASE state WHEN 'finished' THEN measures_json(prpv, ppv) ELSE '{{}}' END,
+        failed_episodes, failure, decided, bound, 0.0 FROM trials_3;
+DROP TABLE trials_3;
 """
-AS_FROM_2 = """
-CREATE TEMP VIEW trials AS SELECT *, '[]' AS decided, NULL AS bound, NULL AS estimate FROM main.trials;
-"""
-STEPS = ((FROM_1, AS_FROM_1), (FROM_2, AS_FROM_2))
-"""From each format to the next: how a file is converted, and how it is read as it is."""
+STEPS = (FROM_1, FROM_2, FROM_3)
+"""From each format to the next."""
 
 
 def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
@@ -101,6 +115,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
         connection = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None)
         try:
             _check(connection, path, writable)
+            connection = _in_present_format(connection, writable)
             if writable:
                 connection.execute("PRAGMA journal_mode = WAL")
                 connection.execute("PRAGMA synchronous = NORMAL")
@@ -137,14 +152,23 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
         raise _corrupt(path, str(verdict))
     if _cut_off(connection, path):
         raise _corrupt(path, "its end has been cut off")
-    if version < FORMAT:
-        converting, reading = zip(*STEPS[version - 1 :], strict=True)
-        # Views of this connection alone leave the file as it is.
-        connection.executescript(_at_once(converting) if writable else "".join(reading))
 
 
-def _at_once(steps: Sequence[str]) -> str:
-    return f"BEGIN;{''.join(steps)}PRAGMA user_version = {FORMAT};\nCOMMIT;"
+def _in_present_format(connection: sqlite3.Connection, writable: bool) -> sqlite3.Connection:
+    """The database as one of the present format: converted, or, where it is only read, a converted copy in memory."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version == FORMAT:
+        return connection
+    if not writable:
+        copy = sqlite3.connect(":memory:", isolation_level=None)
+        connection.backup(copy)
+        connection.close()
+        connection = copy
+    # SQLite's own JSON would round the numbers.
+    connection.create_function("measures_json", 2, lambda prpv, ppv: json.dumps({"prpv": prpv, "ppv": ppv}))
+    steps = "".join(STEPS[version - 1 :])
+    connection.executescript(f"BEGIN;{steps}PRAGMA user_version = {FORMAT};\nCOMMIT;")
+    return connection
 
 
 def _cut_off(connection: sqlite3.Connection, path: Path) -> bool:

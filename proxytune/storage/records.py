@@ -1,6 +1,7 @@
 """The rows of study.db as values."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from proxytune.space import Theta
@@ -16,30 +17,42 @@ class TrialRecord:
         number: Counted from 1.
         theta: Where it was.
         state: Whether it has been scored, has failed, was cut off, or is still open.
-        prpv: Its PRPV, None unless finished.
-        ppv: Its PPV, None unless finished, and where the target's agents all score alike.
+        score: What the search makes small: the objective, with its sign turned if it is to be large; of a trial that
+            was cut off, what that is expected to be. None if it failed or is open.
+        measures: Every measure of it by name, the objective's among them; None where one is undefined. Empty unless
+            finished.
         failed_episodes: How many of its episodes failed.
         failure: Why it failed, empty if it did not.
         decided: The agents that had been driven when it was cut off; empty if it was not.
         bound: What its PRPV cannot be below, None unless it was cut off.
-        estimate: What its PRPV is expected to be, None unless it was cut off.
+        seconds: How long it took, where its episodes do not tell.
     """
 
     number: int
     theta: Theta
     state: State = "open"
-    prpv: float | None = None
-    ppv: float | None = None
+    score: float | None = None
+    measures: Mapping[str, float | None] = field(default_factory=dict)
     failed_episodes: int = 0
     failure: str = ""
     decided: tuple[str, ...] = ()
     bound: float | None = None
-    estimate: float | None = None
+    seconds: float = 0.0
 
     @property
-    def score(self) -> float | None:
-        """What the search is told: PRPV, of a trial that was cut off the estimate; None if it failed or is open."""
-        return self.estimate if self.state == "cut" else self.prpv
+    def prpv(self) -> float | None:
+        """Its PRPV; None unless finished."""
+        return self.measures.get("prpv")
+
+    @property
+    def ppv(self) -> float | None:
+        """Its PPV; None unless finished, and where the target's agents all score alike."""
+        return self.measures.get("ppv")
+
+    @property
+    def estimate(self) -> float | None:
+        """What its PRPV is expected to be; None unless it was cut off."""
+        return self.score if self.state == "cut" else None
 
 
 @dataclass(frozen=True)

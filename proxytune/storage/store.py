@@ -4,7 +4,6 @@ import json
 import sqlite3
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +23,16 @@ def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
 
 def _trial(number: int, theta: str, *rest: Any) -> TrialRecord:
     """A trial from its row, in the order of its attributes."""
-    decided = tuple(json.loads(rest[5]))
-    return replace(TrialRecord(number, json.loads(theta), *rest[:5]), decided=decided, bound=rest[6], estimate=rest[7])
+    state, score, measures, failed, failure, decided, bound, seconds = rest
+    counted = (json.loads(measures), failed, failure, tuple(json.loads(decided)), bound, seconds)
+    return TrialRecord(number, json.loads(theta), state, score, *counted)
+
+
+def _outcome(theta: str, agent: str, start: int, seed: int, *rest: Any) -> Outcome:
+    """An episode's outcome from its row."""
+    metrics, failure, seconds = rest
+    episode = Episode(tuple(json.loads(theta).items()), agent, start, seed)
+    return Outcome(episode, json.loads(metrics) if metrics else None, failure or "", seconds)
 
 
 class Store:
@@ -34,6 +41,10 @@ class Store:
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
         self._connection = connection
+        # What has been read or written, since one writer at a time holds the study's lock.
+        self._trials: dict[str, dict[int, TrialRecord]] = {}
+        self._outcomes: dict[tuple[str, str], dict[Episode, Outcome]] = {}
+        self._seconds: dict[tuple[str, int], tuple[float, int]] | None = None
 
     @classmethod
     @contextmanager
@@ -67,69 +78,78 @@ class Store:
         """What determined the finished trials; empty before the first."""
         return {key: json.loads(value) for key, value in self._all("SELECT key, value FROM facts")}
 
-    def begin(self, facts: Mapping[str, Any]) -> None:
-        """Start a study afresh with these facts; episodes are kept, trials are not."""
+    def begin(self, facts: Mapping[str, Any], objective: str = "prpv") -> None:
+        """Start a search afresh with these facts beside those of others; episodes are kept, its trials are not."""
         with self._transaction() as connection:
-            connection.execute("DELETE FROM trials")
+            connection.execute("DELETE FROM trials WHERE objective = ?", (objective,))
             connection.execute("DELETE FROM facts")
             rows = [(key, json.dumps(value, allow_nan=False)) for key, value in facts.items()]
             connection.executemany("INSERT INTO facts VALUES (?, ?)", rows)
+        self._trials.pop(objective, None)
 
-    def trials(self) -> list[TrialRecord]:
-        """Every trial, in order; the last ones may be open."""
-        rows = self._all(
-            "SELECT number, theta, state, prpv, ppv, failed_episodes, failure, decided, bound, estimate"
-            " FROM trials JOIN instances ON instances.id = trials.instance ORDER BY number"
-        )
-        return [_trial(*row) for row in rows]
+    def trials(self, objective: str = "prpv") -> list[TrialRecord]:
+        """Every trial of a search, in order; the last ones may be open."""
+        if objective not in self._trials:
+            rows = self._all(
+                "SELECT number, theta, state, score, measures, failed_episodes, failure, decided, bound, seconds"
+                " FROM trials JOIN instances ON instances.id = trials.instance WHERE objective = ? ORDER BY number",
+                (objective,),
+            )
+            self._trials[objective] = {row[0]: _trial(*row) for row in rows}
+        return [trial for _, trial in sorted(self._trials[objective].items())]
 
-    def save_trial(self, identity: str, *trials: TrialRecord) -> None:
+    def save_trial(self, identity: str, *trials: TrialRecord, objective: str = "prpv") -> None:
         """Write a trial, or several at once, over what was known of it before."""
         with self._transaction() as connection:
             for trial in trials:
-                row = (trial.state, trial.prpv, trial.ppv, trial.failed_episodes, trial.failure)
-                cut = (json.dumps(trial.decided), trial.bound, trial.estimate)
                 instance = self._instance(connection, identity, theta_json(trial.theta))
+                scored = (trial.state, trial.score, json.dumps(dict(trial.measures), allow_nan=False))
+                rest = (trial.failed_episodes, trial.failure, json.dumps(trial.decided), trial.bound, trial.seconds)
                 connection.execute(
-                    "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                    (trial.number, instance, *row, *cut),
+                    "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                    (objective, trial.number, instance, *scored, *rest),
                 )
+        self._trials.pop(objective, None)
 
     def save_outcome(self, identity: str, outcome: Outcome) -> None:
         """Write an episode, over an earlier failure of the same."""
         episode = outcome.episode
+        theta = theta_json(episode.theta)
         metrics = None if outcome.metrics is None else json.dumps(dict(outcome.metrics), allow_nan=False)
         failure = None if outcome.metrics is not None else outcome.failure
         with self._transaction() as connection:
-            instance = self._instance(connection, identity, theta_json(episode.theta))
+            instance = self._instance(connection, identity, theta)
             row = (instance, episode.agent, episode.start, episode.seed, metrics, failure, outcome.seconds)
             connection.execute("INSERT OR REPLACE INTO episodes VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+        self._remember(identity, theta, outcome)
 
-    def outcomes(self, identity: str, theta: Theta) -> dict[Episode, Outcome]:
-        """Every episode known of a domain instance."""
-        rows = self._all(
-            "SELECT theta, agent, start, seed, metrics, failure, seconds"
-            " FROM episodes JOIN instances ON instances.id = episodes.instance WHERE identity = ? AND theta = ?",
-            (identity, theta_json(theta)),
-        )
-        found = {}
-        for text, agent, start, seed, metrics, failure, seconds in rows:
-            episode = Episode(tuple(json.loads(text).items()), agent, start, seed)
-            found[episode] = Outcome(episode, json.loads(metrics) if metrics else None, failure or "", seconds)
-        return found
+    def outcomes(self, identity: str, theta: Theta) -> Mapping[Episode, Outcome]:
+        """Every episode known of a domain instance: read once, and kept up with what is written."""
+        key = identity, theta_json(theta)
+        if key not in self._outcomes:
+            rows = self._all(
+                "SELECT theta, agent, start, seed, metrics, failure, seconds"
+                " FROM episodes JOIN instances ON instances.id = episodes.instance WHERE identity = ? AND theta = ?",
+                key,
+            )
+            outcomes = [_outcome(*row) for row in rows]
+            self._outcomes[key] = {outcome.episode: outcome for outcome in outcomes}
+        return self._outcomes[key]
 
     def seconds(self) -> dict[tuple[str, int], float]:
         """How long the episodes of each agent and start took on average."""
-        rows = self._all("SELECT agent, start, avg(seconds) FROM episodes GROUP BY agent, start")
-        return {(agent, start): mean for agent, start, mean in rows}
+        if self._seconds is None:
+            rows = self._all("SELECT agent, start, total(seconds), count(*) FROM episodes GROUP BY agent, start")
+            self._seconds = {(agent, start): (total, count) for agent, start, total, count in rows}
+        return {key: total / count for key, (total, count) in self._seconds.items()}
 
-    def seconds_of_trials(self, last: int, seeds: Collection[int]) -> float:
-        """How long the episodes with these seeds took of all trials up to this one."""
+    def seconds_of_trials(self, objective: str, last: int, seeds: Collection[int]) -> float:
+        """How long the episodes with these seeds took of all trials of a search up to this one."""
         query = (
             "SELECT total(seconds) FROM trials JOIN episodes ON episodes.instance = trials.instance"
-            f" WHERE number <= ? AND seed IN ({', '.join('?' * len(seeds))})"
+            f" WHERE objective = ? AND number <= ? AND seed IN ({', '.join('?' * len(seeds))})"
         )
-        return float(self._all(query, (last, *seeds))[0][0])
+        return float(self._all(query, (objective, last, *seeds))[0][0])
 
     def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
         """Remember that a sweep has been asked for in the domain family with this identity."""
@@ -148,6 +168,14 @@ class Store:
             (identity, SweepRecord(name, json.loads(base), tuple(json.loads(points)), *pod))
             for identity, name, base, points, *pod in rows
         ]
+
+    def _remember(self, identity: str, theta: str, outcome: Outcome) -> None:
+        episode = outcome.episode
+        if (identity, theta) in self._outcomes:
+            self._outcomes[identity, theta][episode] = outcome
+        if self._seconds is not None:
+            total, count = self._seconds.get((episode.agent, episode.start), (0.0, 0))
+            self._seconds[episode.agent, episode.start] = (total + outcome.seconds, count + 1)
 
     def _instance(self, connection: sqlite3.Connection, identity: str, theta: str) -> int:
         connection.execute("INSERT OR IGNORE INTO instances (identity, theta) VALUES (?, ?)", (identity, theta))

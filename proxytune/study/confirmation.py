@@ -14,16 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.domain import Episode, Outcome
-from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
 from proxytune.search.knowledge.knowledge import Knowledge
 from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import FRESH, Spent, known_outcomes, plan, run_missing, score, table
-from proxytune.study.outputs import knowledge_of
+from proxytune.study.evaluation import FRESH, plan, score, table
+from proxytune.study.knowledge import knowledge_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.stopping import stopped
 from proxytune.study.study import Study
+from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import Assessment, assess, floor_of_repeats
 
 CANDIDATES = 3
@@ -36,19 +35,20 @@ class Candidate:
 
     Attributes:
         trial: The trial that visited it.
-        scores: PRPV of each fresh repetition of it; None where an agent has no episode that worked.
+        scores: What the study makes small, of each fresh repetition of it; None where an agent has no episode that
+            worked.
         assessment: How useful the proxy is there, over all fresh episodes; None if an agent has none that worked.
     """
 
     trial: TrialRecord
-    scores: tuple[int | None, ...]
+    scores: tuple[float | None, ...]
     assessment: Assessment | None
 
     @property
     def optimism(self) -> float | None:
         """How much better its trial scored than its fresh repetitions do on average."""
         known = [one for one in self.scores if one is not None]
-        return float(np.mean(known)) - self.trial.prpv if known and self.trial.prpv is not None else None
+        return float(np.mean(known)) - self.trial.score if known and self.trial.score is not None else None
 
 
 @dataclass(frozen=True)
@@ -66,42 +66,38 @@ class Confirmation:
     episodes: int
 
 
-def run_confirmation(study: Study, store: Store, watcher: Watcher) -> Spent:
+def run_confirmation(run: StudyRun) -> None:
     """Simulate what is missing of the fresh episodes of a study that has come to its end.
 
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
         RunError: If no trial has a score.
     """
-    trials, spent = [trial for trial in store.trials() if trial.state != "open"], Spent()
-    if not study.settings.confirm or not stopped(study, store, trials):
-        return spent
-    chosen = candidates(trials, knowledge_of(study, store, trials))
-    watcher.begin("fresh episodes", most_episodes(study.settings) - len(chosen) * per_candidate(study.settings))
+    settings, trials = run.settings, run.finished_trials()
+    if not settings.confirm or not stopped(run, trials):
+        return
+    chosen = candidates(trials, knowledge_of(run, trials))
+    run.watcher.begin("fresh episodes", most_episodes(settings) - len(chosen) * per_candidate(settings))
     for number, trial in enumerate(chosen, start=1):
-        planned = [episode for run in _plans(study.settings, trial) for episode in run]
-        spent += run_missing(study, store, planned, watcher, f"fresh episodes {number} of {len(chosen)}")
-    return spent
+        planned = [episode for repetition in _plans(settings, trial) for episode in repetition]
+        run.outcomes(planned, f"fresh episodes {number} of {len(chosen)}")
 
 
-def confirmation_of(
-    study: Study, store: Store, trials: Sequence[TrialRecord], learnt: Knowledge
-) -> Confirmation | None:
-    """What the fresh episodes in the store say of these trials; None if it is off, or an episode is still missing.
+def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:
+    """What the fresh episodes say of these trials; None if it is off, or an episode is still missing.
 
     Args:
-        study: Which study.
-        store: Where its episodes are.
+        run: The study.
         trials: Finished trials, one of them with a score.
         learnt: What they say of θ.
     """
-    if not study.settings.confirm:
+    if not run.settings.confirm:
         return None
-    found = [_driven_again(study, store, trial) for trial in candidates(trials, learnt)]
-    known = tuple(candidate for candidate in found if candidate is not None)
-    if len(known) < len(found):
+    driven = [_driven_again(run, trial) for trial in candidates(trials, learnt)]
+    known = tuple(candidate for candidate in driven if candidate is not None)
+    if len(known) < len(driven):
         return None
-    return Confirmation(_answer(known, learnt), known, per_candidate(study.settings))
+    return Confirmation(_answer(known, learnt), known, per_candidate(run.settings))
 
 
 def candidates(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
@@ -112,7 +108,7 @@ def candidates(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRe
         learnt: What they say of θ.
     """
     # Of a trial that was cut off it is certain that it is none of the best.
-    scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.prpv is not None}
+    scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.state == "finished"}
     expected = {values: mean for values, mean in learnt.expected.items() if values in scored}
     best = min(expected, key=expected.__getitem__)
     noise = float(learnt.fresh_scores(best).std())
@@ -137,16 +133,16 @@ def _plans(settings: StudySettings, trial: TrialRecord) -> list[list[Episode]]:
     return [plan(settings, trial.theta, seed) for seed in seeds]
 
 
-def _driven_again(study: Study, store: Store, trial: TrialRecord) -> Candidate | None:
-    runs = []
-    for planned in _plans(study.settings, trial):
-        known = known_outcomes(study, store, planned)
+def _driven_again(run: StudyRun, trial: TrialRecord) -> Candidate | None:
+    repetitions = []
+    for planned in _plans(run.settings, trial):
+        known = run.known(planned)
         if len(known) < len(planned):
             return None
-        runs.append(list(known.values()))
-    scores = tuple(score(study, trial.theta, outcomes).prpv for outcomes in runs)
-    own = list(known_outcomes(study, store, plan(study.settings, trial.theta, study.settings.seed)).values())
-    return Candidate(trial, scores, _assessed(study, own, runs))
+        repetitions.append(list(known.values()))
+    scores = tuple(score(run.study, trial.theta, outcomes).score for outcomes in repetitions)
+    own = list(run.known(plan(run.settings, trial.theta, run.settings.seed)).values())
+    return Candidate(trial, scores, _assessed(run.study, own, repetitions))
 
 
 def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]]) -> Assessment | None:

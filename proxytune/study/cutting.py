@@ -19,21 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.domain import Episode, Outcome
-from proxytune.running.progress import Watcher
-from proxytune.scores import ScoreTable
 from proxytune.search.surrogate import fit_surrogate
 from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import Instance, Spent, evaluation, known_outcomes, plan, run_missing, table
-from proxytune.study.history import as_trials, episodes_of
+from proxytune.study.evaluation import Instance, Spent, disagreement_of, plan, table
+from proxytune.study.objective import PRPV
+from proxytune.study.outputs import score_trials
 from proxytune.study.study import Study
-from proxytune.usefulness.prpv import dominance
+from proxytune.study.study_run import StudyRun
 
 Array = NDArray[np.float64]
 FEWEST = 3
 """Trials that must have been scored before one is cut off: fewer say nothing of noise."""
-SHARE = 1e-3
-"""What a pair counts besides its disagreements so far: no pair is certain never to disagree."""
+PRIOR_DISAGREEMENT = 1e-3
+"""Added to every pair, so that a pair that has never disagreed keeps some weight."""
 
 
 @dataclass(frozen=True)
@@ -67,30 +65,30 @@ class Cut:
     estimate: float
 
 
-def reference(study: Study, store: Store, done: Sequence[TrialRecord]) -> Reference | None:
+def reference(run: StudyRun, done: Sequence[TrialRecord]) -> Reference | None:
     """What the next trials are held against; None where none is to be cut off.
 
-    That is so during the design, on which all else rests, and where a tolerance is a percentage: what is a tie then
-    depends on agents not driven yet, so that no pair is decided before the last.
+    That is so during the design, on which all else rests; where a tolerance is a percentage: what is a tie then depends
+    on agents not driven yet, so that no pair is decided before the last; and where the objective is another than PRPV,
+    of which the pairs decided say nothing.
     """
-    settings = study.settings
+    settings = run.settings
     scored = [trial for trial in done if trial.state == "finished"]
     percent = any(metric.percent for metric in settings.metrics)
-    if not settings.cut_off or percent or len(done) < settings.initial or len(scored) < FEWEST:
+    cuts = settings.cut_off and not percent and run.study.objective == PRPV
+    if not cuts or len(done) < settings.initial or len(scored) < FEWEST:
         return None
-    surrogate = fit_surrogate(settings.space, as_trials(settings.space, done))
+    surrogate = fit_surrogate(settings.space, score_trials(settings.space, done))
     means, _ = surrogate.at_visited()
-    tables = [found.proxy for trial in scored if (found := evaluation(study, store, trial.theta)) and found.proxy]
     agents = sorted(settings.agents)
-    disagreement = SHARE + np.mean([_disagreement(study, proxy, agents) for proxy in tables], axis=0)
+    pairs = [run.evaluation_of(trial).disagreement for trial in scored]
+    disagreement = PRIOR_DISAGREEMENT + np.mean([matrix for matrix in pairs if matrix is not None], axis=0)
     rows = _telling_first(disagreement)
     limit = float(means.min()) + surrogate.noise_deviation
     return Reference(limit, tuple(agents[row] for row in rows), disagreement[np.ix_(rows, rows)])
 
 
-def run_or_cut(
-    study: Study, store: Store, trials: Sequence[TrialRecord], against: Reference, watcher: Watcher, what: str
-) -> tuple[Spent, list[Cut | None]]:
+def run_or_cut(run: StudyRun, trials: Sequence[TrialRecord], against: Reference, what: str) -> list[Cut | None]:
     """Simulate what is missing of the trials until each is through or cut off.
 
     Episodes that other processes have begun by then are kept in the store, but no trial stands on them.
@@ -98,45 +96,46 @@ def run_or_cut(
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
     """
+    study = run.study
     plans = [_in_order(study, trial, against) for trial in trials]
     planned, plan_of = [episode for one in plans for episode in one], {one[0].theta: one for one in plans}
-    before = known_outcomes(study, store, planned)
+    before = run.known(planned)
 
     def enough(instance: Instance, known: Mapping[Episode, Outcome]) -> bool:
         # The bound never falls, so the last of the agents decided tells for those before it.
         count = _decided(study, against, plan_of[instance], known)
         return count >= 2 and _cut_at(study, against, plan_of[instance], known, count) is not None
 
-    spent = run_missing(study, store, planned, watcher, what, enough)
-    known = known_outcomes(study, store, planned)
+    run.outcomes(planned, what, enough)
+    known = run.known(planned)
     cuts = [_first_cut(study, against, one, known) for one in plans]
-    watcher.begin(what, len(planned) - len(known))
-    ended = [(cut, one) for cut, one in zip(cuts, plans, strict=True) if cut]
-    vain = [episode for cut, one in ended for episode in one if episode.agent not in cut.decided]
-    return spent + Spent(unused=sum(episode in known and episode not in before for episode in vain)), cuts
+    run.watcher.begin(what, len(planned) - len(known))
+    vain = [e for cut, one in zip(cuts, plans, strict=True) if cut for e in one if e.agent not in cut.decided]
+    run.spent += Spent(unused=sum(episode in known and episode not in before for episode in vain))
+    return cuts
 
 
-def by_other_metrics(study: Study, store: Store, trial: TrialRecord) -> TrialRecord:
+def by_other_metrics(run: StudyRun, trial: TrialRecord) -> TrialRecord:
     """What a trial that was cut off comes to by the study's metrics, if others had led to its end.
 
     Its agents decided then bound PRPV now (beside a tolerance in percent only nearly); the estimate takes every other
     pair for one like theirs.
     """
-    outcomes = known_outcomes(study, store, episodes_of(study.settings, trial)).values()
+    outcomes = run.known(run.episodes_of(trial)).values()
     worked = [outcome for outcome in outcomes if outcome.metrics is not None]
-    bound = float(_disagreement(study, table(worked), trial.decided).sum())
-    driven, agents = len(trial.decided), len(study.settings.agents)
-    return replace(trial, bound=bound, estimate=bound * agents * (agents - 1) / (driven * (driven - 1)))
+    bound = float(disagreement_of(run.study, table(worked), trial.decided).sum())
+    driven, agents = len(trial.decided), len(run.settings.agents)
+    return replace(trial, bound=bound, score=bound * agents * (agents - 1) / (driven * (driven - 1)))
 
 
-def spared(study: Study, store: Store, trials: Sequence[TrialRecord]) -> tuple[int, float]:
+def spared(run: StudyRun, trials: Sequence[TrialRecord]) -> tuple[int, float]:
     """How many episodes the cut trials did without, and how long their like take [s], by the others' mean time.
 
     Those that other processes had begun in vain are not among them.
     """
-    settings, seconds = study.settings, store.seconds()
+    settings, seconds = run.settings, run.store.seconds()
     planned = [episode for trial in trials if trial.decided for episode in plan(settings, trial.theta, settings.seed)]
-    known = known_outcomes(study, store, planned)
+    known = run.known(planned)
     missing = [episode for episode in planned if episode not in known]
     return len(missing), sum(seconds.get((episode.agent, episode.start), 0.0) for episode in missing)
 
@@ -173,18 +172,9 @@ def _cut_at(
     if {outcome.episode.agent for outcome in worked} != set(names):
         # An agent that failed from every start leaves the trial without a score, not with a bad one.
         return None
-    bound = float(_disagreement(study, table(worked), names).sum())
+    bound = float(disagreement_of(study, table(worked), names).sum())
     share = against.disagreement[:count, :count].sum() / against.disagreement.sum()
     return Cut(names, bound, float(bound / share)) if bound > against.limit else None
-
-
-def _disagreement(study: Study, proxy: ScoreTable, agents: Sequence[str]) -> Array:
-    """|α_proxy − α_target| of each pair of these agents, in their order."""
-    metrics = study.settings.metrics
-    names = [metric.name for metric in metrics]
-    sides = [table.select(names).arrange(agents=agents).means for table in (proxy, study.target)]
-    ranked = [dominance(means, metrics) for means in sides]
-    return np.abs(ranked[0] - ranked[1])
 
 
 def _telling_first(disagreement: Array) -> list[int]:

@@ -7,7 +7,7 @@ from proxytune.errors import EpisodeError
 from proxytune.running.episodes import running
 from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
-from proxytune.study.evaluation import FRESH, longest_first, plan, told
+from proxytune.study.evaluation import FRESH, failure_of, longest_first, plan
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings
 
@@ -33,7 +33,7 @@ def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, r
     with running(family, longest_first(list(labels), {}), settings.jobs) as outcomes:
         for outcome in outcomes:
             if outcome.metrics is None:
-                raise EpisodeError(told(outcome))
+                raise EpisodeError(failure_of(outcome))
             metrics[outcome.episode] = outcome.metrics
             watcher.episode()
     return ScoreTable.from_episodes({(episode.agent, label): metrics[episode] for episode, label in labels.items()})

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.scores import Array
-from proxytune.storage.store import Store
 from proxytune.study.preflight import placement_pairs
 from proxytune.study.study import Study
+from proxytune.study.study_run import StudyRun
 from proxytune.usefulness.repeats import start_of
 
 PRIOR_PAIRS = 2
@@ -37,11 +37,12 @@ class Noise:
     caution: str = ""
 
 
-def noise_of(study: Study, store: Store) -> Noise:
+def noise_of(run: StudyRun) -> Noise:
     """What is known of noise before the first trial; a function of the pre-flight and the target's table."""
+    study = run.study
     driven = study.settings.starts
     measured = np.maximum(1, study.target.counts)[:, None]
-    pairs = placement_pairs(study, store)
+    pairs = placement_pairs(run)
     if shares_starts(study) and pairs.size:
         return Noise(_shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0 * (1.0 / driven + 1.0 / measured))
     remedy = "measure the target from the study's own starts, and leave the pre-flight on, to know θ better"

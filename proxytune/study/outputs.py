@@ -1,4 +1,4 @@
-"""A study as a search that learns from every output sees it: each agent's mean of every metric that both sides have."""
+"""A study as a search sees it: its trials' scores, and each agent's mean of every metric that both sides have."""
 
 from collections.abc import Collection, Iterable
 
@@ -6,46 +6,15 @@ import numpy as np
 
 from proxytune.domain import Outcome
 from proxytune.scores import Array
-from proxytune.search.goal import Goal
-from proxytune.search.knowledge.knowledge import Knowledge, learn
 from proxytune.search.proposer import Compose, Trial, Values
+from proxytune.space import Space
 from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import known_outcomes
-from proxytune.study.history import episodes_of, lacks_episodes
-from proxytune.study.noise import noise_of
 from proxytune.study.study import Study
-from proxytune.usefulness.prpv import prpv_of_means
 
 
-def trial_of(study: Study, store: Store, done: TrialRecord) -> Trial:
-    """A finished trial as the search sees it; of one that was cut off, the outputs of the agents driven until then.
-
-    Of these the store may happen to have more: other processes had begun them.
-
-    Raises:
-        RunError: If the store lacks episodes of it.
-    """
-    planned = episodes_of(study.settings, done)
-    known = known_outcomes(study, store, planned)
-    if len(known) < len(planned):
-        raise lacks_episodes(store, done)
-    return Trial(study.settings.space.values(done.theta), done.score, outputs_of(study, known.values()))
-
-
-def trials_of(study: Study, store: Store, done: Iterable[TrialRecord]) -> list[Trial]:
-    """Finished trials as the search sees them."""
-    return [trial_of(study, store, trial) for trial in done]
-
-
-def knowledge_of(study: Study, store: Store, done: Iterable[TrialRecord]) -> Knowledge:
-    """What finished trials say of θ.
-
-    Raises:
-        RunError: If no trial has an outcome, or the store lacks episodes of one.
-    """
-    trials = trials_of(study, store, done)
-    return learn(study.settings.space, trials, goal_of(study, store), study.settings.seed)
+def score_trials(space: Space, done: Iterable[TrialRecord]) -> list[Trial]:
+    """Finished trials as a search sees them that learns from scores alone."""
+    return [Trial(space.values(trial.theta), trial.score) for trial in done]
 
 
 def outputs_of(study: Study, outcomes: Collection[Outcome]) -> Values | None:
@@ -69,20 +38,14 @@ def _means(study: Study, outcomes: Collection[Outcome]) -> Array:
     return np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan)
 
 
-def goal_of(study: Study, store: Store) -> Goal:
-    """What the study's search is after; a function of the pre-flight and the target's table."""
-    table = study.target
-    outputs = tuple((agent, metric) for agent in table.agents for metric in table.metrics)
-    return Goal(outputs, table.means.ravel(), noise_of(study, store).variance.ravel(), compose_of(study))
-
-
 def compose_of(study: Study) -> Compose:
-    """PRPV of outputs against the study's target."""
-    metrics, table = study.settings.metrics, study.target
+    """What the study makes small, of outputs against the study's target."""
+    metrics, table, objective = study.settings.metrics, study.target, study.objective
     compared = table.means[:, : len(metrics)]
+    sign = -1.0 if objective.maximise else 1.0
 
     def compose(outputs: Array) -> Array:
         means = outputs.reshape(*outputs.shape[:-1], *table.means.shape)
-        return prpv_of_means(means[..., : len(metrics)], compared, metrics)
+        return sign * objective.of_means(means[..., : len(metrics)], compared, metrics)
 
     return compose

@@ -9,7 +9,7 @@ multiplied by the number of tests (Bonferroni: metrics × ends × looks). A para
 already shows to matter is left out of the second look.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from typing import NamedTuple
@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.domain import Episode, Outcome, make_episode
-from proxytune.running.progress import Watcher
 from proxytune.space import Interval, Theta
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import Spent, episode_seed, known_outcomes, run_missing
+from proxytune.study.evaluation import episode_seed
 from proxytune.study.movement import LOOKS, Movement, judge
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
+from proxytune.study.study_run import StudyRun
 
 PAIRS = 24
 """So many agents × places at least: with fewer, nothing short of a landslide would be beyond noise."""
@@ -61,7 +60,7 @@ class Preflight:
         return tuple(movement.warning for movement in self.movements if not movement.moves)
 
 
-def run_preflight(study: Study, store: Store, watcher: Watcher) -> Spent:
+def run_preflight(run: StudyRun) -> None:
     """Simulate what is missing of the pre-flight of a study that has no finished trial yet.
 
     Nothing of it enters a trial. A study whose trials have begun goes on without.
@@ -69,47 +68,49 @@ def run_preflight(study: Study, store: Store, watcher: Watcher) -> Spent:
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
     """
-    spent = Spent()
-    if not study.settings.preflight or any(trial.state != "open" for trial in store.trials()):
-        return spent
-    undecided = study.settings.space.intervals
-    for look in range(LOOKS):
-        before, now = (_plan(study.settings, _places(study.settings, n), undecided) for n in (look - 1, look))
-        added, what = now[len(before) :], f"pre-flight {look + 1} of {LOOKS}"
-        watcher.begin(what, _most(study.settings, look) - len(added))
-        spent += run_missing(study, store, added, watcher, what)
-        known = known_outcomes(study, store, now)
-        undecided = tuple(i for i in undecided if not _movement(study, look, i, known).moves)
-    return spent
+    if not run.finished_trials():
+        _preflight(run, lambda look, added: _simulate(run, look, added))
 
 
-def preflight_of(study: Study, store: Store) -> Preflight | None:
-    """The pre-flight from what the store has; None if it is off, or an episode is still missing."""
-    if not study.settings.preflight:
+def preflight_of(run: StudyRun) -> Preflight | None:
+    """The pre-flight from what has been simulated; None if it is off, or an episode is still missing."""
+    return _preflight(run, lambda look, added: None)
+
+
+def _simulate(run: StudyRun, look: int, added: Sequence[Episode]) -> None:
+    what = f"pre-flight {look + 1} of {LOOKS}"
+    run.watcher.begin(what, _most(run.settings, look) - len(added))
+    run.outcomes(added, what)
+
+
+def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]) -> Preflight | None:
+    settings = run.settings
+    if not settings.preflight:
         return None
-    found: dict[str, Movement] = {}
+    movements: dict[str, Movement] = {}
     driven: set[Episode] = set()
-    undecided = study.settings.space.intervals
+    undecided = settings.space.intervals
     for look in range(LOOKS):
-        planned = _plan(study.settings, _places(study.settings, look), undecided)
-        known = known_outcomes(study, store, planned)
-        if len(known) < len(planned):
+        before, now = (_plan(settings, _places(settings, n), undecided) for n in (look - 1, look))
+        simulate(look, now[len(before) :])
+        known = run.known(now)
+        if len(known) < len(now):
             return None
-        driven |= set(planned)
-        found |= {i.name: _movement(study, look, i, known) for i in undecided}
-        undecided = tuple(i for i in undecided if not found[i.name].moves)
-    return Preflight(_base(study.settings), tuple(found[name] for name in study.settings.space.names), len(driven))
+        driven |= set(now)
+        movements |= {i.name: _movement(run.study, look, i, known) for i in undecided}
+        undecided = tuple(i for i in undecided if not movements[i.name].moves)
+    return Preflight(_base(settings), tuple(movements[name] for name in settings.space.names), len(driven))
 
 
-def placement_pairs(study: Study, store: Store) -> Array:
+def placement_pairs(run: StudyRun) -> Array:
     """The base of the pre-flight under its own and another placement.
 
     Returns:
         Shape (places, 2, agents, metrics), in the order of the target's table; NaN where an episode failed or was not
         driven; no places where there is no pre-flight.
     """
-    settings, names = study.settings, study.target.metrics
-    known = store.outcomes(study.identity, _base(settings)) if settings.preflight else {}
+    study, settings, names = run.study, run.settings, run.study.target.metrics
+    known = run.store.outcomes(study.identity, _base(settings)) if settings.preflight else {}
     found = np.full((len(_places(settings, LOOKS - 1)), 2, *study.target.means.shape), np.nan)
     for row, place in enumerate(_places(settings, LOOKS - 1)):
         for column, agent in enumerate(settings.agents):

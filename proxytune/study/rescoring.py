@@ -7,12 +7,12 @@ from proxytune.errors import InputError
 from proxytune.scores import Metric
 from proxytune.settings import nearest
 from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
 from proxytune.study.cutting import by_other_metrics
-from proxytune.study.result import StudyResult, known_evaluation, result_of
+from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import record
 from proxytune.study.stopping import stopped
 from proxytune.study.study import Study, read_target
+from proxytune.study.study_run import StudyRun
 
 
 def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:
@@ -31,20 +31,19 @@ def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:
     return replace(study, settings=settings, target=read_target(settings, study.family))
 
 
-def rescored(study: Study, store: Store, metrics: Sequence[Metric]) -> StudyResult:
+def rescored(run: StudyRun, metrics: Sequence[Metric]) -> StudyResult:
     """The result that the study's trials give by these metrics; they remain those that its own metrics led to.
 
     Raises:
         InputError: If a metric cannot be used.
         RunError: If no trial has a score, or episodes are missing.
     """
-    own = [trial for trial in store.trials() if trial.state != "open"]
-    other = with_metrics(study, metrics)
-    trials = [_rescored(other, store, trial) for trial in own]
-    return replace(result_of(other, store, trials), stopped=stopped(study, store, own))
+    own, other = run.finished_trials(), run.of(with_metrics(run.study, metrics))
+    trials = [_rescored(other, trial) for trial in own]
+    return replace(result_of(other, trials), stopped=stopped(run, own))
 
 
-def _rescored(other: Study, store: Store, trial: TrialRecord) -> TrialRecord:
+def _rescored(other: StudyRun, trial: TrialRecord) -> TrialRecord:
     if trial.state == "cut":
-        return by_other_metrics(other, store, trial)
-    return record(trial.number, known_evaluation(other, store, trial))
+        return by_other_metrics(other, trial)
+    return record(trial.number, other.evaluation_of(trial))

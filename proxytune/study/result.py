@@ -9,16 +9,16 @@ from proxytune.search.knowledge.knowledge import Knowledge
 from proxytune.search.surrogate import fit_surrogate
 from proxytune.space import Theta
 from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
 from proxytune.study.confirmation import Confirmation, confirmation_of
 from proxytune.study.cutting import spared
-from proxytune.study.evaluation import Evaluation, evaluation, known_outcomes, told
-from proxytune.study.history import as_trials, episodes_of, lacks_episodes
+from proxytune.study.evaluation import failure_of
+from proxytune.study.knowledge import knowledge_of
 from proxytune.study.noise import noise_of
-from proxytune.study.outputs import knowledge_of
+from proxytune.study.outputs import score_trials
 from proxytune.study.preflight import Preflight, preflight_of
 from proxytune.study.stopping import stopped
 from proxytune.study.study import Study
+from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import Assessment, NoiseFloor, assess
 
 FAILURES_TOLD = 10
@@ -123,49 +123,48 @@ class StudyResult:
     @property
     def episodes(self) -> int:
         """How many episodes trials, pre-flight and confirmation took, failed ones counted."""
-        trials = sum(len(episodes_of(self.study.settings, trial)) for trial in self.trials)
+        settings = self.study.settings
+        trials = sum((len(trial.decided) or len(settings.agents)) * settings.starts for trial in self.trials)
         before = self.preflight.episodes if self.preflight else 0
         after = self.confirmation.episodes * len(self.confirmation.candidates) if self.confirmation else 0
         return before + trials + after
 
 
-def result_of(study: Study, store: Store, scored_anew: Sequence[TrialRecord] | None = None) -> StudyResult:
+def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -> StudyResult:
     """Sum up what the store has, or the same trials scored anew; nothing is simulated.
 
     Raises:
         RunError: If no trial has a score.
     """
-    known = store.trials() if scored_anew is None else scored_anew
-    trials = tuple(trial for trial in known if trial.state != "open")
-    scored = [trial for trial in trials if trial.prpv is not None]
-    if not scored:
+    trials = tuple(run.finished_trials() if scored_anew is None else scored_anew)
+    if not any(trial.state == "finished" for trial in trials):
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
-        raise RunError(f"{store.path}: {reason}")
-    space = study.settings.space
-    learnt = knowledge_of(study, store, trials)
-    confirmation = confirmation_of(study, store, trials, learnt)
+        raise RunError(f"{run.store.path}: {reason}")
+    study, space = run.study, run.settings.space
+    learnt = knowledge_of(run, trials)
+    confirmation = confirmation_of(run, trials, learnt)
     answers = _answers(trials, learnt)
     answer = confirmation.answer.trial if confirmation else answers[-1]
     assert answer is not None
     return StudyResult(
         study=study,
         trials=trials,
-        best=_best(study, store, answer, learnt),
+        best=_best(run, answer, learnt),
         knowledge=learnt,
         answers=answers,
         truth=study.truth,
-        importances=importances(fit_surrogate(space, as_trials(space, trials))),
+        importances=importances(fit_surrogate(space, score_trials(space, trials))),
         confirmation=confirmation,
-        preflight=preflight_of(study, store),
-        stopped=stopped(study, store, trials),
-        spared=spared(study, store, trials),
-        failures=_failures(study, store, trials),
-        cautions=_cautions(study, store),
+        preflight=preflight_of(run),
+        stopped=stopped(run, trials),
+        spared=spared(run, trials),
+        failures=_failures(run, trials),
+        cautions=_cautions(run),
     )
 
 
 def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialRecord | None, ...]:
-    scored = [trial for trial in trials if trial.prpv is not None]
+    scored = [trial for trial in trials if trial.state == "finished"]
     expected = {trial.number: learnt.expected[learnt.space.values(trial.theta)] for trial in scored}
     found: list[TrialRecord | None] = []
     best: TrialRecord | None = None
@@ -176,35 +175,23 @@ def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialR
     return tuple(found)
 
 
-def _cautions(study: Study, store: Store) -> tuple[str, ...]:
-    return tuple(line for line in (*study.cautions, noise_of(study, store).caution) if line)
+def _cautions(run: StudyRun) -> tuple[str, ...]:
+    return tuple(line for line in (*run.study.cautions, noise_of(run).caution) if line)
 
 
-def _best(study: Study, store: Store, answer: TrialRecord, learnt: Knowledge) -> Best:
+def _best(run: StudyRun, answer: TrialRecord, learnt: Knowledge) -> Best:
     values = learnt.space.values(answer.theta)
     _, deviation = learnt.scores([values])
-    proxy = known_evaluation(study, store, answer).proxy
+    proxy = run.evaluation_of(answer).proxy
     assert proxy is not None
-    assessment = assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
+    assessment = assess(proxy=proxy, target=run.study.target, metrics=run.settings.metrics)
     return Best(answer, learnt.expected[values], float(deviation[0]), assessment)
 
 
-def known_evaluation(study: Study, store: Store, trial: TrialRecord) -> Evaluation:
-    """What a finished trial's episodes came to.
-
-    Raises:
-        RunError: If the store lacks some of them.
-    """
-    found = evaluation(study, store, trial.theta)
-    if found is None:
-        raise lacks_episodes(store, trial)
-    return found
-
-
-def _failures(study: Study, store: Store, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]:
+def _failures(run: StudyRun, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]:
     lines: list[str] = []
     for trial in trials:
         if trial.failed_episodes and len(lines) < FAILURES_TOLD:
-            driven = known_outcomes(study, store, episodes_of(study.settings, trial)).values()
-            lines += [f"trial {trial.number}: {told(outcome)}" for outcome in driven if outcome.metrics is None]
+            driven = run.known(run.episodes_of(trial)).values()
+            lines += [f"trial {trial.number}: {failure_of(outcome)}" for outcome in driven if outcome.metrics is None]
     return tuple(lines[:FAILURES_TOLD])

@@ -1,23 +1,25 @@
-"""The loop of a study: propose a batch, simulate, score, until the budget is spent or a rule says stop."""
+"""The search of a study: its trials proposed, simulated and scored, until the budget is spent or a rule says stop."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from proxytune.errors import RunError, SettingsError
-from proxytune.running.progress import Watcher
-from proxytune.search.proposer import Proposer, Trial, batch_at, propose_batch
+from proxytune.search.loop import Propose, Search
+from proxytune.search.proposer import Proposer, Trial
 from proxytune.storage.records import State, TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.cutting import Cut, Reference, reference, run_or_cut
-from proxytune.study.evaluation import Evaluation, Spent, evaluation, known_outcomes, run_missing
-from proxytune.study.history import episodes_of
-from proxytune.study.outputs import trial_of
+from proxytune.study.cutting import Cut, reference, run_or_cut
+from proxytune.study.evaluation import Evaluation
 from proxytune.study.stopping import stopped
 from proxytune.study.study import Study, changes, facts
+from proxytune.study.study_run import StudyRun
+
+LEARNING = "plv"
+"""The fact under which a search for learning value keeps its own."""
 
 
-def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) -> Spent:
+def run_study(run: StudyRun, proposer: Proposer) -> None:
     """Run a study to the end of its budget, or until a rule stops it, from wherever it was left.
 
     The next batch is a function of the seed and the trials before it alone, and an episode that has been simulated is
@@ -29,80 +31,96 @@ def run_study(study: Study, store: Store, proposer: Proposer, watcher: Watcher) 
         RunError: If the machine fails, or no trial of the initial design has a score.
         StoreError: If the database cannot be written.
     """
-    check_facts(study, store)
-    spent = Spent()
-    done = [trial for trial in store.trials() if trial.state != "open"]
-    told = [trial_of(study, store, trial) for trial in done]
-    while not stopped(study, store, done):
-        _check_hope(study, done)
-        batch = batch_at(len(done), study.settings.batch, study.settings.initial)
-        opened = _opened(study, store, proposer, told, batch)
-        against = reference(study, store, done[: batch.start])
-        cost, ended = _evaluated(study, store, opened, against, watcher)
-        spent += cost
-        store.save_trial(study.identity, *ended)
-        done += ended
-        told += [trial_of(study, store, trial) for trial in ended]
-        _tell_best(watcher, done)
-    return spent
+    check_facts(run)
+    settings = run.settings
+    search = Search(settings.space, proposer, settings.seed, settings.budget, settings.initial, settings.batch)
+    search.run(StudyTrials(run))
 
 
-def _opened(study: Study, store: Store, proposer: Proposer, told: Sequence[Trial], batch: range) -> list[TrialRecord]:
-    """What is left of a batch within the budget: open trials in the store, or else proposed, and in the store now.
+class StudyTrials:
+    """The trials of a study, as the search loop evaluates them."""
 
-    Where the budget once cut the batch short, the rest of it is what it would have been.
-    """
-    settings = study.settings
-    last = min(batch.stop, settings.budget)
-    found = [trial for trial in store.trials() if len(told) < trial.number <= last]
-    if len(found) < last - len(told):
-        made = propose_batch(proposer, settings.space, told[: batch.start], settings.seed, last - batch.start)
-        thetas = enumerate(map(settings.space.theta, made), start=batch.start + 1)
-        found += [TrialRecord(number, theta) for number, theta in thetas if number > len(told) + len(found)]
-        store.save_trial(study.identity, *found)
-    return found
+    def __init__(self, run: StudyRun) -> None:
+        self._run = run
+        self._done = run.finished_trials()
+
+    def trials(self) -> Sequence[Trial]:
+        """The finished trials, in order."""
+        return [self._run.search_trial(trial) for trial in self._done]
+
+    def ended(self) -> str:
+        """Why the study runs no further; empty while it does.
+
+        Raises:
+            RunError: If nothing has worked: more of the same would only burn time.
+        """
+        why = stopped(self._run, self._done)
+        failed = all(trial.state == "failed" for trial in self._done)
+        if not why and failed and len(self._done) >= self._run.settings.initial:
+            raise RunError(f"all {len(self._done)} trials failed; the first: {self._done[0].failure}")
+        return why
+
+    def evaluate(self, batch: range, propose: Propose) -> None:
+        """Simulate what is left of a batch, all its trials together, and keep how they ended."""
+        trials = self._open(batch, propose)
+        what = _name_trials(trials, self._run.settings.budget)
+        against = reference(self._run, self._done[: batch.start])
+        if against is None:
+            self._run.outcomes([episode for trial in trials for episode in self._run.episodes_of(trial)], what)
+            cuts: list[Cut | None] = [None] * len(trials)
+        else:
+            cuts = run_or_cut(self._run, trials, against, what)
+        ended = [_end(self._run, trial, cut) for trial, cut in zip(trials, cuts, strict=True)]
+        self._run.save_trials(*ended)
+        self._done += ended
+        self._show_best()
+
+    def _open(self, batch: range, propose: Propose) -> list[TrialRecord]:
+        """What is left of a batch: open trials in the store, or else proposed, and in the store from now on."""
+        done = len(self._done)
+        trials = [trial for trial in self._run.open_trials() if done < trial.number <= batch.stop]
+        if len(trials) < batch.stop - done:
+            thetas = enumerate(map(self._run.settings.space.theta, propose()), start=batch.start + 1)
+            trials += [TrialRecord(number, theta) for number, theta in thetas if number > done + len(trials)]
+            self._run.save_trials(*trials)
+        return trials
+
+    def _show_best(self) -> None:
+        scores = [trial.score for trial in self._done if trial.state == "finished" and trial.score is not None]
+        if scores:
+            objective = self._run.study.objective
+            self._run.watcher.best(-min(scores) if objective.maximise else min(scores))
 
 
-def _evaluated(
-    study: Study, store: Store, trials: Sequence[TrialRecord], against: Reference | None, watcher: Watcher
-) -> tuple[Spent, list[TrialRecord]]:
-    """Simulate trials to their end, or until each is cut off; what it cost and how they ended."""
-    what = _told(trials, study.settings.budget)
-    if against is None:
-        planned = [episode for trial in trials for episode in episodes_of(study.settings, trial)]
-        spent = run_missing(study, store, planned, watcher, what)
-        return spent, [_ended(study, store, trial, None) for trial in trials]
-    spent, cuts = run_or_cut(study, store, trials, against, watcher, what)
-    return spent, [_ended(study, store, trial, cut) for trial, cut in zip(trials, cuts, strict=True)]
-
-
-def _told(trials: Sequence[TrialRecord], budget: int) -> str:
+def _name_trials(trials: Sequence[TrialRecord], budget: int) -> str:
     """Which trials these are, in one phrase."""
     first, last = trials[0].number, trials[-1].number
     return f"trial {first} of {budget}" if first == last else f"trials {first} to {last} of {budget}"
 
 
-def _ended(study: Study, store: Store, trial: TrialRecord, cut: Cut | None) -> TrialRecord:
+def _end(run: StudyRun, trial: TrialRecord, cut: Cut | None) -> TrialRecord:
     """A trial as its episodes, all or those up to the cut, leave it."""
     if cut is None:
-        return record(trial.number, evaluation(study, store, trial.theta))
-    ended = replace(trial, state="cut", decided=cut.decided, bound=cut.bound, estimate=cut.estimate)
-    outcomes = known_outcomes(study, store, episodes_of(study.settings, ended)).values()
+        return record(trial.number, run.evaluation_of(trial))
+    ended = replace(trial, state="cut", decided=cut.decided, bound=cut.bound, score=cut.estimate)
+    outcomes = run.known(run.episodes_of(ended)).values()
     return replace(ended, failed_episodes=sum(outcome.metrics is None for outcome in outcomes))
 
 
-def check_facts(study: Study, store: Store) -> None:
+def check_facts(run: StudyRun) -> None:
     """See to it that what is in the store was made by this very study.
 
     Raises:
         SettingsError: If there are finished trials and what they depend on has changed.
     """
+    study, store = run.study, run.store
     before, after = _facts_before(study, store), facts(study)
     if before == after:
         return
-    if any(trial.state != "open" for trial in store.trials()):
+    if run.finished_trials():
         raise _changed(study, store, before)
-    store.begin(after)
+    others = {key: value for key, value in store.facts().items() if key == LEARNING}
+    store.begin({**after, **others}, study.objective.name)
 
 
 def as_stored(study: Study, store: Store) -> Study:
@@ -120,7 +138,7 @@ def as_stored(study: Study, store: Store) -> Study:
 
 def _facts_before(study: Study, store: Store) -> dict[str, Any]:
     """What the trials in the store were made by; before there was cutting off, nothing was said of it."""
-    before = store.facts()
+    before = {key: value for key, value in store.facts().items() if key != LEARNING}
     return {"cut_off": study.settings.cut_off, **before} if before else {}
 
 
@@ -131,20 +149,9 @@ def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsE
     )
 
 
-def record(number: int, found: Evaluation | None) -> TrialRecord:
+def record(number: int, evaluation: Evaluation) -> TrialRecord:
     """A trial as the store keeps it, from what its episodes came to."""
-    assert found is not None
-    state: State = "failed" if found.failure else "finished"
-    return TrialRecord(number, found.theta, state, found.prpv, found.ppv, len(found.failures), found.failure)
-
-
-def _check_hope(study: Study, done: Sequence[TrialRecord]) -> None:
-    """Stop where nothing has worked: more of the same would only burn time."""
-    if len(done) >= study.settings.initial and all(trial.state == "failed" for trial in done):
-        raise RunError(f"all {len(done)} trials failed; the first: {done[0].failure}")
-
-
-def _tell_best(watcher: Watcher, done: Sequence[TrialRecord]) -> None:
-    scores = [trial.prpv for trial in done if trial.prpv is not None]
-    if scores:
-        watcher.best(min(scores))
+    state: State = "failed" if evaluation.failure else "finished"
+    score, measures = evaluation.score, evaluation.measures if state == "finished" else {}
+    failed = len(evaluation.failures)
+    return TrialRecord(number, evaluation.theta, state, score, measures, failed, evaluation.failure)

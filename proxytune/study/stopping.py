@@ -7,60 +7,58 @@ from proxytune.search.engines.gaussian_process import expected_improvement
 from proxytune.search.engines.registry import WITH_OUTPUTS
 from proxytune.search.proposer import batch_at
 from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
 from proxytune.study.evaluation import plan
-from proxytune.study.history import as_trials
-from proxytune.study.outputs import goal_of, trials_of
-from proxytune.study.settings import StudySettings
-from proxytune.study.study import Study
+from proxytune.study.knowledge import goal_of
+from proxytune.study.outputs import score_trials
+from proxytune.study.study_run import StudyRun
 
 FILE_REMEDY = "raise it or take it out to go on"
 
 
-def stopped(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
+def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
     """Why a study with these finished trials runs no further, in one phrase; empty while it goes on.
 
     Only finished trials and the time of their own episodes count, never the clock of this process: a study that was
     stopped stays so when it is run again, and without the rule it goes on to the trials it would have had anyway. Rules
     are asked where a batch has ended: a budget that cut one short has no say in what they would have said of the whole.
     """
-    settings = study.settings
+    settings = run.settings
     if len(done) >= settings.budget:
         kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
         return f"the budget of {settings.budget} trials is spent{kept}"
     if batch_at(len(done), settings.batch, settings.initial).start < len(done):
         return ""
-    return _out_of_time(settings, store, done) or _nothing_to_gain(study, store, done)
+    return _out_of_time(run, done) or _nothing_to_gain(run, done)
 
 
-def _out_of_time(settings: StudySettings, store: Store, done: Sequence[TrialRecord]) -> str:
-    limit = settings.stop.wall_time_s
+def _out_of_time(run: StudyRun, done: Sequence[TrialRecord]) -> str:
+    settings, limit = run.settings, run.settings.stop.wall_time_s
     if limit is None:
         return ""
     seeds = {episode.seed for episode in plan(settings, {}, settings.seed)}
-    seconds = store.seconds_of_trials(len(done), seeds) / settings.jobs
+    seconds = run.store.seconds_of_trials(run.study.objective.name, len(done), seeds) / settings.jobs
     if seconds < limit:
         return ""
     return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {limit:g}; {FILE_REMEDY}"
 
 
-def _nothing_to_gain(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
-    settings = study.settings
-    limit = settings.stop.no_improvement
-    if limit is None or len(done) < settings.initial or all(trial.prpv is None for trial in done):
+def _nothing_to_gain(run: StudyRun, done: Sequence[TrialRecord]) -> str:
+    limit = run.settings.stop.no_improvement
+    if limit is None or len(done) < run.settings.initial or not any(trial.state == "finished" for trial in done):
         return ""
-    gain, noise = _gain(study, store, done)
+    gain, noise = _gain(run, done)
     if gain >= limit * noise:
         return ""
     return (
-        f"no θ is expected to improve PRPV by more than {gain:.2g}, where its noise is {noise:.2g} and"
-        f" stop.no_improvement is {limit:g}; lower it or take it out to go on"
+        f"no θ is expected to improve {run.study.objective.label} by more than {gain:.2g}, where its noise is"
+        f" {noise:.2g} and stop.no_improvement is {limit:g}; lower it or take it out to go on"
     )
 
 
-def _gain(study: Study, store: Store, done: Sequence[TrialRecord]) -> tuple[float, float]:
-    """The most that any θ is expected to improve PRPV, and its noise, as the study's engine sees it."""
-    settings = study.settings
+def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:
+    """The most that any θ is expected to improve the objective, and its noise, as the study's engine sees it."""
+    settings = run.settings
     if settings.engine in WITH_OUTPUTS:
-        return expected_gain(settings.space, trials_of(study, store, done), goal_of(study, store), settings.seed)
-    return expected_improvement(settings.space, as_trials(settings.space, done), settings.seed)
+        trials = [run.search_trial(trial) for trial in done]
+        return expected_gain(settings.space, trials, goal_of(run), settings.seed)
+    return expected_improvement(settings.space, score_trials(settings.space, done), settings.seed)

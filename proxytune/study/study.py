@@ -15,6 +15,7 @@ from proxytune.search.engines.registry import WITH_OUTPUTS
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.study.family import load_family
+from proxytune.study.objective import PRPV, Objective, objective_of
 from proxytune.study.settings import StudySettings, read_study_settings
 from proxytune.usefulness.repeats import start_of, starts_of
 
@@ -34,6 +35,7 @@ class Study:
         identity: What determines the result of an episode in the proxy, apart from the episode.
         truth: The θ that made the target, where study.toml names a model of it; nothing depends on it.
         cautions: What of study.toml or of the target's table is left out, in one line each.
+        objective: The measure that its trials make small or large.
     """
 
     settings: StudySettings
@@ -42,6 +44,7 @@ class Study:
     identity: str
     truth: Theta | None = None
     cautions: tuple[str, ...] = ()
+    objective: Objective = PRPV
 
 
 def open_study(path: Path) -> Study:
@@ -55,7 +58,8 @@ def open_study(path: Path) -> Study:
     known = _with_scores(settings)
     absent = [agent for agent in settings.agents if agent not in known.agents]
     cautions = (f"the target has no scores of {', '.join(absent)}: left out",) if absent else ()
-    return Study(known, family, read_target(known, family), family.identity, _truth(settings), cautions)
+    target, objective = read_target(known, family), objective_of(settings)
+    return Study(known, family, target, family.identity, _truth(settings), cautions, objective)
 
 
 def _with_scores(settings: StudySettings) -> StudySettings:

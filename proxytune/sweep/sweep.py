@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.errors import InputError
-from proxytune.running.progress import Watcher
 from proxytune.settings import nearest
 from proxytune.space import Interval, Parameter, Theta
 from proxytune.storage.records import SweepRecord
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import Evaluation, Spent, evaluation, plan, simulate
+from proxytune.study.evaluation import Evaluation, plan
 from proxytune.study.study import Study
+from proxytune.study.study_run import StudyRun
 from proxytune.sweep.discrepancy import METRICS
 from proxytune.usefulness import Assessment, assess
 from proxytune.usefulness.resampling import interval as central_interval
@@ -125,30 +124,30 @@ def with_target(sweep: SweepRecord, model: Path, discrepancy: Study) -> SweepRec
     return replace(sweep, target_model=model.read_text(encoding="utf-8"), replays=discrepancy.identity)
 
 
-def run_sweep(
-    study: Study, store: Store, sweep: SweepRecord, watcher: Watcher, discrepancy: Study | None = None
-) -> Spent:
+def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = None) -> None:
     """Simulate what is missing of a sweep; episodes are shared with the study's trials and other sweeps.
 
     With the study of the discrepancy that the sweep names (with_target), POD is simulated too.
     """
-    store.save_sweep(study.identity, sweep)
-    spent = Spent()
+    run.store.save_sweep(run.study.identity, sweep)
+    replays = run.of(discrepancy) if discrepancy is not None else None
     for number, value in enumerate(sweep.points, start=1):
         what = f"{sweep.parameter} {number} of {len(sweep.points)}"
-        spent += simulate(study, store, _theta(sweep, value), watcher, what)
-        if discrepancy is not None:
-            spent += simulate(discrepancy, store, _theta(sweep, value), watcher, f"POD, {what}")
-    return spent
+        run.evaluate(_theta(sweep, value), what)
+        if replays is not None:
+            planned = plan(replays.settings, _theta(sweep, value), replays.settings.seed)
+            replays.outcomes(planned, f"POD, {what}")
+    if replays is not None:
+        run.spent += replays.spent
 
 
-def curve_of(study: Study, store: Store, sweep: SweepRecord) -> Curve | None:
-    """The curve of a sweep from what the store has; None if an episode is still missing."""
-    points = [point for value in sweep.points if (point := _point(study, store, sweep, value))]
+def curve_of(run: StudyRun, sweep: SweepRecord) -> Curve | None:
+    """The curve of a sweep from what has been simulated; None if an episode is still missing."""
+    points = [point for value in sweep.points if (point := _point(run, sweep, value))]
     if len(points) < len(sweep.points):
         return None
-    unit = study.family.parameters[sweep.parameter].unit
-    metrics = tuple(metric.name for metric in study.settings.metrics)
+    unit = run.study.family.parameters[sweep.parameter].unit
+    metrics = tuple(metric.name for metric in run.settings.metrics)
     return Curve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
 
 
@@ -161,10 +160,11 @@ def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
     return PodMean(float(found.mean()), central_interval(found[draws].mean(axis=1)), len(found))
 
 
-def all_curves(study: Study, store: Store) -> Sequence[Curve]:
+def all_curves(run: StudyRun) -> Sequence[Curve]:
     """The curves of every sweep that has been finished, the last one last, each in the domain family of then."""
-    known = [(identity, sweep) for identity, sweep in store.sweeps() if sweep.parameter in study.family.parameters]
-    curves = [curve_of(replace(study, identity=identity), store, sweep) for identity, sweep in known]
+    study = run.study
+    known = [(identity, sweep) for identity, sweep in run.store.sweeps() if sweep.parameter in study.family.parameters]
+    curves = [curve_of(run.of(replace(study, identity=identity)), sweep) for identity, sweep in known]
     return [curve for curve in curves if curve is not None]
 
 
@@ -172,23 +172,23 @@ def _theta(sweep: SweepRecord, value: float) -> dict[str, float]:
     return {**sweep.base, sweep.parameter: value}
 
 
-def _point(study: Study, store: Store, sweep: SweepRecord, value: float) -> SweepPoint | None:
-    """One point from what the store has; None if an episode or a replay is still missing."""
-    known = evaluation(study, store, _theta(sweep, value))
-    pod = _pod(study, store, sweep, value) if sweep.replays else {}
+def _point(run: StudyRun, sweep: SweepRecord, value: float) -> SweepPoint | None:
+    """One point from what has been simulated; None if an episode or a replay is still missing."""
+    known = run.evaluation(_theta(sweep, value))
+    pod = _pod(run, sweep, value) if sweep.replays else {}
     if known is None or pod is None:
         return None
-    found = None
+    assessment = None
     if known.proxy is not None:
-        found = assess(proxy=known.proxy, target=study.target, metrics=study.settings.metrics)
-    return SweepPoint(value, known, found, pod)
+        assessment = assess(proxy=known.proxy, target=run.study.target, metrics=run.settings.metrics)
+    return SweepPoint(value, known, assessment, pod)
 
 
-def _pod(study: Study, store: Store, sweep: SweepRecord, value: float) -> dict[str, PodMean] | None:
+def _pod(run: StudyRun, sweep: SweepRecord, value: float) -> dict[str, PodMean] | None:
     # Its first agent's commands are replayed, as discrepancy_study has it.
-    replayed = replace(study.settings, agents=study.settings.agents[:1])
+    replayed = replace(run.settings, agents=run.settings.agents[:1])
     planned = plan(replayed, _theta(sweep, value), replayed.seed)
-    known = store.outcomes(sweep.replays, _theta(sweep, value))
+    known = run.store.outcomes(sweep.replays, _theta(sweep, value))
     if not all(episode in known for episode in planned):
         return None
     worked = [metrics for episode in planned if (metrics := known[episode].metrics) is not None]

@@ -77,7 +77,11 @@ def _fresh(found: Confirmation | None) -> dict[str, Any] | None:
         "optimism": found.answer.optimism,
         "episodes": found.episodes,
         "candidates": [
-            {"index": one.trial.number, "prpv": round(one.trial.prpv or 0.0), "fresh_prpv": list(one.scores)}
+            {
+                "index": one.trial.number,
+                "prpv": round(one.trial.prpv or 0.0),
+                "fresh_prpv": [None if score is None else round(score) for score in one.scores],
+            }
             for one in found.candidates
         ],
     }

@@ -76,15 +76,15 @@ def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
 @pytest.fixture(scope="session")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
-    from proxytune.running.progress import Silent
     from proxytune.search.engines.registry import make_proposer
     from proxytune.storage.store import Store
     from proxytune.study.run import run_study
     from proxytune.study.study import open_study
+    from proxytune.study.study_run import StudyRun
 
     folder = study_maker(tmp_path_factory.mktemp("finished"))()
     with Store.open(folder) as store:
-        run_study(open_study(folder), store, make_proposer("gp", 5), Silent())
+        run_study(StudyRun(open_study(folder), store), make_proposer("gp", 5))
     return folder
 
 

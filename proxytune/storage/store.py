@@ -146,7 +146,7 @@ class Store:
     def seconds_of_trials(self, objective: str, last: int, seeds: Collection[int]) -> float:
         """How long the episodes with these seeds took of all trials of a search up to this one."""
         query = (
-            "SELECT total(seconds) FROM trials JOIN episodes ON episodes.instance = trials.instance"
+            "SELECT total(episodes.seconds) FROM trials JOIN episodes ON episodes.instance = trials.instance"
             f" WHERE objective = ? AND number <= ? AND seed IN ({', '.join('?' * len(seeds))})"
         )
         return float(self._all(query, (objective, last, *seeds))[0][0])

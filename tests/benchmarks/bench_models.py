@@ -13,17 +13,18 @@ from proxytune.search.engines.composite import composed_scores
 from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.surrogate import fit_surrogate, unit_array
 from proxytune.storage.store import Store
-from proxytune.study.outputs import goal_of, trial_of
+from proxytune.study.knowledge import goal_of
 from proxytune.study.run import as_stored
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 def main():
     opened = open_study(Path(sys.argv[1]))
     with Store.read(opened.settings.folder) as store:
         study = as_stored(opened, store)
-        trials = [trial_of(study, store, trial) for trial in store.trials() if trial.prpv is not None]
-        goal = goal_of(study, store)
+        trials = [StudyRun(study, store).search_trial(trial) for trial in store.trials() if trial.prpv is not None]
+        goal = goal_of(StudyRun(study, store))
     space = study.settings.space
     unit = unit_array(space, [trial.values for trial in trials])
     actual = np.array([trial.score for trial in trials])

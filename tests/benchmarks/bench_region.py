@@ -17,11 +17,13 @@ from proxytune.search.design import from_unit, unit_points
 from proxytune.search.knowledge.knowledge import learn
 from proxytune.search.proposer import Trial
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import known_outcomes, plan, run_missing, table
+from proxytune.study.evaluation import plan, table
+from proxytune.study.knowledge import goal_of
 from proxytune.study.measure import SEED_OFFSET
-from proxytune.study.outputs import goal_of, outputs_of
+from proxytune.study.outputs import outputs_of
 from proxytune.study.preflight import run_preflight
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "truths"
 DESIGN_SEED, TRUTH_SEED = 5, 77
@@ -30,15 +32,15 @@ DESIGN_SEED, TRUTH_SEED = 5, 77
 def driven(study, store, watcher, values, seed):
     """The episodes of a θ under a seed."""
     planned = plan(study.settings, study.settings.space.theta(values), seed)
-    run_missing(study, store, planned, watcher, f"seed {seed}")
-    return list(known_outcomes(study, store, planned).values())
+    StudyRun(study, store, watcher).outcomes(planned, f"seed {seed}")
+    return list(StudyRun(study, store).known(planned).values())
 
 
 def known_of(study, store, watcher, trials, values, family, seed):
     """What the trials say of a target that is measured at a θ."""
     there = replace(study, family=family, identity=family.identity)
     target = table(driven(there, store, watcher, values, seed)).select(study.target.metrics)
-    return learn(study.settings.space, trials, goal_of(replace(study, target=target), store), seed)
+    return learn(study.settings.space, trials, goal_of(StudyRun(replace(study, target=target), store)), seed)
 
 
 def told(name, found, truths):
@@ -69,7 +71,8 @@ def main():
     truths = [from_unit(space, unit) for unit in cloud]
     total = (given.trials + given.truths + 2 * len(models) + 8) * len(study.settings.agents) * study.settings.starts
     with Store.open(given.output) as store, Bars(total) as bars:
-        run_preflight(study, store, bars)
+        study_run = StudyRun(study, store, bars)
+        run_preflight(study_run)
         seed = study.settings.seed
         trials = [Trial(v, 0.0, outputs_of(study, driven(study, store, bars, v, seed))) for v in points]
         seeds = range(SEED_OFFSET + 1, SEED_OFFSET + 1 + given.truths)

@@ -115,7 +115,7 @@ def test_study_db_of_200_trials_of_100_episodes(tmp_path, capsys):
                 episode = make_episode(theta, agent=agent, start=start, seed=episode_seed(1, start))
                 scores = dict(zip(METRICS, random.uniform(0.0, 60.0, len(METRICS)).tolist(), strict=True))
                 store.save_outcome(identity, Outcome(episode, scores, "", float(random.uniform(1.0, 2.0))))
-            store.save_trial(identity, TrialRecord(number, theta, "finished", 20.0, 0.75))
+            store.save_trial(identity, TrialRecord(number, theta, "finished", 20.0, {"prpv": 20.0, "ppv": 0.75}))
         seconds = time.perf_counter() - begun
         begun = time.perf_counter()
         known = store.outcomes(identity, theta)

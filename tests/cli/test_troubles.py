@@ -12,12 +12,12 @@ from processes import episodes, start, trials
 from stopping import Stopping
 
 from proxytune.cli.main import main
-from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.database import FORMAT
 from proxytune.storage.store import Store
 from proxytune.study.run import run_study
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 slow = pytest.mark.slow
 DAMAGED = r"is damaged \([^)]+\); restore a copy, or move it away to start again"
@@ -27,7 +27,8 @@ def interrupted_after(folder, count):
     """Run a study in this process until it has so many episodes."""
     study = open_study(folder)
     with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-        run_study(study, store, make_proposer("gp", study.settings.initial), Stopping(count))
+        study_run = StudyRun(study, store, Stopping(count))
+        run_study(study_run, make_proposer("gp", study.settings.initial))
 
 
 @pytest.fixture
@@ -135,7 +136,8 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     study = open_study(folder)
     with Store.open(folder) as store:
         with pytest.raises(KeyboardInterrupt):
-            run_study(study, store, make_proposer("gp", 5), Stopping(80))
+            study_run = StudyRun(study, store, Stopping(80))
+            run_study(study_run, make_proposer("gp", 5))
         for name in ("study.db", "study.db-wal"):
             shutil.copy(folder / name, crashed / name)
     log = crashed / "study.db-wal"
@@ -143,7 +145,9 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     kept = len(episodes(crashed)) if share else 0
     assert (kept > 0) == (share > 0)
     with Store.open(crashed) as store:
-        spent = run_study(open_study(crashed), store, make_proposer("gp", 5), Silent())
+        study_run = StudyRun(open_study(crashed), store)
+        run_study(study_run, make_proposer("gp", 5))
+        spent = study_run.spent
     assert spent.episodes == 7 * 18 - kept
     assert (trials(crashed), episodes(crashed)) == (trials(finished), episodes(finished))
 

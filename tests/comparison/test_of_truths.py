@@ -11,6 +11,7 @@ from proxytune.storage.store import Store
 from proxytune.study.evaluation import FRESH, plan
 from proxytune.study.measure import SEED_OFFSET, measure
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def opened(make_study, tmp_path):
         study = open_study(folder)
         context = Store.open(tmp_path)
         stores.append(context)
-        return TruthObjective(study, context.__enter__(), Silent(), lacking_families(study, models))
+        return TruthObjective(StudyRun(study, context.__enter__()), lacking_families(study, models))
 
     yield make
     for context in stores:
@@ -65,17 +66,17 @@ def test_the_target_is_what_measure_makes_of_the_truth_under_seeds_that_the_stud
     objective = opened()
     theta = objective.space.theta(objective.truth(2))
     truth = model(tmp_path, "".join(f"{name} = {value!r}\n" for name, value in theta.items()))
-    expected = measure(objective.study.settings, truth, 2 + SEED_OFFSET, Silent())
+    expected = measure(objective.run.study.settings, truth, 2 + SEED_OFFSET, Silent())
     goal = objective.goal(2)
     assert np.array_equal(
-        goal.values.reshape(expected.means.shape), expected.select(objective.study.target.metrics).means
+        goal.values.reshape(expected.means.shape), expected.select(objective.run.study.target.metrics).means
     )
 
 
 def test_the_studys_own_target_is_not_looked_at(opened):
     objective = opened()
-    other = replace(objective.study.target, values=objective.study.target.values[::-1])
-    blind = replace(objective, study=replace(objective.study, target=other))
+    other = replace(objective.run.study.target, values=objective.run.study.target.values[::-1])
+    blind = replace(objective, run=objective.run.of(replace(objective.run.study, target=other)), objectives={})
     assert blind.identity == objective.identity
     assert blind.score(point(objective), 1) == objective.score(point(objective), 1)
 
@@ -99,7 +100,7 @@ def test_a_point_that_seems_no_worse_than_the_truth_has_the_regret_of_the_worse_
         def fresh_score(self, values, seed):
             return {objective.truth(1): 6.0, (0.1, 0.1): 9.0}[values]
 
-    told = Told(objective.study, objective.store, objective.watcher)
+    told = Told(objective.run)
     assert told.regret((0.1, 0.1), 1) == 4.0
     assert told.regret((0.2, 0.1), 1) == 1.0
     assert told.regret(objective.truth(1), 1) == 1.0
@@ -165,12 +166,12 @@ def test_a_proxy_with_a_model_and_targets_with_another_are_refused(opened, tmp_p
 def test_a_target_with_a_hole_is_no_target(make_study, tmp_path):
     study = open_study(make_study(domain={"faults": '["agent2:1:raises"]'}))
     with Store.open(tmp_path) as store, pytest.raises(EpisodeError, match="target of seed 1: agent 'agent2' failed"):
-        TruthObjective(study, store, Silent()).score((0.1, 0.1), 1)
+        TruthObjective(StudyRun(study, store)).score((0.1, 0.1), 1)
 
 
 def test_targets_are_driven_from_the_studys_starts(opened):
     objective = opened()
     objective.score(point(objective), 1)
     theta = objective.space.theta(objective.truth(1))
-    driven = objective.store.outcomes(objective.study.identity, theta)
-    assert set(driven) == set(plan(objective.study.settings, theta, 1 + SEED_OFFSET))
+    driven = objective.run.store.outcomes(objective.run.study.identity, theta)
+    assert set(driven) == set(plan(objective.run.study.settings, theta, 1 + SEED_OFFSET))

@@ -9,12 +9,13 @@ from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 @pytest.fixture
 def result(finished):
     with Store.read(finished) as store:
-        return result_of(open_study(finished), store)
+        return result_of(StudyRun(open_study(finished), store))
 
 
 def lines(figure):
@@ -73,7 +74,7 @@ def test_failed_trials_are_crosses(result):
 
 
 def test_trials_that_were_cut_off_are_shown_at_what_they_cannot_be_below(result):
-    cut = TrialRecord(8, result.trials[0].theta, "cut", decided=("agent0", "agent1"), bound=14.0, estimate=20.0)
+    cut = TrialRecord(8, result.trials[0].theta, "cut", decided=("agent0", "agent1"), bound=14.0, score=20.0)
     told = replace(result, trials=(*result.trials, cut), answers=(*result.answers, result.answers[-1]))
     drawn = lines(convergence(told))
     assert drawn["cut off, at least"].get_xydata().tolist() == [[8.0, 14.0]]

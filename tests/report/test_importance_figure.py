@@ -11,19 +11,20 @@ from proxytune.search.knowledge.importance import Importance
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 @pytest.fixture
 def result(finished):
     with Store.read(finished) as store:
-        found = result_of(open_study(finished), store)
+        found = result_of(StudyRun(open_study(finished), store))
     planted = (Importance("delay", 0.25, (0.1, 0.4), 0.125), Importance("trim", 0.75, (0.5, 1.0), 0.5))
     return replace(found, importances=planted)
 
 
 def test_a_study_has_the_importance_of_each_of_its_parameters(finished):
     with Store.read(finished) as store:
-        found = result_of(open_study(finished), store).importances
+        found = result_of(StudyRun(open_study(finished), store)).importances
     assert [importance.name for importance in found] == ["delay", "trim"]
 
 

@@ -13,12 +13,13 @@ from proxytune.report.writing import save
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 @pytest.fixture
 def result(finished):
     with Store.read(finished) as store:
-        return result_of(open_study(finished), store)
+        return result_of(StudyRun(open_study(finished), store))
 
 
 def test_the_page_needs_nothing_else_and_is_small(result, tmp_path):

@@ -8,13 +8,14 @@ from proxytune.report.study.profiles_figure import density_of, profiles_figure
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 @pytest.fixture
 def result(finished):
     """θ is known to be delay 0.12 and trim 0.1."""
     with Store.read(finished) as store:
-        return planted(result_of(open_study(finished), store))
+        return planted(result_of(StudyRun(open_study(finished), store)))
 
 
 def test_the_density_is_highest_where_theta_is_known_to_be_and_adds_up_to_one(result):

@@ -12,12 +12,13 @@ from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 @pytest.fixture
 def result(finished):
     with Store.read(finished) as store:
-        return planted(result_of(open_study(finished), store))
+        return planted(result_of(StudyRun(open_study(finished), store)))
 
 
 def shadow(result):

@@ -13,7 +13,6 @@ from proxytune.report.study.page import page
 from proxytune.report.study.search_lines import cut_lines, failure_lines, search_lines
 from proxytune.report.study.table import floor_lines, misfit_line, study_table, worth_lines
 from proxytune.report.study.verdict import sentence
-from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
 from proxytune.storage.store import Store
@@ -22,12 +21,13 @@ from proxytune.study.preflight import Preflight
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 @pytest.fixture
 def result(finished):
     with Store.read(finished) as store:
-        return result_of(open_study(finished), store)
+        return result_of(StudyRun(open_study(finished), store))
 
 
 def test_the_document_has_the_promised_keys_and_is_plain_json(result):
@@ -195,8 +195,9 @@ def test_what_was_cut_off_and_saved_is_told(result):
 def test_failed_episodes_are_told_with_the_first_of_them(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6")
     with Store.open(folder) as store:
-        run_study(open_study(folder), store, make_proposer("gp", 5), Silent())
-        result = result_of(open_study(folder), store)
+        study_run = StudyRun(open_study(folder), store)
+        run_study(study_run, make_proposer("gp", 5))
+        result = result_of(StudyRun(open_study(folder), store))
     head, first, *_ = failure_lines(result)
     assert head == "6 of 108 episodes failed; the first:"
     assert first.startswith("  trial 1: agent 'agent3' failed from start 1: ")

@@ -9,9 +9,9 @@ from rich.console import Console
 
 from proxytune.report.sweep.document import curve_csv, curve_document, curve_lines, curve_name, curve_tables, failures
 from proxytune.report.sweep.figures import bar_points, bars_figure, panels_figure, sweep_figure
-from proxytune.running.progress import Silent
 from proxytune.storage.store import Store
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.sweep.discrepancy import discrepancy_study
 from proxytune.sweep.sweep import curve_of, plan_sweep, run_sweep, sweep_interval, with_target
 
@@ -25,8 +25,9 @@ def curve(folder, parameter="trim", base=TRUTH, model=None):
     if discrepancy:
         plan = with_target(plan, model, discrepancy)
     with Store.open(folder) as store:
-        run_sweep(study, store, plan, Silent(), discrepancy)
-        return curve_of(study, store, plan)
+        study_run = StudyRun(study, store)
+        run_sweep(study_run, plan, discrepancy)
+        return curve_of(StudyRun(study, store), plan)
 
 
 @pytest.fixture

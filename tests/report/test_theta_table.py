@@ -7,12 +7,13 @@ from proxytune.report.study.theta_table import theta_columns, theta_lines, theta
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 @pytest.fixture
 def result(finished):
     with Store.read(finished) as store:
-        return planted(replace(result_of(open_study(finished), store), cautions=()))
+        return planted(replace(result_of(StudyRun(open_study(finished), store)), cautions=()))
 
 
 def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box(result):

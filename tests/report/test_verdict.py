@@ -11,6 +11,7 @@ from proxytune.search.knowledge.information import Information
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import NoiseFloor
 from proxytune.usefulness.chance import Chance
 
@@ -79,7 +80,7 @@ def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help(finished):
     found = replace(ABOVE, inside=False, ruled=True)
     assert sentence(found).endswith("Next: loosen the rule under [stop] that ended the search, to come closer to it.")
     with Store.read(finished) as store:
-        result = result_of(open_study(finished), store)
+        result = result_of(StudyRun(open_study(finished), store))
     assert finding_of(result).ruled is False
     assert finding_of(replace(result, trials=result.trials[:3])).ruled is True
 
@@ -153,7 +154,7 @@ def test_only_effects_on_motion_are_declared_to_diagnose_each_once():
 
 def test_a_study_s_finding_holds_what_the_study_knows(finished):
     with Store.read(finished) as store:
-        result = result_of(open_study(finished), store)
+        result = result_of(StudyRun(open_study(finished), store))
     found = finding_of(planted(result, deviation=(3.0, 0.01), misfit=LACKS))
     assert [(known.name, known.unit, known.identified) for known in found.parameters] == [
         ("delay", "s", False),

@@ -1,9 +1,10 @@
+import json
 import sqlite3
 
 import pytest
 
 from proxytune.errors import StoreError
-from proxytune.storage.database import FORMAT, connect, disconnect, told
+from proxytune.storage.database import FORMAT, TRIALS_3, connect, disconnect, told
 
 
 def made(path):
@@ -82,9 +83,17 @@ PRAGMA user_version = 2;
 """
 TRIALS_OF_2 = "SELECT * FROM trials ORDER BY number"
 CONVERTED_TRIALS = [
-    (1, 1, "finished", 4.0, 0.25, 1, "", "[]", None, None),
-    (2, 1, "failed", None, None, 3, "it fell", "[]", None, None),
+    ("prpv", 1, 1, "finished", 4.0, '{"prpv": 4.0, "ppv": 0.25}', 1, "", "[]", None, 0.0),
+    ("prpv", 2, 1, "failed", None, "{}", 3, "it fell", "[]", None, 0.0),
 ]
+TRIALS_OF_3 = f"""
+DROP TABLE trials;
+{TRIALS_3}
+INSERT INTO instances VALUES (1, 'identity', '{{}}');
+INSERT INTO trials VALUES (1, 1, 'finished', 4.0, {1 / 3!r}, 1, '', '[]', NULL, NULL),
+    (2, 1, 'cut', NULL, NULL, 0, '', '["agent1"]', 5.0, 12.5), (3, 1, 'open', NULL, NULL, 0, '', '[]', NULL, NULL);
+PRAGMA user_version = 3;
+"""
 OLD_SWEEPS = """
 DROP TABLE sweeps;
 CREATE TABLE sweeps (
@@ -151,6 +160,22 @@ def test_format_1_becomes_the_present_one_when_opened_for_writing_and_keeps_what
         assert plain.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
         names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     assert names == {"facts", "instances", "trials", "episodes", "sweeps"}
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_trials_of_format_3_have_their_scores_and_measures_to_the_last_bit(tmp_path, writable):
+    path = made(tmp_path / "study.db")
+    with sqlite3.connect(path) as plain:
+        plain.executescript(TRIALS_OF_3)
+    connection = connect(path, writable=writable)
+    rows = connection.execute("SELECT number, state, score, measures, bound FROM trials ORDER BY number").fetchall()
+    connection.close()
+    assert json.loads(rows[0][3]) == {"prpv": 4.0, "ppv": 1 / 3}
+    assert [(*row[:3], row[4]) for row in rows] == [
+        (1, "finished", 4.0, None),
+        (2, "cut", 12.5, 5.0),
+        (3, "open", None, None),
+    ]
 
 
 def test_a_new_database_and_a_converted_one_have_the_same_tables(of_format_1, tmp_path):

@@ -44,12 +44,34 @@ def test_a_failure_is_kept_until_the_episode_works(tmp_path):
 
 
 def test_trials_come_back_in_order_and_the_last_word_counts(tmp_path):
-    finished = TrialRecord(1, THETA, "finished", 4.0, 0.25, 1, "")
+    finished = TrialRecord(1, THETA, "finished", 4.0, {"prpv": 4.0, "ppv": 1 / 3}, 1, "")
     with Store.open(tmp_path) as store:
         store.save_trial("identity", TrialRecord(2, {"trim": 0.2, "delay": 0.0}))
         store.save_trial("identity", TrialRecord(1, THETA))
         store.save_trial("identity", finished)
         assert store.trials() == [finished, TrialRecord(2, {"trim": 0.2, "delay": 0.0})]
+
+
+def test_the_trials_of_two_searches_in_one_study_are_kept_apart(tmp_path):
+    of_plv = TrialRecord(1, {"trim": 0.2}, "finished", -400.0, {"plv": 400.0, "zero_shot": None}, seconds=2.5)
+    with Store.open(tmp_path) as store:
+        store.save_trial("identity", TrialRecord(1, THETA))
+        store.save_trial("identity", of_plv, objective="plv")
+        store.begin({"seed": 2}, "prpv")
+    with Store.read(tmp_path) as store:
+        assert (store.trials(), store.trials("plv")) == ([], [of_plv])
+
+
+def test_what_has_been_read_is_kept_up_with_what_is_written(tmp_path):
+    again = Outcome(EPISODE, {"distance": 2.0}, "", 0.5)
+    with Store.open(tmp_path) as store:
+        assert (store.outcomes("identity", THETA), store.seconds(), store.trials()) == ({}, {}, [])
+        for outcome in (WORKED, again):
+            store.save_outcome("identity", outcome)
+        store.save_trial("identity", TrialRecord(1, THETA))
+        assert store.outcomes("identity", THETA) == {EPISODE: again}
+        assert store.trials() == [TrialRecord(1, THETA)]
+        assert store.seconds() == {("agent1", 2): 1.0}
 
 
 def test_beginning_afresh_drops_trials_but_no_episode(tmp_path):
@@ -73,14 +95,14 @@ def test_seconds_are_averaged_over_domain_instances(tmp_path):
 def test_the_time_of_trials_is_that_of_their_own_episodes(tmp_path):
     elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
     with Store.open(tmp_path) as store:
-        assert store.seconds_of_trials(9, {11}) == 0.0
+        assert store.seconds_of_trials("prpv", 9, {11}) == 0.0
         store.save_outcome("identity", WORKED)
         store.save_outcome("another identity", WORKED)
         store.save_outcome("identity", Outcome(elsewhere, {"distance": 1.0}, "", 0.25))
         store.save_outcome("identity", Outcome(replace(EPISODE, seed=12), {"distance": 1.0}, "", 8.0))
         store.save_trial("identity", TrialRecord(1, THETA, "finished"))
         store.save_trial("identity", TrialRecord(2, {"trim": 0.2}, "finished"))
-        assert [store.seconds_of_trials(last, {11, 13}) for last in (0, 1, 2)] == [0.0, 1.5, 1.75]
+        assert [store.seconds_of_trials("prpv", last, {11, 13}) for last in (0, 1, 2)] == [0.0, 1.5, 1.75]
 
 
 SWEEP = SweepRecord("trim", {"delay": 0.1}, (-0.3, 0.0, 0.3))

@@ -14,12 +14,12 @@ from proxytune.search.engines.registry import STUDY_ENGINES, make_proposer
 from proxytune.search.proposer import propose_batch
 from proxytune.storage.store import Store
 from proxytune.study.cutting import reference
-from proxytune.study.evaluation import evaluation, simulate
-from proxytune.study.outputs import goal_of, trial_of
+from proxytune.study.knowledge import goal_of
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
 from proxytune.study.stopping import stopped
 from proxytune.study.study import facts, open_study
+from proxytune.study.study_run import StudyRun
 
 BATCH = 3
 KEYS = {"batch": str(BATCH), "seed": "4", "engine": '"gp"'}
@@ -35,8 +35,10 @@ def run(folder, watcher=None, **changes):
     """What it cost, and the trials."""
     study = changed(folder, **changes)
     with Store.open(folder) as store:
-        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(study, store))
-        return run_study(study, store, proposer, watcher or Silent()), store.trials()
+        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
+        study_run = StudyRun(study, store, watcher or Silent())
+        run_study(study_run, proposer)
+        return study_run.spent, store.trials()
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +53,7 @@ def test_the_thetas_of_a_batch_follow_from_the_trials_before_it(make_study):
     _, trials = run(folder)
     study = open_study(folder)
     with Store.read(folder) as store:
-        told = [trial_of(study, store, trial) for trial in trials]
+        told = [StudyRun(study, store).search_trial(trial) for trial in trials]
     for base, count in ((0, 3), (3, 2), (5, 3), (8, 2)):
         made = propose_batch(make_proposer("gp", 5), study.settings.space, told[:base], 1, count)
         assert made == tuple(trial.values for trial in told[base : base + count])
@@ -74,10 +76,10 @@ def test_each_trial_of_a_batch_is_held_against_the_trials_before_the_batch_by_it
     with Store.open(folder) as store:
         for trial in (trial for trial in trials if trial.state == "cut"):
             base = 5 + (trial.number - 6) // BATCH * BATCH
-            against = reference(study, store, trials[:base])
+            against = reference(StudyRun(study, store), trials[:base])
             assert trial.decided == against.order[: len(trial.decided)]
-            simulate(study, store, trial.theta, Silent(), "")
-            assert evaluation(study, store, trial.theta).prpv >= trial.bound > against.limit
+            StudyRun(study, store).evaluate(trial.theta, "")
+            assert StudyRun(study, store).evaluation(trial.theta).prpv >= trial.bound > against.limit
 
 
 @pytest.mark.parametrize("first", [1, 4, 6, 9])
@@ -138,8 +140,8 @@ def test_rules_to_stop_are_asked_where_a_batch_has_ended(make_study):
     _, trials = run(folder, budget=BATCH + 1)
     study = changed(folder, **hurried)
     with Store.read(folder) as store:
-        assert stopped(study, store, trials) == ""
-        assert stopped(study, store, trials[:BATCH]).startswith("episodes have taken")
+        assert stopped(StudyRun(study, store), trials) == ""
+        assert stopped(StudyRun(study, store), trials[:BATCH]).startswith("episodes have taken")
 
 
 class Listening(Silent):

@@ -22,11 +22,12 @@ from proxytune.study.confirmation import (
     run_confirmation,
 )
 from proxytune.study.evaluation import FRESH, plan, table
-from proxytune.study.outputs import knowledge_of
+from proxytune.study.knowledge import knowledge_of
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import prpv
 
 ONE = 6 * 3
@@ -42,8 +43,10 @@ def confirmed(folder, watcher=None, **changes):
     """What it cost, and what there is to tell."""
     study = opened(folder, **changes)
     with Store.open(folder) as store:
-        spent = run_confirmation(study, store, watcher or Silent())
-        return spent, result_of(study, store)
+        study_run = StudyRun(study, store, watcher or Silent())
+        run_confirmation(study_run)
+        spent = study_run.spent
+        return spent, result_of(StudyRun(study, store))
 
 
 def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_seen(finished):
@@ -71,7 +74,7 @@ def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_lik
     study = opened(finished)
     with Store.read(finished) as store:
         trials = store.trials()
-        known = knowledge_of(study, store, trials)
+        known = knowledge_of(StudyRun(study, store), trials)
     chosen = [study.settings.space.values(trial.theta) for trial in candidates(trials, known)]
     ranked = list(known.expected)
     noise = known.fresh_scores(ranked[0]).std()
@@ -100,7 +103,7 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
         plant(study, store, lucky, -1.0)
         for rival in rivals:
             plant(study, store, rival, 1.0)
-        found = confirmation_of(study, store, trials, knowledge_of(study, store, trials))
+        found = confirmation_of(StudyRun(study, store), trials, knowledge_of(StudyRun(study, store), trials))
     assert found.answer.trial != lucky
     assert found.answer.scores == (0,)
     assert found.candidates[0].optimism > 0
@@ -126,7 +129,8 @@ def test_trials_do_not_depend_on_it(finished, make_study):
     trials = []
     for study in (longer, other):
         with Store.open(study.settings.folder) as store:
-            run_study(study, store, make_proposer("gp", 5), Silent())
+            study_run = StudyRun(study, store)
+            run_study(study_run, make_proposer("gp", 5))
             trials.append(store.trials())
     assert trials[0] == trials[1]
     assert trials[0][:7] == before
@@ -138,8 +142,9 @@ def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
     for episodes in (1, 20):
         with Store.open(finished) as store:
             with pytest.raises(KeyboardInterrupt):
-                run_confirmation(study, store, Stopping(episodes))
-            assert result_of(study, store).confirmation is None
+                study_run = StudyRun(study, store, Stopping(episodes))
+                run_confirmation(study_run)
+            assert result_of(StudyRun(study, store)).confirmation is None
     spent, found = confirmed(finished, jobs=jobs, confirm=2)
     assert spent.episodes == 2 * ONE * len(found.confirmation.candidates) - 21
     assert found.confirmation.answer.trial in found.trials
@@ -164,7 +169,8 @@ def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, fi
     folder = make_study("ruled")
     study = opened(folder, stop=StopRules(no_improvement=1e9))
     with Store.open(folder) as store:
-        run_study(study, store, make_proposer("gp", 5), Silent())
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer("gp", 5))
         assert len(store.trials()) == 5
     assert confirmed(folder, stop=StopRules(no_improvement=1e9))[0].episodes >= ONE
 
@@ -187,7 +193,7 @@ def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished
 def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_score(finished):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(store.trials(), knowledge_of(study, store, store.trials())):
+        for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
             for episode in plan(study.settings, trial.theta, study.settings.seed + FRESH):
                 if episode.agent == "agent3":
                     store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
@@ -202,7 +208,8 @@ def test_where_failures_stop_the_study_they_stop_it_here(finished):
     broken = opened(finished, stop_on_failure=True)
     broken = replace(broken, family=replace(broken.family, faults=("agent3:1:raises",)))
     with Store.open(finished) as store, pytest.raises(EpisodeError, match="agent 'agent3'"):
-        run_confirmation(broken, store, Silent())
+        study_run = StudyRun(broken, store)
+        run_confirmation(study_run)
 
 
 def test_how_much_was_luck_is_one_line(finished):
@@ -235,9 +242,9 @@ def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_t
 ):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(store.trials(), knowledge_of(study, store, store.trials())):
+        for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
             plant(study, store, trial, 1.0)
-        found = result_of(study, store)
+        found = result_of(StudyRun(study, store))
     monkeypatch.setattr(type(found.knowledge), "holds", lambda *_: inside)
     monkeypatch.setattr(type(found.knowledge), "misfit", Misfit(1.0, 1.0, 0.5 if fits else 0.01))
     assert found.judged.prpv.value == 0

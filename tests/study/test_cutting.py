@@ -17,13 +17,13 @@ from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.cutting import reference, spared
-from proxytune.study.evaluation import evaluation, simulate
-from proxytune.study.history import as_trials, episodes_of
-from proxytune.study.outputs import goal_of, trial_of
+from proxytune.study.knowledge import goal_of
+from proxytune.study.outputs import score_trials
 from proxytune.study.rescoring import rescored
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 BUDGET, ALL = 14, 8 * 3
 """Trials, and episodes of one that is not cut off."""
@@ -53,8 +53,10 @@ def run(folder, watcher=None, **changes):
     study = open_study(folder)
     study = replace(study, settings=replace(study.settings, **changes))
     with Store.open(folder) as store:
-        spent = run_study(study, store, make_proposer("gp", study.settings.initial), watcher or Silent())
-        return spent, store.trials(), result_of(study, store)
+        study_run = StudyRun(study, store, watcher or Silent())
+        run_study(study_run, make_proposer("gp", study.settings.initial))
+        spent = study_run.spent
+        return spent, store.trials(), result_of(StudyRun(study, store))
 
 
 def test_trials_are_cut_off_after_the_design_and_no_other_episode_is_run(done):
@@ -72,16 +74,16 @@ def test_a_trial_that_was_cut_off_would_have_scored_no_less_than_its_bound_and_a
     with Store.open(found.study.settings.folder) as store:
         for trial in trials:
             if trial.state == "cut":
-                limit = reference(found.study, store, trials[: trial.number - 1]).limit
-                simulate(found.study, store, trial.theta, Silent(), "")
-                score = evaluation(found.study, store, trial.theta).prpv
+                limit = reference(StudyRun(found.study, store), trials[: trial.number - 1]).limit
+                StudyRun(found.study, store).evaluate(trial.theta, "")
+                score = StudyRun(found.study, store).evaluation(trial.theta).prpv
                 assert score >= trial.bound > limit
                 assert trial.estimate >= trial.bound
 
 
 def test_the_search_is_told_the_estimate_of_a_trial_that_was_cut_off(done):
     _, trials, found = done
-    told = as_trials(found.study.settings.space, trials)
+    told = score_trials(found.study.settings.space, trials)
     assert [one.score for one in told] == [t.estimate if t.state == "cut" else t.prpv for t in trials]
     assert found.best.trial.state == "finished"
 
@@ -117,7 +119,7 @@ def test_episodes_run_in_vain_change_nothing(cutting, done):
     study = open_study(folder)
     with Store.open(folder) as store:
         for trial in trials:
-            simulate(study, store, trial.theta, Silent(), "")
+            StudyRun(study, store).evaluate(trial.theta, "")
     spent, again, _ = run(folder)
     assert (spent.episodes, again) == (0, trials)
 
@@ -150,8 +152,8 @@ def test_the_order_of_agents_in_the_settings_does_not_matter(cutting, done):
 def test_the_agents_that_tell_most_come_first_and_the_limit_is_a_noise_above_the_incumbent(done):
     _, trials, found = done
     with Store.open(found.study.settings.folder) as store:
-        against = reference(found.study, store, trials)
-        assert reference(found.study, store, trials[:4]) is None
+        against = reference(StudyRun(found.study, store), trials)
+        assert reference(StudyRun(found.study, store), trials[:4]) is None
     rows = against.disagreement
     assert sorted(against.order) == sorted(found.study.settings.agents)
     assert rows[0, 1] == rows.max()
@@ -164,7 +166,7 @@ def test_what_was_spared_is_the_time_of_the_like_of_what_was_not_driven(done):
     _, trials, found = done
     with Store.open(found.study.settings.folder) as store:
         seconds = store.seconds()
-        episodes, spared_seconds = spared(found.study, store, trials)
+        episodes, spared_seconds = spared(StudyRun(found.study, store), trials)
     missing = [
         seconds[agent, start]
         for trial in trials
@@ -179,26 +181,29 @@ def test_what_was_spared_is_the_time_of_the_like_of_what_was_not_driven(done):
 def test_a_cut_trial_is_told_in_the_database_in_plain_sql(done):
     _, trials, found = done
     with sqlite3.connect(found.study.settings.folder / "study.db") as plain:
-        rows = plain.execute("SELECT number, prpv, decided, bound, estimate FROM trials WHERE state = 'cut'").fetchall()
+        rows = plain.execute(
+            "SELECT number, measures, decided, bound, score FROM trials WHERE state = 'cut'"
+        ).fetchall()
     assert [(row[0], row[1], tuple(json.loads(row[2])), *row[3:]) for row in rows] == [
-        (trial.number, None, trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
+        (trial.number, "{}", trial.decided, trial.bound, trial.estimate) for trial in trials if trial.state == "cut"
     ]
 
 
 def test_a_trial_stands_on_the_episodes_of_its_decided_agents(done):
     _, _, found = done
-    trial = TrialRecord(1, {"first": 0.0, "second": 0.0}, "cut", decided=("agent2", "agent5"), bound=1.0, estimate=2.0)
-    driven = episodes_of(found.study.settings, trial)
+    trial = TrialRecord(1, {"first": 0.0, "second": 0.0}, "cut", decided=("agent2", "agent5"), bound=1.0, score=2.0)
+    driven = StudyRun(found.study, None).episodes_of(trial)
     assert {episode.agent for episode in driven} == {"agent2", "agent5"}
     assert len(driven) == 6
-    assert len(episodes_of(found.study.settings, replace(trial, state="finished", decided=()))) == ALL
+    assert len(StudyRun(found.study, None).episodes_of(replace(trial, state="finished", decided=()))) == ALL
 
 
 def test_an_engine_that_learns_from_outputs_has_its_trials_cut_off_too(cutting):
     folder = cutting(engine='"outcomes"')
     study = open_study(folder)
     with Store.open(folder) as store:
-        run_study(study, store, make_proposer("outcomes", 5, goal_of(study, store)), Silent())
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer("outcomes", 5, goal_of(StudyRun(study, store))))
         assert "cut" in {trial.state for trial in store.trials()}
 
 
@@ -206,9 +211,9 @@ def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_e
     _, trials, found = done
     cut, study = next(trial for trial in trials if trial.state == "cut"), found.study
     with Store.open(found.study.settings.folder) as store:
-        before = trial_of(found.study, store, cut)
-        simulate(found.study, store, cut.theta, Silent(), "")
-        assert np.array_equal(trial_of(found.study, store, cut).outcome, before.outcome, equal_nan=True)
+        before = StudyRun(found.study, store).search_trial(cut)
+        StudyRun(found.study, store).evaluate(cut.theta, "")
+        assert np.array_equal(StudyRun(found.study, store).search_trial(cut).outcome, before.outcome, equal_nan=True)
     known = ~np.isnan(before.outcome).reshape(study.target.means.shape).any(axis=1)
     assert {agent for agent, is_known in zip(study.target.agents, known, strict=True) if is_known} == set(cut.decided)
 
@@ -216,8 +221,8 @@ def test_of_a_trial_that_was_cut_off_the_search_has_the_decided_agents_outputs_e
 def test_by_other_metrics_a_cut_trial_is_bounded_by_its_own_agents_and_by_its_own_it_keeps_its_bound(done):
     _, trials, found = done
     with Store.read(found.study.settings.folder) as store:
-        own = rescored(found.study, store, found.study.settings.metrics)
-        other = rescored(found.study, store, [Metric.parse("distance:max:2")])
+        own = rescored(StudyRun(found.study, store), found.study.settings.metrics)
+        other = rescored(StudyRun(found.study, store), [Metric.parse("distance:max:2")])
     assert [trial.bound for trial in own.trials] == [trial.bound for trial in trials]
     assert [trial.state for trial in other.trials] == [trial.state for trial in trials]
     assert [trial.bound for trial in other.trials] != [trial.bound for trial in trials]

@@ -4,19 +4,15 @@ import pytest
 
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError
-from proxytune.running.progress import Silent
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import (
     episode_seed,
-    evaluation,
-    known_outcomes,
     longest_first,
     plan,
-    run_missing,
     score,
-    simulate,
 )
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import ppv, prpv
 
 THETA = {"trim": 0.05, "delay": 0.1}
@@ -25,8 +21,10 @@ THETA = {"trim": 0.05, "delay": 0.1}
 def simulated(folder, theta=THETA):
     study = open_study(folder)
     with Store.open(folder) as store:
-        spent = simulate(study, store, theta, Silent(), "")
-        return spent, evaluation(study, store, theta)
+        study_run = StudyRun(study, store)
+        study_run.evaluate(theta, "")
+        spent = study_run.spent
+        return spent, StudyRun(study, store).evaluation(theta)
 
 
 def test_every_agent_drives_from_every_start_under_common_random_numbers(make_study):
@@ -49,7 +47,7 @@ def test_the_score_is_what_the_usefulness_room_says_of_the_tables(make_study):
     _, found = simulated(folder)
     sides = {"proxy": found.proxy, "target": study.target, "metrics": study.settings.metrics}
     assert found.prpv == prpv(**sides).value > 0
-    assert found.ppv == ppv(**sides).value
+    assert found.measures["ppv"] == ppv(**sides).value
     assert found.failures == ()
 
 
@@ -58,7 +56,7 @@ def test_an_episode_that_is_known_is_not_run_again(make_study, tmp_path):
     first, found = simulated(folder)
     again, same = simulated(folder)
     assert (first.episodes, again.episodes) == (18, 0)
-    assert (found.prpv, found.ppv) == (same.prpv, same.ppv)
+    assert (found.prpv, found.measures["ppv"]) == (same.prpv, same.measures["ppv"])
     assert len((tmp_path / "journal").read_text().splitlines()) == 18
 
 
@@ -66,7 +64,7 @@ def test_an_instance_that_lacks_an_episode_has_no_evaluation_yet(make_study):
     folder = make_study()
     simulated(folder)
     with Store.open(folder) as store:
-        assert evaluation(open_study(folder), store, {"trim": 0.0, "delay": 0.0}) is None
+        assert StudyRun(open_study(folder), store).evaluation({"trim": 0.0, "delay": 0.0}) is None
 
 
 def test_a_failed_episode_is_left_out_and_none_is_made_up_for_it(make_study):
@@ -79,7 +77,7 @@ def test_a_failed_episode_is_left_out_and_none_is_made_up_for_it(make_study):
 
 def test_an_agent_without_any_episode_that_worked_fails_the_trial_by_name(make_study):
     _, found = simulated(make_study(domain={"faults": '["agent3:*:raises"]'}))
-    assert (found.prpv, found.ppv, found.proxy) == (None, None, None)
+    assert (found.prpv, found.score, found.proxy) == (None, None, None)
     assert found.failure.startswith("agent 'agent3' failed from every start, first with: agent 'agent3' raised")
 
 
@@ -112,7 +110,7 @@ def test_scoring_does_not_depend_on_the_order_of_the_outcomes(make_study):
     study = open_study(folder)
     outcomes = [Outcome(e, study.family.run(e), "", 0.0) for e in plan(study.settings, THETA, 1)]
     forth, back = score(study, THETA, outcomes), score(study, THETA, outcomes[::-1])
-    assert (forth.prpv, forth.ppv) == (back.prpv, pytest.approx(back.ppv, abs=1e-12))
+    assert (forth.prpv, forth.measures["ppv"]) == (back.prpv, pytest.approx(back.measures["ppv"], abs=1e-12))
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -120,12 +118,15 @@ def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(mak
     study = open_study(make_study(jobs=str(jobs)))
     planned = plan(study.settings, THETA, 1)
     with Store.open(study.settings.folder) as store:
-        spent = run_missing(study, store, planned, Silent(), "", lambda _, known: len(known) >= 5)
-        known = known_outcomes(study, store, planned)
-        assert spent.episodes == len(known)
+        study_run = StudyRun(study, store)
+        known = study_run.outcomes(planned, "", lambda _, known: len(known) >= 5)
+        assert known == study_run.known(planned)
+        assert study_run.spent.episodes == len(known)
         assert len(known) == 5 if jobs == 1 else len(known) >= 5
-        assert run_missing(study, store, planned, Silent(), "", lambda _, known: len(known) >= 5).episodes == 0
-        assert run_missing(study, store, planned, Silent(), "").episodes == len(planned) - len(known)
+        study_run.outcomes(planned, "", lambda _, known: len(known) >= 5)
+        assert study_run.spent.episodes == len(known)
+        assert list(study_run.outcomes(planned, "")) == planned
+        assert study_run.spent.episodes == len(planned)
 
 
 def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp_path):
@@ -133,9 +134,9 @@ def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp
     study = open_study(make_study(domain={"journal": f'"{journal}"'}))
     planned = plan(study.settings, THETA, 1)[::-1]
     with Store.open(study.settings.folder) as store:
-        simulate(study, store, {"trim": 0.0, "delay": 0.0}, Silent(), "")  # tells which episodes take longest
+        StudyRun(study, store).evaluate({"trim": 0.0, "delay": 0.0}, "")  # tells which episodes take longest
         journal.unlink()
-        run_missing(study, store, planned, Silent(), "", lambda _, known: False)
+        StudyRun(study, store).outcomes(planned, "", lambda _, known: False)
     driven = [line.split()[0] for line in journal.read_text().splitlines()]
     assert driven == [episode.agent for episode in planned]
 
@@ -150,9 +151,9 @@ def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_
         return instance == short and sum(episode.theta == short for episode in known) >= 7
 
     with Store.open(study.settings.folder) as store:
-        spent = run_missing(study, store, planned, Silent(), "", enough)
-        known = known_outcomes(study, store, planned)
-    assert spent.episodes == 18 + 7 + 18
+        study_run = StudyRun(study, store)
+        known = study_run.outcomes(planned, "", enough)
+    assert study_run.spent.episodes == 18 + 7 + 18
     assert [sum(episode in known for episode in one) for one in plans] == [18, 7, 18]
     driven = [line.split()[0] for line in journal.read_text().splitlines()]
     assert driven == sorted(driven), "agent after agent, each in all instances"
@@ -163,7 +164,7 @@ def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
     study = open_study(folder)
     planned = plan(study.settings, THETA, 1)
     with Store.open(folder) as store:
-        run_missing(study, store, planned, Silent(), "")
+        StudyRun(study, store).outcomes(planned, "")
         stopping = replace(study, settings=replace(study.settings, stop_on_failure=True))
         with pytest.raises(EpisodeError, match="agent 'agent3'"):
-            run_missing(stopping, store, planned, Silent(), "", lambda _, known: len(known) == len(planned))
+            StudyRun(stopping, store).outcomes(planned, "", lambda _, known: len(known) == len(planned))

@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 
-from proxytune.running.progress import Silent
 from proxytune.storage.store import Store
+from proxytune.study.knowledge import goal_of
 from proxytune.study.noise import noise_of, shares_starts
-from proxytune.study.outputs import goal_of
 from proxytune.study.preflight import placement_pairs, run_preflight
 from proxytune.study.result import result_of
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 def opened(folder, store):
     study = open_study(folder)
-    run_preflight(study, store, Silent())
+    study_run = StudyRun(study, store)
+    run_preflight(study_run)
     return study
 
 
@@ -43,7 +44,7 @@ def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
     folder = make_study(preflight="true")
     with Store.open(folder) as store:
         study = opened(folder, store)
-        found, pairs = noise_of(study, store), placement_pairs(study, store)
+        found, pairs = noise_of(StudyRun(study, store)), placement_pairs(StudyRun(study, store))
     assert found.caution == ""
     assert pairs.shape[1:] == (2, 6, 2)
     # Wobbly's scores wobble by 0.15, so a difference of two means over three starts has a variance of 2 · 0.15² / 3.
@@ -54,11 +55,11 @@ def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
 def test_repeats_of_a_start_on_the_target_make_its_noise_less(make_study):
     folder = make_study(preflight="true")
     with Store.open(folder) as store:
-        once = noise_of(opened(folder, store), store)
+        once = noise_of(StudyRun(opened(folder, store), store))
         edited(folder, twice)
         study = open_study(folder)
         assert shares_starts(study)
-        again = noise_of(study, store)
+        again = noise_of(StudyRun(study, store))
     assert again.variance == pytest.approx(0.75 * once.variance)
 
 
@@ -71,9 +72,9 @@ def twice(rows):
 @pytest.mark.parametrize("edit", [means_only, other_starts, with_holes])
 def test_any_other_table_works_and_says_what_it_loses(finished, edit):
     with Store.read(finished) as store:
-        before = result_of(open_study(finished), store)
+        before = result_of(StudyRun(open_study(finished), store))
         assert len(before.cautions) == 1  # this study has no pre-flight
-        found = result_of(open_study(edited(finished, edit)), store)
+        found = result_of(StudyRun(open_study(edited(finished, edit)), store))
     assert not shares_starts(found.study)
     (caution,) = found.cautions
     assert caution.startswith("noise is ")
@@ -86,8 +87,8 @@ def test_any_other_table_works_and_says_what_it_loses(finished, edit):
 def test_the_spread_between_starts_is_taken_for_noise_only_where_nothing_better_is_known(make_study):
     folder = make_study(preflight="true")
     with Store.open(folder) as store:
-        known = noise_of(opened(folder, store), store)
-        unknown = noise_of(open_study(make_study(preflight="false")), store)
+        known = noise_of(StudyRun(opened(folder, store), store))
+        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), store))
     assert known.caution == ""
     assert unknown.caution.startswith("noise is taken from the spread between the target's episodes")
 
@@ -96,6 +97,6 @@ def test_failed_episodes_of_the_pre_flight_are_left_out(make_study):
     folder = make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")
     with Store.open(folder) as store:
         study = opened(folder, store)
-        found = noise_of(study, store)
-        assert np.array_equal(goal_of(study, store).noise, found.variance.ravel())
+        found = noise_of(StudyRun(study, store))
+        assert np.array_equal(goal_of(StudyRun(study, store)).noise, found.variance.ravel())
     assert np.isfinite(found.variance).all()

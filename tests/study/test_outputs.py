@@ -1,22 +1,21 @@
 import numpy as np
 import pytest
 
-from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import evaluation, simulate
-from proxytune.study.outputs import goal_of, trial_of
+from proxytune.study.knowledge import goal_of
 from proxytune.study.run import run_study
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 def test_a_trial_s_outcome_composes_to_its_prpv(finished):
     study = open_study(finished)
     with Store.read(finished) as store:
         done = store.trials()
-        told = [trial_of(study, store, trial) for trial in done]
-        composed = goal_of(study, store).compose(np.array([trial.outcome for trial in told]))
+        told = [StudyRun(study, store).search_trial(trial) for trial in done]
+        composed = goal_of(StudyRun(study, store)).compose(np.array([trial.outcome for trial in told]))
     assert [trial.score for trial in told] == [trial.prpv for trial in done]
     assert [trial.values for trial in told] == [study.settings.space.values(trial.theta) for trial in done]
     assert np.array_equal(composed, [trial.prpv for trial in done])
@@ -29,9 +28,10 @@ def test_an_outcome_has_the_study_s_metrics_in_their_order_and_the_target_s_agen
     folder = make_study(agents=agents, metrics=metrics, budget="6")
     study = open_study(folder)
     with Store.open(folder) as store:
-        run_study(study, store, make_proposer("sobol", 5), Silent())
-        told = [trial_of(study, store, trial) for trial in store.trials()]
-        composed = goal_of(study, store).compose(np.array([trial.outcome for trial in told]))
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer("sobol", 5))
+        told = [StudyRun(study, store).search_trial(trial) for trial in store.trials()]
+        composed = goal_of(StudyRun(study, store)).compose(np.array([trial.outcome for trial in told]))
     assert np.array_equal(composed, [trial.score for trial in told])
 
 
@@ -40,8 +40,8 @@ def test_a_trial_whose_agent_has_no_episode_lacks_that_agent_s_outputs_alone(mak
     study = open_study(folder)
     with Store.open(folder) as store:
         theta = {"delay": 0.1, "trim": 0.1}
-        simulate(study, store, theta, Silent(), "")
-        told = trial_of(study, store, TrialRecord(1, theta, "failed"))
+        StudyRun(study, store).evaluate(theta, "")
+        told = StudyRun(study, store).search_trial(TrialRecord(1, theta, "failed"))
     known = ~np.isnan(told.outcome).reshape(6, 2)
     assert told.score is None
     assert known.all(axis=1).tolist() == [True, True, True, False, True, True]
@@ -51,8 +51,10 @@ def test_a_trial_without_any_episode_that_worked_has_no_outcome(make_study):
     folder = make_study(domain={"faults": str([f"agent{n}:*:raises" for n in range(6)])})
     study = open_study(folder)
     with Store.open(folder) as store:
-        simulate(study, store, {"delay": 0.1, "trim": 0.1}, Silent(), "")
-        assert trial_of(study, store, TrialRecord(1, {"delay": 0.1, "trim": 0.1}, "failed")).outcome is None
+        StudyRun(study, store).evaluate({"delay": 0.1, "trim": 0.1}, "")
+        assert (
+            StudyRun(study, store).search_trial(TrialRecord(1, {"delay": 0.1, "trim": 0.1}, "failed")).outcome is None
+        )
 
 
 def test_the_search_is_told_every_metric_that_both_sides_have_and_prpv_counts_the_study_s_own(finished):
@@ -65,9 +67,9 @@ def test_the_search_is_told_every_metric_that_both_sides_have_and_prpv_counts_th
     study = open_study(folder)
     assert study.target.metrics == ("survival_time", "distance")
     with Store.read(folder) as store:
-        goal, done = goal_of(study, store), store.trials()
-        told = [trial_of(study, store, trial) for trial in done]
-        alone = [evaluation(study, store, trial.theta).prpv for trial in done]
+        goal, done = goal_of(StudyRun(study, store)), store.trials()
+        told = [StudyRun(study, store).search_trial(trial) for trial in done]
+        alone = [StudyRun(study, store).evaluation(trial.theta).prpv for trial in done]
     assert goal.outputs[:2] == (("agent0", "survival_time"), ("agent0", "distance"))
     assert goal.compose(np.array([trial.outcome for trial in told])).tolist() == alone
     (folder / "target.csv").write_text("\n".join([*lines[:-1], ",".join(["agent5", "2", "", "7.0"])]) + "\n")

@@ -7,7 +7,6 @@ import pytest
 from stopping import Stopping
 
 from proxytune.errors import EpisodeError
-from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
 from proxytune.storage.store import Store
@@ -15,14 +14,17 @@ from proxytune.study.movement import LEVEL, LOOKS, judge
 from proxytune.study.preflight import PAIRS, most_episodes, preflight_of, run_preflight
 from proxytune.study.run import run_study
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 def run(folder, **changes):
     study = open_study(folder)
     study = replace(study, settings=replace(study.settings, **changes))
     with Store.open(folder) as store:
-        spent = run_preflight(study, store, Silent())
-        return spent, preflight_of(study, store)
+        study_run = StudyRun(study, store)
+        run_preflight(study_run)
+        spent = study_run.spent
+        return spent, preflight_of(StudyRun(study, store))
 
 
 def told(folder, **changes):
@@ -77,7 +79,8 @@ def test_interrupted_anywhere_it_finds_the_same_and_simulates_nothing_twice(plan
     study = replace(study, settings=replace(study.settings, jobs=jobs))
     for episodes in (1, 50, 60):
         with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-            run_preflight(study, store, Stopping(episodes))
+            study_run = StudyRun(study, store, Stopping(episodes))
+            run_preflight(study_run)
         assert run_free(folder) is None
     spent, found = run(folder, jobs=jobs)
     assert found == whole
@@ -86,14 +89,16 @@ def test_interrupted_anywhere_it_finds_the_same_and_simulates_nothing_twice(plan
 
 def run_free(folder):
     with Store.read(folder) as store:
-        return preflight_of(open_study(folder), store)
+        return preflight_of(StudyRun(open_study(folder), store))
 
 
 def test_what_need_not_be_run_is_taken_off_the_bar(planted):
     study = open_study(planted())
     watcher = Stopping()
     with Store.open(study.settings.folder) as store:
-        spent = run_preflight(study, store, watcher)
+        study_run = StudyRun(study, store, watcher)
+        run_preflight(study_run)
+        spent = study_run.spent
     assert spent.episodes + watcher.off == most_episodes(study.settings)
 
 
@@ -103,7 +108,8 @@ def test_the_trials_are_those_of_a_study_without_it(make_study, finished):
     trials = []
     for one in (folder, finished):
         with Store.open(one) as store:
-            run_study(open_study(one), store, make_proposer("gp", 5), Silent())
+            study_run = StudyRun(open_study(one), store)
+            run_study(study_run, make_proposer("gp", 5))
             trials.append(store.trials())
     assert trials[0] == trials[1]
 

@@ -6,11 +6,11 @@ from proxytune.errors import InputError, RunError
 from proxytune.scores import Metric
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import evaluation
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import result_of
 from proxytune.study.settings import StopRules
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 COARSE = (Metric.parse("distance:max:20%"), Metric.parse("survival_time:max"))
 OWN = (Metric.parse("distance:max"), Metric.parse("survival_time:max"))
@@ -18,7 +18,7 @@ OWN = (Metric.parse("distance:max"), Metric.parse("survival_time:max"))
 
 def found(folder, metrics):
     with Store.read(folder) as store:
-        return rescored(open_study(folder), store, metrics)
+        return rescored(StudyRun(open_study(folder), store), metrics)
 
 
 def scores(result):
@@ -27,7 +27,7 @@ def scores(result):
 
 def test_by_its_own_metrics_a_study_comes_to_its_own_result(finished):
     with Store.read(finished) as store:
-        own = result_of(open_study(finished), store)
+        own = result_of(StudyRun(open_study(finished), store))
     again = found(finished, OWN)
     assert again.trials == own.trials
     assert again.best.trial == own.best.trial
@@ -39,7 +39,9 @@ def test_every_trial_is_scored_as_a_study_of_these_metrics_would_have(finished, 
     folder = make_study("other", metrics='["distance:max:20%", "survival_time:max"]')
     other, identity = open_study(folder), open_study(finished).identity
     with Store.read(finished) as store:
-        expected = [evaluation(replace(other, identity=identity), store, trial.theta) for trial in store.trials()]
+        expected = [
+            StudyRun(replace(other, identity=identity), store).evaluation(trial.theta) for trial in store.trials()
+        ]
         before = [trial.prpv for trial in store.trials()]
     assert scores(again) == [one.prpv for one in expected]
     assert scores(again) != before
@@ -56,7 +58,7 @@ def test_why_a_study_has_stopped_is_not_judged_by_the_other_metrics(finished):
     study = open_study(finished)
     study = replace(study, settings=replace(study.settings, budget=9, stop=StopRules(no_improvement=1e9)))
     with Store.read(finished) as store:
-        assert rescored(study, store, COARSE).stopped == result_of(study, store).stopped != ""
+        assert rescored(StudyRun(study, store), COARSE).stopped == result_of(StudyRun(study, store)).stopped != ""
 
 
 REFUSED = {
@@ -84,6 +86,8 @@ def test_a_metric_that_the_target_was_not_measured_in_is_refused_by_file(finishe
 
 def test_a_trial_that_lacks_episodes_is_told(finished):
     with Store.open(finished) as store:
-        store.save_trial(open_study(finished).identity, TrialRecord(7, {"trim": 0.0, "delay": 0.1}, "finished", 3.0))
+        store.save_trial(
+            open_study(finished).identity, TrialRecord(7, {"trim": 0.0, "delay": 0.1}, "finished", 3.0, {"prpv": 3.0})
+        )
     with pytest.raises(RunError, match=r"study\.db: lacks episodes of trial 7"):
         found(finished, COARSE)

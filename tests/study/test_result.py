@@ -3,26 +3,26 @@ from dataclasses import replace
 import pytest
 
 from proxytune.errors import RunError
-from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import simulate
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import assess
 
 
 def result(folder):
     with Store.read(folder) as store:
-        return result_of(open_study(folder), store)
+        return result_of(StudyRun(open_study(folder), store))
 
 
 def run(folder):
     study = open_study(folder)
     with Store.open(folder) as store:
-        run_study(study, store, make_proposer("gp", study.settings.initial), Silent())
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer("gp", study.settings.initial))
     return result(folder)
 
 
@@ -40,8 +40,8 @@ def test_the_best_is_the_surrogate_s_and_not_the_lowest_score(finished):
     with Store.open(finished) as store:
         worst = max(store.trials(), key=lambda trial: trial.prpv)
         near = {name: value + 1e-4 for name, value in worst.theta.items()}
-        lucky = TrialRecord(8, near, "finished", 0.0)
-        simulate(study, store, near, Silent(), "")
+        lucky = TrialRecord(8, near, "finished", 0.0, {"prpv": 0.0})
+        StudyRun(study, store).evaluate(near, "")
         store.save_trial(study.identity, lucky)
     assert result(finished).best.trial.number not in (8, worst.number)
 
@@ -74,18 +74,18 @@ def test_without_a_scored_trial_it_says_so(make_study):
     with Store.open(folder) as store:
         study = open_study(folder)
         with pytest.raises(RunError, match="no trial is finished yet"):
-            result_of(study, store)
+            result_of(StudyRun(study, store))
         store.save_trial(
             study.identity, TrialRecord(1, {"trim": 0.0, "delay": 0.0}, "failed", failure="agent 'x' fell")
         )
         with pytest.raises(RunError, match="all trials failed, the first because agent 'x' fell"):
-            result_of(study, store)
+            result_of(StudyRun(study, store))
 
 
 def test_episodes_that_have_gone_missing_are_told(finished):
     study = open_study(finished)
     with Store.read(finished) as store, pytest.raises(RunError, match="lacks episodes of trial"):
-        result_of(replace(study, identity="another"), store)
+        result_of(StudyRun(replace(study, identity="another"), store))
 
 
 def test_a_study_can_be_summed_up_from_its_first_trial_on(make_study):

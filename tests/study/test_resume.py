@@ -12,12 +12,12 @@ import pytest
 from processes import ENVIRONMENT, FAKES, episodes, finished_episodes, start, trials, wait_for
 
 from proxytune.cli.main import main
-from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import STUDY_ENGINES, make_proposer
 from proxytune.storage.store import Store
-from proxytune.study.outputs import goal_of
+from proxytune.study.knowledge import goal_of
 from proxytune.study.run import run_study
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 PER_TRIAL = 18
 EPISODES = 7 * PER_TRIAL
@@ -61,8 +61,9 @@ def never_stopped(make_study, **changes):
     folder = make_study("whole", **changes)
     study = open_study(folder)
     with Store.open(folder) as store:
-        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(study, store))
-        run_study(study, store, proposer, Silent())
+        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
+        study_run = StudyRun(study, store)
+        run_study(study_run, proposer)
     return trials(folder), episodes(folder)
 
 

@@ -5,21 +5,23 @@ import pytest
 from stopping import Stopping
 
 from proxytune.errors import EpisodeError, RunError, SettingsError
-from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.history import as_trials
-from proxytune.study.outputs import goal_of
+from proxytune.study.knowledge import goal_of
+from proxytune.study.outputs import score_trials
 from proxytune.study.run import as_stored, check_facts, run_study
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 
 def run(folder, **changes):
     study = open_study(folder)
     study = replace(study, settings=replace(study.settings, **changes))
     with Store.open(folder) as store:
-        spent = run_study(study, store, make_proposer("gp", study.settings.initial), Silent())
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer("gp", study.settings.initial))
+        spent = study_run.spent
         return spent.episodes, store.trials()
 
 
@@ -56,7 +58,8 @@ def test_an_interrupted_study_loses_no_finished_episode_and_goes_on_to_the_same_
     study = replace(study, settings=replace(study.settings, jobs=jobs))
     for episodes in (5, 40, 40):
         with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-            run_study(study, store, make_proposer("gp", 5), Stopping(episodes))
+            study_run = StudyRun(study, store, Stopping(episodes))
+            run_study(study_run, make_proposer("gp", 5))
     with sqlite3.connect(folder / "study.db") as plain:
         assert plain.execute("SELECT count(*) FROM episodes").fetchone() == (85,)
     episodes, trials = run(folder, jobs=jobs)
@@ -144,7 +147,7 @@ def test_changed_code_of_the_family_is_refused_but_its_old_result_can_still_be_l
     newer = replace(open_study(finished), identity="wobbly 2 ()")
     with Store.open(finished) as store:
         with pytest.raises(SettingsError, match="the domain family"):
-            check_facts(newer, store)
+            check_facts(StudyRun(newer, store))
         assert as_stored(newer, store).identity == open_study(finished).identity
         assert store.trials() == trials
 
@@ -176,7 +179,8 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
     folder = make_study()
     study = open_study(folder)
     with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
-        run_study(study, store, make_proposer("gp", 5), Stopping(4))
+        study_run = StudyRun(study, store, Stopping(4))
+        run_study(study_run, make_proposer("gp", 5))
     make_study(seed="2")
     assert len(run(folder)[1]) == 7
 
@@ -188,13 +192,16 @@ def test_with_every_engine_an_interrupted_study_goes_on_to_the_same_trials(make_
     folders = [make_study(called, engine=f'"{engine}"') for called in ("whole", "stopped")]
     whole, stopped_one = (open_study(folder) for folder in folders)
     with Store.open(folders[0]) as store:
-        run_study(whole, store, make_proposer(engine, 5, goal_of(whole, store)), Silent())
+        study_run = StudyRun(whole, store)
+        run_study(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
         expected = store.trials()
     for episodes in (30, 70):
         with Store.open(folders[1]) as store, pytest.raises(KeyboardInterrupt):
-            run_study(stopped_one, store, make_proposer(engine, 5, goal_of(whole, store)), Stopping(episodes))
+            study_run = StudyRun(stopped_one, store, Stopping(episodes))
+            run_study(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
     with Store.open(folders[1]) as store:
-        run_study(stopped_one, store, make_proposer(engine, 5, goal_of(whole, store)), Silent())
+        study_run = StudyRun(stopped_one, store)
+        run_study(study_run, make_proposer(engine, 5, goal_of(StudyRun(whole, store))))
         assert store.trials() == expected
     assert len(expected) == 7
 
@@ -205,4 +212,4 @@ def test_the_search_sees_failed_trials_without_a_score(make_study):
         TrialRecord(1, {"trim": 0.1, "delay": 0.2}, "failed"),
         TrialRecord(2, {"trim": 0, "delay": 0}, "finished", 3),
     ]
-    assert [(trial.values, trial.score) for trial in as_trials(space, done)] == [((0.2, 0.1), None), ((0.0, 0.0), 3)]
+    assert [(trial.values, trial.score) for trial in score_trials(space, done)] == [((0.2, 0.1), None), ((0.0, 0.0), 3)]

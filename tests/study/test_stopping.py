@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import pytest
 
-from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
@@ -10,6 +9,7 @@ from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
 from proxytune.study.stopping import stopped
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 NEVER, ALWAYS = 1e-9, 1e9
 
@@ -22,8 +22,9 @@ def ruled(folder, **rules):
 def run(study):
     """The trials, and why there are no more."""
     with Store.open(study.settings.folder) as store:
-        run_study(study, store, make_proposer("gp", study.settings.initial), Silent())
-        return store.trials(), stopped(study, store, store.trials())
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer("gp", study.settings.initial))
+        return store.trials(), stopped(StudyRun(study, store), store.trials())
 
 
 def test_a_spent_budget_is_said(finished):
@@ -35,7 +36,7 @@ def test_a_spent_budget_is_said(finished):
 def test_a_study_under_way_is_not_stopped(finished):
     study = ruled(finished)
     with Store.read(finished) as store:
-        assert stopped(study, store, store.trials()[:6]) == ""
+        assert stopped(StudyRun(study, store), store.trials()[:6]) == ""
 
 
 RULES = {
@@ -73,13 +74,13 @@ def test_time_counts_over_all_runs_and_is_shared_among_jobs(finished):
         trials = store.trials()[:6]
         known = [store.outcomes(study.identity, trial.theta) for trial in trials]
         taken = sum(outcome.seconds for outcomes in known for outcome in outcomes.values())
-        assert stopped(ruled(finished, wall_time_s=0.9 * taken), store, trials)
-        assert not stopped(ruled(finished, wall_time_s=1.1 * taken), store, trials)
+        assert stopped(StudyRun(ruled(finished, wall_time_s=0.9 * taken), store), trials)
+        assert not stopped(StudyRun(ruled(finished, wall_time_s=1.1 * taken), store), trials)
         twice = ruled(finished, wall_time_s=0.9 * taken)
-        assert not stopped(replace(twice, settings=replace(twice.settings, jobs=2)), store, trials)
+        assert not stopped(StudyRun(replace(twice, settings=replace(twice.settings, jobs=2)), store), trials)
 
 
 def test_where_all_trials_failed_nothing_is_said_of_a_gain(finished):
     failed = [TrialRecord(number, {"trim": 0.0, "delay": 0.0}, "failed") for number in range(1, 7)]
     with Store.read(finished) as store:
-        assert stopped(ruled(finished, no_improvement=ALWAYS), store, failed) == ""
+        assert stopped(StudyRun(ruled(finished, no_improvement=ALWAYS), store), failed) == ""

@@ -4,6 +4,7 @@ from proxytune.errors import InputError
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
 from proxytune.study.study import changes, facts, open_study
+from proxytune.study.study_run import StudyRun
 
 BAD = {
     "all agents but one are missing": (
@@ -85,7 +86,7 @@ def test_agents_that_the_target_lacks_are_left_out_and_named(finished):
     study = open_study(finished)
     assert study.settings.agents == study.target.agents == ("agent0", "agent1", "agent2", "agent3")
     with Store.read(finished) as store:
-        cautions = result_of(study, store).cautions
+        cautions = result_of(StudyRun(study, store)).cautions
     assert "the target has no scores of agent4, agent5: left out" in cautions
 
 

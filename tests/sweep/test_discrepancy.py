@@ -9,6 +9,7 @@ from proxytune.errors import InputError
 from proxytune.running.progress import Silent
 from proxytune.storage.store import Store
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.sweep.curves import series_of
 from proxytune.sweep.discrepancy import COMMANDS, METRICS, discrepancy_study
 from proxytune.sweep.sweep import curve_of, plan_sweep, pod_mean, run_sweep, sweep_interval, with_target
@@ -34,8 +35,10 @@ def swept(study, discrepancy, points=4):
     if discrepancy:
         plan = with_target(plan, study.settings.folder.parent / "truth.toml", discrepancy)
     with Store.open(study.settings.folder) as store:
-        spent = run_sweep(study, store, plan, Silent(), discrepancy)
-        return spent.episodes, curve_of(study, store, plan)
+        study_run = StudyRun(study, store)
+        run_sweep(study_run, plan, discrepancy)
+        spent = study_run.spent
+        return spent.episodes, curve_of(StudyRun(study, store), plan)
 
 
 def test_pod_is_nothing_at_the_truth_and_something_beside_it(opened):
@@ -120,9 +123,10 @@ def test_a_sweep_stopped_before_its_last_replays_has_no_curve_yet(opened):
     plan = with_target(plan_sweep(sweep_interval(study, "trim"), TRUTH, 4), model, discrepancy)
     with Store.open(study.settings.folder) as store:
         with pytest.raises(KeyboardInterrupt):
-            run_sweep(study, store, plan, Stopping(), discrepancy)
-        assert curve_of(study, store, plan) is None
-        assert curve_of(study, store, replace(plan, replays="")) is not None, "only POD is missing"
+            study_run = StudyRun(study, store, Stopping())
+            run_sweep(study_run, plan, discrepancy)
+        assert curve_of(StudyRun(study, store), plan) is None
+        assert curve_of(StudyRun(study, store), replace(plan, replays="")) is not None, "only POD is missing"
     assert swept(study, discrepancy)[0] == 3
 
 

@@ -5,6 +5,7 @@ from proxytune.running.progress import Silent
 from proxytune.space import Interval
 from proxytune.storage.store import Store
 from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 from proxytune.sweep.sweep import all_curves, check_base, curve_of, plan_sweep, run_sweep, sweep_interval
 
 TRUTH = {"trim": 0.1, "delay": 0.12}
@@ -14,7 +15,9 @@ def swept(folder, base=TRUTH, parameter="trim", points=5):
     study = open_study(folder)
     plan = plan_sweep(sweep_interval(study, parameter), base, points)
     with Store.open(folder) as store:
-        return run_sweep(study, store, plan, Silent()).episodes, curve_of(study, store, plan)
+        study_run = StudyRun(study, store)
+        run_sweep(study_run, plan)
+        return study_run.spent.episodes, curve_of(StudyRun(study, store), plan)
 
 
 def test_a_grid_has_both_ends_and_the_base_s_own_value_once():
@@ -58,12 +61,13 @@ def test_an_interrupted_sweep_goes_on_where_it_was(make_study):
     plan = plan_sweep(sweep_interval(study, "trim"), TRUTH, 5)
     with Store.open(folder) as store:
         with pytest.raises(KeyboardInterrupt):
-            run_sweep(study, store, plan, Stopping())
-        assert curve_of(study, store, plan) is None
-        assert all_curves(study, store) == []
+            study_run = StudyRun(study, store, Stopping())
+            run_sweep(study_run, plan)
+        assert curve_of(StudyRun(study, store), plan) is None
+        assert all_curves(StudyRun(study, store)) == []
     assert swept(folder)[0] == 4 * 18
     with Store.read(folder) as store:
-        assert [curve.parameter for curve in all_curves(study, store)] == ["trim"]
+        assert [curve.parameter for curve in all_curves(StudyRun(study, store))] == ["trim"]
 
 
 def test_sweeps_of_a_parameter_that_the_family_no_longer_has_are_left_out(make_study, monkeypatch):
@@ -73,7 +77,7 @@ def test_sweeps_of_a_parameter_that_the_family_no_longer_has_are_left_out(make_s
     monkeypatch.setattr("wobbly.PARAMETERS", {"delay": open_study(folder).family.parameters["delay"]})
     study = open_study(make_study(parameters={"delay": "[0.0, 0.3]"}))
     with Store.read(folder) as store:
-        assert [curve.parameter for curve in all_curves(study, store)] == ["delay"]
+        assert [curve.parameter for curve in all_curves(StudyRun(study, store))] == ["delay"]
 
 
 def test_a_point_where_an_agent_fails_throughout_has_no_score_but_the_curve_stands(make_study):

@@ -10,9 +10,10 @@ from proxytune.report.writing import save
 from proxytune.running.progress import Bars
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.lock import locked
+from proxytune.storage.store import Store
 from proxytune.study.study import Study
 from proxytune.teaching.experiment import open_school, points_of
-from proxytune.teaching.search import run_plv_study, search_space
+from proxytune.teaching.search import PlvSearch, search_space
 
 
 def taught(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[float, float]]]) -> Answer:
@@ -22,8 +23,10 @@ def taught(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[
     widths = school.settings.widths
     search_space(settings, widths, {})
     space = search_space(settings, widths, by_prpv() if school.settings.narrow else {})
-    with locked(folder), Bars(points_of(school, school.settings.budget), "points of learning curves") as bars:
-        found = run_plv_study(settings, school, make_proposer(settings.engine, settings.initial), space, bars)
+    points = points_of(school, school.settings.budget)
+    with locked(folder), Store.open(folder) as store, Bars(points, "points of learning curves") as bars:
+        search = PlvSearch(settings, school, store, space, bars)
+        found = search.run(make_proposer(settings.engine, settings.initial))
     figure = folder / "figures" / "plv.png"
     save(plv_figure(found), figure)
     return Answer({**plv_document(found), "figure": str(figure)}, plv_table(found, {"figure": figure}))

@@ -1,13 +1,14 @@
 """One engine on one seed of an objective, from the design to the end of its budget."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from proxytune.comparison.analytic import Objective
 from proxytune.comparison.judgement import Judgement, judge, judgement_from
 from proxytune.search.engines.registry import WITH_OUTPUTS, make_proposer
+from proxytune.search.loop import Propose, Search
 from proxytune.search.proposer import Trial, Values
 
 
@@ -57,16 +58,41 @@ def run_engine(objective: Objective, key: RunKey) -> Run:
         RunError: If no trial has a score.
     """
     goal = objective.goal(key.seed) if key.engine in WITH_OUTPUTS else None
-    proposer, space, spent = make_proposer(key.engine, key.initial, goal), objective.space, 0.0
-    trials: list[Trial] = []
-    for number in range(key.budget):
+    proposer = make_proposer(key.engine, key.initial, goal)
+    visits = Visits(objective, key)
+    Search(objective.space, proposer, key.seed, key.budget, key.initial).run(visits)
+    points = tuple(trial.values for trial in visits.trials())
+    judgement = judge(objective, points, key.seed, by_outputs=key.engine in WITH_OUTPUTS)
+    return Run(key, points, visits.seconds / max(1, key.budget - key.initial), judgement)
+
+
+class Visits:
+    """The points that an engine visits, as the search loop evaluates them.
+
+    Attributes:
+        seconds: How long the proposals after the design have taken.
+    """
+
+    def __init__(self, objective: Objective, key: RunKey) -> None:
+        self.seconds = 0.0
+        self._objective, self._key = objective, key
+        self._trials: list[Trial] = []
+
+    def trials(self) -> Sequence[Trial]:
+        """The visits so far, in order."""
+        return list(self._trials)
+
+    def ended(self) -> str:
+        """Why no further point is visited; empty while one is."""
+        return "the budget is spent" if len(self._trials) >= self._key.budget else ""
+
+    def evaluate(self, batch: range, propose: Propose) -> None:
+        """Score the next point."""
         begun = time.perf_counter()
-        values = proposer.propose(space, trials, key.seed)
-        spent += time.perf_counter() - begun if number >= key.initial else 0.0
-        trials.append(Trial(values, objective.score(values, key.seed), objective.outcome(values, key.seed)))
-    visited = tuple(trial.values for trial in trials)
-    found = judge(objective, visited, key.seed, by_outputs=key.engine in WITH_OUTPUTS)
-    return Run(key, visited, spent / max(1, key.budget - key.initial), found)
+        points = propose()
+        self.seconds += time.perf_counter() - begun if batch.start >= self._key.initial else 0.0
+        objective, seed = self._objective, self._key.seed
+        self._trials += [Trial(v, objective.score(v, seed), objective.outcome(v, seed)) for v in points]
 
 
 def judged_again(objective: Objective, run: Run) -> Run:

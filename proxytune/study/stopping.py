@@ -10,6 +10,7 @@ from proxytune.storage.records import TrialRecord
 from proxytune.study.evaluation import plan
 from proxytune.study.knowledge import goal_of
 from proxytune.study.outputs import score_trials
+from proxytune.study.settings import StopRules
 from proxytune.study.study_run import StudyRun
 
 FILE_REMEDY = "raise it or take it out to go on"
@@ -31,28 +32,39 @@ def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
     return _out_of_time(run, done) or _nothing_to_gain(run, done)
 
 
+def out_of_time(seconds: float, rules: StopRules) -> str:
+    """What to say where so many seconds are more than the rules allow; empty where they are not."""
+    if rules.wall_time_s is None or seconds < rules.wall_time_s:
+        return ""
+    return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {rules.wall_time_s:g}; {FILE_REMEDY}"
+
+
+def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: StopRules) -> str:
+    """What to say where the most that any θ is expected to improve an objective is too little; else empty."""
+    gain, noise = gain_and_noise
+    if rules.no_improvement is None or gain >= rules.no_improvement * noise:
+        return ""
+    return (
+        f"no θ is expected to improve {label} by more than {gain:.2g}, where its noise is {noise:.2g} and"
+        f" stop.no_improvement is {rules.no_improvement:g}; lower it or take it out to go on"
+    )
+
+
 def _out_of_time(run: StudyRun, done: Sequence[TrialRecord]) -> str:
-    settings, limit = run.settings, run.settings.stop.wall_time_s
-    if limit is None:
+    settings = run.settings
+    if settings.stop.wall_time_s is None:
         return ""
     seeds = {episode.seed for episode in plan(settings, {}, settings.seed)}
-    seconds = run.store.seconds_of_trials(run.study.objective.name, len(done), seeds) / settings.jobs
-    if seconds < limit:
-        return ""
-    return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {limit:g}; {FILE_REMEDY}"
+    seconds = run.store.seconds_of_trials(run.study.objective.name, len(done), seeds)
+    return out_of_time(seconds / settings.jobs, settings.stop)
 
 
 def _nothing_to_gain(run: StudyRun, done: Sequence[TrialRecord]) -> str:
-    limit = run.settings.stop.no_improvement
-    if limit is None or len(done) < run.settings.initial or not any(trial.state == "finished" for trial in done):
+    rules = run.settings.stop
+    finished = any(trial.state == "finished" for trial in done)
+    if rules.no_improvement is None or len(done) < run.settings.initial or not finished:
         return ""
-    gain, noise = _gain(run, done)
-    if gain >= limit * noise:
-        return ""
-    return (
-        f"no θ is expected to improve {run.study.objective.label} by more than {gain:.2g}, where its noise is"
-        f" {noise:.2g} and stop.no_improvement is {limit:g}; lower it or take it out to go on"
-    )
+    return nothing_to_gain(run.study.objective.label, _gain(run, done), rules)
 
 
 def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:

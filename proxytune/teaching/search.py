@@ -1,23 +1,34 @@
-"""A study that looks for the proxy of highest learning value: θ, or p(θ) by the centre and width of each parameter.
+"""A search for the proxy of highest learning value: θ, or p(θ) by the centre and width of each parameter.
 
-Nothing but trained points is kept (see `Cache`): a proposal is a pure function of seed and finished trials, so a study
-that is run again finds every trial it had and goes on after them.
+A proposal is a pure function of seed and finished trials, trials are kept in study.db and trained points in a cache
+(see `Cache`): a study that is stopped at any moment goes on where it was.
 """
 
-from collections.abc import Mapping
+import json
+import math
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from proxytune.errors import RunError
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Curve, Teaching, settled, teaching
 from proxytune.learning.settings import NONE
 from proxytune.running.progress import Watcher
+from proxytune.search.engines.gaussian_process import expected_improvement
+from proxytune.search.loop import Propose, Search
 from proxytune.search.proposer import Proposer, Trial
 from proxytune.space import Interval, Space, Theta
+from proxytune.storage.records import TrialRecord
+from proxytune.storage.store import Store
+from proxytune.study.outputs import score_trials
 from proxytune.study.settings import StudySettings
+from proxytune.study.stopping import nothing_to_gain, out_of_time
 from proxytune.teaching.experiment import convergence, learning_curves, teaching_settings
 from proxytune.teaching.points import School
 
+OBJECTIVE = "plv"
 WIDTH = " width"
 """What the width of a parameter's distribution is called, after the parameter."""
 
@@ -54,6 +65,7 @@ class PlvStudy:
         without: The learning curve without a proxy.
         when: When a learner counts as converged.
         trials: Every proxy tried, in order.
+        stopped: Why no further one was.
     """
 
     settings: StudySettings
@@ -61,6 +73,7 @@ class PlvStudy:
     without: Curve
     when: Convergence
     trials: tuple[PlvTrial, ...]
+    stopped: str = ""
 
     @property
     def narrowed(self) -> bool:
@@ -70,10 +83,10 @@ class PlvStudy:
     @property
     def best(self) -> PlvTrial:
         """The trial of highest PLV, the first of them; where none is known, the first."""
-        return max(self.trials, key=lambda trial: (known(trial), -trial.number))
+        return max(self.trials, key=lambda trial: (plv_or_worst(trial), -trial.number))
 
 
-def known(trial: PlvTrial) -> float:
+def plv_or_worst(trial: PlvTrial) -> float:
     """PLV, minus infinity where the learner did not converge."""
     value = trial.worth.plv.value
     return float("-inf") if value is None else value
@@ -107,33 +120,131 @@ def _narrowed(box: Interval, left: tuple[float, float] | None) -> Interval:
     return Interval(box.name, max(box.low, left[0] - slack), min(box.high, left[1] + slack), box.unit)
 
 
-def run_plv_study(
-    settings: StudySettings, school: School, proposer: Proposer, space: Space, watcher: Watcher
-) -> PlvStudy:
-    """Try as many proxies as the budget of [teaching] says, from wherever an earlier run was left.
+@dataclass(frozen=True)
+class PlvSearch:
+    """A search for the proxy of highest learning value: what its trials are a function of, and where they are kept.
 
-    Raises:
-        RunError: If the learner does not converge without a proxy, so that no PLV is known.
-        LearnerError: If an expert cannot drive somewhere in the box.
+    Attributes:
+        settings: Of the study.
+        school: Where learners are taught and examined.
+        store: Where trials are kept.
+        space: The box that is searched.
+        watcher: Hears of every point of a learning curve.
     """
-    taught = school.settings
-    without = learning_curves(school, {NONE: None}, settings.jobs, watcher)[NONE]
-    when = convergence(taught, without)
-    if not settled(without, taught.tolerance):
-        raise RunError(
-            f"{settings.path}: without a proxy the score still rises by more than {taught.tolerance:g} up to "
-            f"{without.counts[-1]} target samples, so PLV is not known; raise teaching.target_samples"
-        )
-    trials: list[PlvTrial] = []
-    while len(trials) < taught.budget:
-        told = [Trial(space.values(trial.theta), _score(trial)) for trial in trials]
-        theta = space.theta(proposer.propose(space, told, settings.seed))
-        proxy = distribution(school, theta)
-        name = f"trial {len(trials) + 1}"
-        curve = learning_curves(school, {name: proxy}, settings.jobs, watcher)[name]
-        worth = teaching(without=without, with_proxy=curve, when=when)
-        trials.append(PlvTrial(len(trials) + 1, theta, proxy, curve, worth))
-    return PlvStudy(settings, space, without, when, tuple(trials))
+
+    settings: StudySettings
+    school: School
+    store: Store
+    space: Space
+    watcher: Watcher
+
+    def run(self, proposer: Proposer) -> PlvStudy:
+        """Try proxies until the budget of [teaching] is spent or a rule says stop, from wherever it was left.
+
+        Raises:
+            RunError: If the learner does not converge without a proxy, so that no PLV is known.
+            LearnerError: If an expert cannot drive somewhere in the box.
+        """
+        settings, taught = self.settings, self.school.settings
+        without = learning_curves(self.school, {NONE: None}, settings.jobs, self.watcher)[NONE]
+        if not settled(without, taught.tolerance):
+            raise RunError(
+                f"{settings.path}: without a proxy the score still rises by more than {taught.tolerance:g} up to "
+                f"{without.counts[-1]} target samples, so PLV is not known; raise teaching.target_samples"
+            )
+        self._check_facts()
+        tried = ProxyTrials(self, without, convergence(taught, without))
+        Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
+        return PlvStudy(settings, self.space, without, tried.when, tuple(tried.tried()), tried.ended())
+
+    def facts(self) -> dict[str, Any]:
+        """All that a trial depends on; if it changes, trials lose their meaning."""
+        settings, taught = self.settings, self.school.settings
+        named = ("proxy_samples", "target_samples", "seeds", "lesson_s", "level", "tolerance")
+        return {
+            "domains": list(self.school.identities),
+            "learner": self.school.learner_identity,
+            **{name: json.loads(json.dumps(getattr(taught, name))) for name in named},
+            **{name: getattr(settings, name) for name in ("starts", "seed", "initial", "batch", "engine")},
+            "box": {box.name: [box.low, box.high] for box in self.space.intervals},
+        }
+
+    def _check_facts(self) -> None:
+        """Begin afresh where trials were made under other facts; what was taught is kept, so little is lost."""
+        facts = self.store.facts()
+        if facts.get(OBJECTIVE) != self.facts():
+            self.store.begin({**facts, OBJECTIVE: self.facts()}, OBJECTIVE)
+
+
+class ProxyTrials:
+    """The proxies tried, as the search loop evaluates them."""
+
+    def __init__(self, search: PlvSearch, without: Curve, when: Convergence) -> None:
+        self.when = when
+        self._search, self._without = search, without
+        self._records = [trial for trial in search.store.trials(OBJECTIVE) if trial.state != "open"]
+
+    def trials(self) -> Sequence[Trial]:
+        """The finished trials, in order."""
+        return score_trials(self._search.space, self._records)
+
+    def ended(self) -> str:
+        """Why no further proxy is tried; empty while one is."""
+        search, done = self._search, self._records
+        if len(done) >= search.school.settings.budget:
+            return f"the budget of {search.school.settings.budget} proxies is spent"
+        rules = search.settings.stop
+        late = out_of_time(sum(record.seconds for record in done), rules)
+        if late or rules.no_improvement is None or len(done) < search.settings.initial:
+            return late
+        if not any(record.state == "finished" for record in done):
+            return ""
+        return nothing_to_gain("PLV", expected_improvement(search.space, self.trials(), search.settings.seed), rules)
+
+    def evaluate(self, batch: range, propose: Propose) -> None:
+        """Teach from what is left of a batch of proxies, all together, and keep what each was worth."""
+        begun = time.perf_counter()
+        points = list(zip(batch, propose(), strict=True))[len(self._records) - batch.start :]
+        thetas = {number + 1: self._search.space.theta(values) for number, values in points}
+        made = self._tried(thetas)
+        seconds = (time.perf_counter() - begun) / len(made)
+        records = [_record(trial, seconds) for trial in made]
+        self._search.store.save_trial(self._identity, *records, objective=OBJECTIVE)
+        self._records += records
+
+    def tried(self) -> list[PlvTrial]:
+        """Every proxy tried, in order, with its learning curve."""
+        return self._tried({record.number: record.theta for record in self._records})
+
+    @property
+    def _identity(self) -> str:
+        return self._search.school.identities[0]
+
+    def _tried(self, thetas: Mapping[int, Theta]) -> list[PlvTrial]:
+        search = self._search
+        proxies = {f"trial {number}": distribution(search.school, theta) for number, theta in thetas.items()}
+        curves = learning_curves(search.school, proxies, search.settings.jobs, search.watcher)
+        return [
+            PlvTrial(number, theta, proxies[name], curves[name], self._worth(curves[name]))
+            for (number, theta), name in zip(thetas.items(), proxies, strict=True)
+        ]
+
+    def _worth(self, curve: Curve) -> Teaching:
+        return teaching(without=self._without, with_proxy=curve, when=self.when)
+
+
+def _record(trial: PlvTrial, seconds: float) -> TrialRecord:
+    """A trial as the store keeps it; where the learner did not converge it has failed, which is as bad as the worst."""
+    plv = trial.worth.plv.value
+    if plv is None:
+        failure = f"the learner does not converge within {trial.curve.counts[-1]} target samples"
+        return TrialRecord(trial.number, trial.theta, "failed", failure=failure, seconds=seconds)
+    measures = {OBJECTIVE: plv, "needed": trial.worth.needed.value, "zero_shot": _finite(trial.curve.mean[0])}
+    return TrialRecord(trial.number, trial.theta, "finished", -plv, measures, seconds=seconds)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def distribution(school: School, theta: Theta) -> Distribution:
@@ -144,9 +255,3 @@ def distribution(school: School, theta: Theta) -> Distribution:
             half, known = theta.get(name + WIDTH, 0.0) / 2.0, school.proxy.parameters[name]
             bounds[name] = (max(known.low, centre - half), min(known.high, centre + half))
     return Distribution(bounds)
-
-
-def _score(trial: PlvTrial) -> float | None:
-    """What is made small: minus PLV; None where the learner did not converge, which is as bad as the worst."""
-    value = trial.worth.plv.value
-    return None if value is None else -value

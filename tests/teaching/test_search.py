@@ -1,14 +1,17 @@
 """A study of learning value looks where asked, finds the proxy that teaches, and goes on where it was left."""
 
+import re
+
 import pytest
 from taught import make_taught
 
 from proxytune.errors import RunError, SettingsError
 from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
+from proxytune.storage.store import Store
 from proxytune.study.settings import read_study_settings
 from proxytune.teaching.experiment import open_school
-from proxytune.teaching.search import distribution, run_plv_study, search_space
+from proxytune.teaching.search import OBJECTIVE, PlvSearch, distribution, search_space
 
 BOX = {"trim": "[-0.3, 0.3]"}
 
@@ -17,7 +20,8 @@ def run(folder, left=None):
     settings = read_study_settings(folder)
     school = open_school(settings)
     space = search_space(settings, school.settings.widths, left or {})
-    return run_plv_study(settings, school, make_proposer("gp", settings.initial), space, Silent())
+    with Store.open(folder) as store:
+        return PlvSearch(settings, school, store, space, Silent()).run(make_proposer("gp", settings.initial))
 
 
 def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(make_study):
@@ -41,6 +45,58 @@ def test_a_raised_budget_goes_on_after_the_very_same_trials(make_study, tmp_path
     thetas = [[dict(trial.theta) for trial in found.trials] for found in (short, again, longer)]
     assert thetas[0] == thetas[1] == thetas[2][:3]
     assert len(thetas[2]) == 5
+
+
+def test_its_trials_are_kept_in_the_study_with_score_and_measures(make_study):
+    folder = make_taught(make_study, parameters=BOX, more="budget = 3", initial="2")
+    found = run(folder)
+    with Store.read(folder) as store:
+        trials = store.trials(OBJECTIVE)
+    assert [trial.theta for trial in trials] == [trial.theta for trial in found.trials]
+    assert [trial.measures.get("plv") for trial in trials] == [trial.worth.plv.value for trial in found.trials]
+    assert all(trial.score == -trial.measures["plv"] for trial in trials if trial.state == "finished")
+    assert found.stopped == "the budget of 3 proxies is spent"
+
+
+def test_a_batch_of_proxies_is_proposed_together_and_resumed_exactly(make_study):
+    def set_budget(folder, count):
+        path = folder / "study.toml"
+        head, teaching = path.read_text().split("[teaching]")
+        path.write_text(f"{head}[teaching]{re.sub(r'budget = [0-9]+', f'budget = {count}', teaching)}")
+
+    keys = {"parameters": BOX, "more": "budget = 6", "initial": "2", "batch": "2"}
+    whole, cut = (make_taught(make_study, called=name, **keys) for name in ("whole", "cut"))
+    expected = [trial.theta for trial in run(whole).trials]
+    set_budget(cut, 3)
+    assert [trial.theta for trial in run(cut).trials] == expected[:3]
+    set_budget(cut, 6)
+    assert [trial.theta for trial in run(cut).trials] == expected
+
+
+@pytest.mark.parametrize(
+    ("rule", "reason"),
+    [("wall_time_s = 1e-9", "episodes have taken"), ("no_improvement = 1e9", "no θ is expected to improve PLV")],
+)
+def test_a_rule_stops_it_and_without_the_rule_it_goes_on(make_study, rule, reason):
+    folder = make_taught(make_study, parameters=BOX, more="budget = 4", initial="2")
+    path = folder / "study.toml"
+    plain = path.read_text()
+    path.write_text(f"{plain}\n[stop]\n{rule}\n")
+    found = run(folder)
+    assert found.stopped.startswith(reason)
+    assert 0 < len(found.trials) < 4
+    path.write_text(plain)
+    assert [trial.theta for trial in run(folder).trials][: len(found.trials)] == [trial.theta for trial in found.trials]
+
+
+def test_other_settings_of_teaching_begin_its_trials_afresh(make_study):
+    folder = make_taught(make_study, parameters=BOX, more="budget = 2", initial="2")
+    first = run(folder)
+    path = folder / "study.toml"
+    path.write_text(path.read_text().replace("seeds = 3", "seeds = 2"))
+    again = run(folder)
+    assert len(again.trials) == 2
+    assert again.trials[0].curve.scores.shape[0] == 2 != first.trials[0].curve.scores.shape[0]
 
 
 def test_the_width_of_a_parameter_is_searched_beside_its_centre(make_study):

@@ -22,6 +22,7 @@ def plv_document(found: PlvStudy) -> dict[str, Any]:
         "trials": [_trial(trial) for trial in found.trials],
         "searched": {interval.name: [interval.low, interval.high] for interval in found.space.intervals},
         "narrowed_by_prpv": found.narrowed,
+        "stopped": found.stopped,
         "convergence": {"level": found.when.level, "threshold": found.when.threshold},
         "settings": dict(as_document(found.settings)),
     }
@@ -53,6 +54,7 @@ def plv_table(found: PlvStudy, files: Mapping[str, Any]) -> RenderableType:
     by = " (narrowed: PRPV cannot tell these θ from the best)" if found.narrowed else ""
     lines = [
         f"searched: {box}{by}",
+        f"stopped: {found.stopped}",
         f"converged: a mean score of at least {found.when.threshold:.1f}, from there on",
         *(f"{what}: {path}" for what, path in files.items()),
     ]

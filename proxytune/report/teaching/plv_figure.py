@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from proxytune.report.style import BLUE, ORANGE, VERMILLION, dress, legend_below
-from proxytune.teaching.search import PlvStudy, known
+from proxytune.teaching.search import PlvStudy, plv_or_worst
 
 
 def plv_figure(found: PlvStudy) -> Figure:
@@ -21,7 +21,7 @@ def plv_figure(found: PlvStudy) -> Figure:
         low, high = (end if end is not None else far for end, far in ((figures.low, -grid), (figures.high, grid)))
         axes.plot((trial.number, trial.number), (low, high), color=BLUE, linewidth=1.0, alpha=0.6)
         axes.plot(trial.number, figures.value, "o", color=BLUE, markersize=4, label="PLV")
-    values = np.array([known(trial) for trial in found.trials])
+    values = np.array([plv_or_worst(trial) for trial in found.trials])
     numbers = np.arange(1, len(values) + 1)
     highest = np.maximum.accumulate(values)
     shown = np.isfinite(highest)

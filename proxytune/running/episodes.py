@@ -3,12 +3,13 @@
 import errno
 import functools
 import math
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import EpisodeError, RunError
@@ -38,7 +39,7 @@ def run_episode(family: DomainFamily, episode: Episode) -> Outcome:
     metrics: Mapping[str, float] | None = None
     failure = ""
     try:
-        with threadpool_limits(limits=1):
+        with _libraries(len(sys.modules)).limit(limits=1):
             metrics = _checked(family, episode, family.run(episode))
     except EpisodeError as problem:
         failure = str(problem)
@@ -47,6 +48,16 @@ def run_episode(family: DomainFamily, episode: Episode) -> Outcome:
             raise RunError(f"the machine failed ({type(problem).__name__}: {problem}); run again to go on") from None
         failure = f"the domain family raised {type(problem).__name__}: {' '.join(str(problem).split())}"
     return Outcome(episode, metrics, failure, time.perf_counter() - start)
+
+
+@functools.lru_cache(maxsize=1)
+def _libraries(modules: int) -> ThreadpoolController:
+    """The libraries that have threads of their own; looking for them takes longer than a short episode.
+
+    Args:
+        modules: How many modules are loaded: with another, there may be another library.
+    """
+    return ThreadpoolController()
 
 
 def _checked(family: DomainFamily, episode: Episode, result: Any) -> dict[str, float]:

@@ -1,0 +1,156 @@
+"""A study from Python: run or resume it, or look at what it has; the command `study` is this and a terminal."""
+
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from proxytune.report.study.convergence import convergence
+from proxytune.report.study.document import study_document
+from proxytune.report.study.importance_figure import importance_figure
+from proxytune.report.study.page import page
+from proxytune.report.study.profiles_figure import profiles_figure
+from proxytune.report.study.search_figures import evaluations_figure
+from proxytune.report.writing import save, write_text
+from proxytune.running.progress import Silent, Watcher
+from proxytune.search.engines.registry import make_proposer, why_not
+from proxytune.space import Theta
+from proxytune.storage.lock import locked
+from proxytune.storage.store import Store
+from proxytune.study import confirmation, preflight
+from proxytune.study.evaluation import Spent
+from proxytune.study.knowledge import goal_of
+from proxytune.study.result import Best, StudyResult, result_of
+from proxytune.study.run import as_stored, check_facts, run_study
+from proxytune.study.settings import StudySettings
+from proxytune.study.study import Study, open_study
+from proxytune.study.study_run import StudyRun
+
+FIGURES: Mapping[str, Callable[[StudyResult], Figure]] = {
+    "convergence": convergence,
+    "profiles": profiles_figure,
+    "evaluations": evaluations_figure,
+    "importance": importance_figure,
+}
+
+
+@dataclass(frozen=True)
+class StudyReport:
+    """What a study has found.
+
+    Attributes:
+        result: All of it.
+        spent: What this call has simulated.
+    """
+
+    result: StudyResult
+    spent: Spent
+
+    @property
+    def best(self) -> Best:
+        """The answer: its trial, what is expected there, and how useful the proxy is."""
+        return self.result.best
+
+    @property
+    def theta(self) -> Theta:
+        """The best θ."""
+        return dict(self.best.trial.theta)
+
+    def trials(self) -> pd.DataFrame:
+        """One row per finished trial: its θ, state, score (what the search makes small) and measures."""
+        rows = [
+            {"trial": one.number, **one.theta, "state": one.state, "score": one.score, **one.measures}
+            for one in self.result.trials
+        ]
+        return pd.DataFrame(rows).set_index("trial")
+
+    def figures(self) -> dict[str, Figure]:
+        """Convergence, profiles, evaluations and importance, by name."""
+        return {name: draw(self.result) for name, draw in FIGURES.items()}
+
+    def document(self) -> dict[str, Any]:
+        """What `study --json` prints of it."""
+        return study_document(self.result)
+
+    def write(self, folder: Path) -> tuple[list[Path], Path]:
+        """Write the figures and the page; their paths."""
+        paths = [folder / "figures" / f"{name}.png" for name in FIGURES]
+        for path, figure in zip(paths, self.figures().values(), strict=True):
+            save(figure, path)
+        report = folder / "report.html"
+        write_text(report, page(self.result, paths))
+        return paths, report
+
+
+def run(path: str | Path, watcher: Watcher | None = None) -> StudyReport:
+    """Run a study, or resume it where it was left; a finished one is summed up again without simulating.
+
+    Args:
+        path: The study's folder, or its study.toml.
+        watcher: Hears of every episode, to show progress.
+
+    Raises:
+        InputError: If anything in the study cannot be used, with file, key and remedy.
+        RunError: If no trial works, or the machine fails; all that was finished is kept.
+    """
+    return run_opened(open_study(Path(path)), nullcontext(watcher or Silent()))
+
+
+def run_opened(
+    study: Study, watching: AbstractContextManager[Watcher], warn: Callable[[str], None] = lambda line: None
+) -> StudyReport:
+    """Search by predictivity from wherever it was left: pre-flight, trials, confirmation.
+
+    Args:
+        study: The study.
+        watching: Gives what hears of every episode.
+        warn: Hears of every parameter that the pre-flight finds to do nothing, before the first trial.
+    """
+    settings = study.settings
+    _check_engine(study)
+    with locked(settings.folder), Store.open(settings.folder) as store:
+        with watching as watcher:
+            under_way = StudyRun(study, store, watcher)
+            _prepare(under_way, warn)
+            # The pre-flight measures the noise that the proposer is to forgive.
+            run_study(under_way, make_proposer(settings.engine, settings.initial, goal_of(under_way)))
+            confirmation.run_confirmation(under_way)
+        return StudyReport(result_of(under_way), under_way.spent)
+
+
+def read(path: str | Path) -> StudyReport:
+    """Look at a study as far as it has been run; nothing is simulated.
+
+    Raises:
+        InputError: If the study has not been run, or was changed since.
+        RunError: If no trial has a score yet.
+    """
+    opened = open_study(Path(path))
+    with Store.read(opened.settings.folder) as store:
+        return StudyReport(result_of(StudyRun(as_stored(opened, store), store)), Spent())
+
+
+def most_episodes(settings: StudySettings) -> int:
+    """How many episodes a study takes at most, from pre-flight to confirmation."""
+    trials = settings.budget * len(settings.agents) * settings.starts
+    return trials + preflight.most_episodes(settings) + confirmation.most_episodes(settings)
+
+
+def _prepare(under_way: StudyRun, warn: Callable[[str], None]) -> None:
+    """Run the pre-flight and say at once which parameters do nothing: the study may be stopped for that."""
+    check_facts(under_way)
+    preflight.run_preflight(under_way)
+    learnt = preflight.preflight_of(under_way) if under_way.spent.episodes else None
+    for warning in learnt.warnings if learnt else ():
+        warn(warning)
+
+
+def _check_engine(study: Study) -> None:
+    settings = study.settings
+    reason = why_not(settings.engine, composed=settings.objective != "plv")
+    if reason:
+        raise settings.error("engine", reason)

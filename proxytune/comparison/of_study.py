@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from proxytune.running.progress import Watcher
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Values
+from proxytune.seeds import fresh_seed
 from proxytune.space import Space
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import FRESH, Evaluation, evaluation, known_outcomes, plan, simulate
+from proxytune.study.evaluation import Evaluation, evaluation, known_outcomes, plan, simulate
 from proxytune.study.outputs import goal_of, outputs_of
 from proxytune.study.preflight import run_preflight
 from proxytune.study.study import Study, facts
@@ -78,7 +79,7 @@ class StudyObjective:
 
     def fresh_score(self, values: Values, seed: int) -> float | None:
         """PRPV of episodes that no engine has seen."""
-        return self.score(values, seed + FRESH)
+        return self.score(values, fresh_seed(seed, 1))
 
     def fresh_regret(self, values: Values, seed: int) -> float | None:
         """PRPV of fresh episodes above the noise floor."""

@@ -14,11 +14,11 @@ from proxytune.running.progress import Watcher
 from proxytune.search.design import from_unit, to_unit
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Values
+from proxytune.seeds import target_seed
 from proxytune.space import Space
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import known_outcomes, plan, run_missing, table, told
 from proxytune.study.family import load_family
-from proxytune.study.measure import SEED_OFFSET
 from proxytune.study.study import Study
 
 MIDDLE = (0.1, 0.9)
@@ -116,7 +116,7 @@ class TruthObjective:
         family = self.lacking[seed % len(self.lacking)] if self.lacking else self.study.family
         metrics = list(dict.fromkeys([*self.study.target.metrics, *family.metrics]))
         place = replace(self.study, family=family, identity=family.identity)
-        planned = plan(place.settings, self.space.theta(self.truth(seed)), seed + SEED_OFFSET)
+        planned = plan(place.settings, self.space.theta(self.truth(seed)), target_seed(seed))
         run_missing(place, self.store, planned, self.watcher, f"target of seed {seed}")
         known = known_outcomes(place, self.store, planned)
         for outcome in known.values():

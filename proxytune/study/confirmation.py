@@ -17,9 +17,10 @@ from proxytune.domain import Episode, Outcome
 from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
 from proxytune.search.knowledge.knowledge import Knowledge
+from proxytune.seeds import fresh_seed
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import FRESH, Spent, known_outcomes, plan, run_missing, score, table
+from proxytune.study.evaluation import Spent, known_outcomes, plan, run_missing, score, table
 from proxytune.study.outputs import knowledge_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.stopping import stopped
@@ -133,7 +134,7 @@ def most_episodes(settings: StudySettings) -> int:
 
 def _plans(settings: StudySettings, trial: TrialRecord) -> list[list[Episode]]:
     """The episodes of each fresh repetition of a trial."""
-    seeds = [settings.seed + repetition * FRESH for repetition in range(1, settings.confirm + 1)]
+    seeds = [fresh_seed(settings.seed, repetition) for repetition in range(1, settings.confirm + 1)]
     return [plan(settings, trial.theta, seed) for seed in seeds]
 
 

@@ -3,21 +3,17 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from proxytune.domain import Episode, Outcome, make_episode
 from proxytune.errors import EpisodeError
 from proxytune.running.episodes import running
 from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
+from proxytune.seeds import episode_seed
 from proxytune.space import Theta
 from proxytune.storage.store import Store
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
 from proxytune.usefulness import ppv, prpv
-
-FRESH = 1_000_003
-"""Added to a seed for the episodes that judge an answer: no engine has seen them."""
 
 Instance = tuple[tuple[str, float], ...]
 """θ as an episode names it."""
@@ -45,11 +41,6 @@ class Evaluation:
     ppv: float | None
     failures: tuple[Outcome, ...]
     failure: str = ""
-
-
-def episode_seed(study_seed: int, start: int) -> int:
-    """The seed of every episode from this start: common random numbers for all agents and all θ."""
-    return int(np.random.SeedSequence([study_seed, start]).generate_state(1)[0])
 
 
 def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:

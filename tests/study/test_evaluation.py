@@ -5,9 +5,9 @@ import pytest
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError
 from proxytune.running.progress import Silent
+from proxytune.seeds import episode_seed
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import (
-    episode_seed,
     evaluation,
     known_outcomes,
     longest_first,

@@ -24,6 +24,7 @@ from proxytune.storage.store import Store
 from proxytune.study import confirmation, preflight
 from proxytune.study.evaluation import Spent
 from proxytune.study.outputs import goal_of
+from proxytune.study.provenance import note_search
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import check_facts, run_study
 from proxytune.study.study import Study, open_study
@@ -70,6 +71,8 @@ def searched(study: Study, folder: Path) -> tuple[StudyResult, Spent]:
 def _prepared(study: Study, store: Store, watcher: Watcher) -> Spent:
     """Run the pre-flight and say at once which parameters do nothing: the study may be stopped for that."""
     check_facts(study, store)
+    if line := note_search(study, store):
+        print(f"proxytune study: {line}", file=sys.stderr)
     spent = preflight.run_preflight(study, store, watcher)
     found = preflight.preflight_of(study, store) if spent.episodes else None
     for warning in found.warnings if found else ():

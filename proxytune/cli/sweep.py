@@ -30,6 +30,7 @@ from proxytune.storage.lock import locked
 from proxytune.storage.records import SweepRecord
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import Spent
+from proxytune.study.provenance import adopt
 from proxytune.study.study import Study, open_study
 from proxytune.sweep.discrepancy import discrepancy_study
 from proxytune.sweep.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval, with_target
@@ -68,6 +69,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     points = sum(len(sweep.points) for sweep in sweeps)
     spent = Spent()
     with locked(folder), Store.open(folder) as store:
+        adopt(study, store)
         with Bars(points * per_point * study.settings.starts) as bars:
             for sweep in sweeps:
                 spent += run_sweep(study, store, sweep, bars, discrepancy)

@@ -13,6 +13,7 @@ from proxytune.study.cutting import Cut, Reference, reference, run_or_cut
 from proxytune.study.evaluation import Evaluation, Spent, evaluation, known_outcomes, run_missing
 from proxytune.study.history import episodes_of
 from proxytune.study.outputs import trial_of
+from proxytune.study.provenance import CODE, SEARCH, adopt, differ
 from proxytune.study.stopping import stopped
 from proxytune.study.study import Study, changes, facts
 
@@ -92,11 +93,12 @@ def _ended(study: Study, store: Store, trial: TrialRecord, cut: Cut | None) -> T
 
 
 def check_facts(study: Study, store: Store) -> None:
-    """See to it that what is in the store was made by this very study.
+    """See to it that what is in the store was made by this very study, or by earlier code that does the same.
 
     Raises:
         SettingsError: If there are finished trials and what they depend on has changed.
     """
+    adopt(study, store)
     before, after = _facts_before(study, store), facts(study)
     if before == after:
         return
@@ -113,14 +115,15 @@ def as_stored(study: Study, store: Store) -> Study:
     """
     before = _facts_before(study, store)
     then = replace(study, identity=before.get("identity", study.identity))
-    if before and before != facts(then):
-        raise _changed(then, store, before)
+    after = facts(then)
+    if before and differ(before, after):
+        raise _changed(then, store, {**before, **{key: after[key] for key in CODE if key in after}})
     return then
 
 
 def _facts_before(study: Study, store: Store) -> dict[str, Any]:
     """What the trials in the store were made by; before there was cutting off, nothing was said of it."""
-    before = store.facts()
+    before = {key: value for key, value in store.facts().items() if key != SEARCH}
     return {"cut_off": study.settings.cut_off, **before} if before else {}
 
 

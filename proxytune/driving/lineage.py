@@ -44,5 +44,7 @@ def digest_of_54760ad(robot: str, files: str, code: str) -> bytes | None:
         files: What its files mean today.
         code: What the code means today.
     """
-    then, digest = OF_54760AD.get(robot, ("", ""))
-    return bytes.fromhex(digest) if code in SAME_CODE and files == then else None
+    if robot not in OF_54760AD or code not in SAME_CODE:
+        return None
+    then, digest = OF_54760AD[robot]
+    return bytes.fromhex(digest) if files == then else None

@@ -1,1 +1,1 @@
-"""What a Python user calls: whole tasks in one call each, on files or on DataFrames; `import proxytune` has their names."""
+"""What a Python user calls: whole tasks in one call each, on files or on DataFrames."""

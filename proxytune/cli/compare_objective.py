@@ -16,6 +16,7 @@ from proxytune.errors import InputError
 from proxytune.running.progress import Bars
 from proxytune.storage.store import Store
 from proxytune.study.preflight import most_episodes
+from proxytune.study.provenance import adopt
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
@@ -38,6 +39,7 @@ def objective_of(
     episodes = per_run * arguments.seeds * engines
     print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
     with Store.open(output) as store, Bars(episodes) as bars:
+        adopt(study, store)
         yield _on_study(arguments, StudyRun(study, store, bars)), budget, initial, 1
 
 

@@ -11,7 +11,8 @@ from proxytune.cli.answer import Answer
 from proxytune.errors import InputError
 from proxytune.running.progress import Bars
 from proxytune.scores import ScoreTable, write_scores
-from proxytune.study.measure import SEED_OFFSET, measure
+from proxytune.seeds import TARGET_OFFSET, target_seed
+from proxytune.study.measure import measure
 from proxytune.study.settings import read_study_settings
 
 
@@ -28,14 +29,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="episodes from every start under other placement noise each, labelled START/REPEAT where N > 1 [1]",
     )
     parser.add_argument(
-        "--seed", type=int, metavar="N", help=f"seed of the episodes [the study's seed plus {SEED_OFFSET}]"
+        "--seed", type=int, metavar="N", help=f"seed of the episodes [the study's seed plus {TARGET_OFFSET}]"
     )
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score every agent from every start, and write the table."""
     settings = read_study_settings(arguments.path)
-    seed = settings.seed + SEED_OFFSET if arguments.seed is None else arguments.seed
+    seed = target_seed(settings.seed) if arguments.seed is None else arguments.seed
     if seed < 0:
         raise InputError(f"--seed must be at least 0, got {seed}")
     if arguments.repeats < 1:

@@ -24,6 +24,7 @@ from proxytune.storage.store import Store
 from proxytune.study import confirmation, preflight
 from proxytune.study.evaluation import Spent
 from proxytune.study.knowledge import goal_of
+from proxytune.study.provenance import note_search
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import check_facts, run_study
 from proxytune.study.study import Study, open_study
@@ -71,6 +72,8 @@ def searched(study: Study, folder: Path) -> tuple[StudyResult, Spent]:
 def _prepare(run: StudyRun) -> None:
     """Run the pre-flight and say at once which parameters do nothing: the study may be stopped for that."""
     check_facts(run)
+    if line := note_search(run.study, run.store):
+        print(f"proxytune study: {line}", file=sys.stderr)
     preflight.run_preflight(run)
     learnt = preflight.preflight_of(run) if run.spent.episodes else None
     for warning in learnt.warnings if learnt else ():

@@ -30,6 +30,7 @@ from proxytune.storage.lock import locked
 from proxytune.storage.records import SweepRecord
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import Spent
+from proxytune.study.provenance import adopt
 from proxytune.study.study import Study, open_study
 from proxytune.study.study_run import StudyRun
 from proxytune.sweep.discrepancy import discrepancy_study
@@ -68,6 +69,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     per_point = len(study.settings.agents) + (discrepancy is not None)
     points = sum(len(sweep.points) for sweep in sweeps)
     with locked(folder), Store.open(folder) as store:
+        adopt(study, store)
         with Bars(points * per_point * study.settings.starts) as bars:
             run = StudyRun(study, store, bars)
             for sweep in sweeps:

@@ -12,6 +12,7 @@ from proxytune.report.writing import save
 from proxytune.running.progress import Bars
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
+from proxytune.study.provenance import adopt
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 from proxytune.teaching.experiment import open_school, points_of, run_experiment
@@ -32,6 +33,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     school = open_school(study.settings)
     proxies = school.settings.proxies
     with locked(folder), Store.open(folder) as store:
+        adopt(study, store)
         with Bars(points_of(school, len(proxies)), "points of learning curves") as bars:
             found = run_experiment(study.settings, school, bars)
         agents = len(study.settings.agents) * study.settings.starts

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Values
+from proxytune.seeds import fresh_seed
 from proxytune.space import Space
-from proxytune.study.evaluation import FRESH, plan
+from proxytune.study.evaluation import plan
 from proxytune.study.knowledge import goal_of
 from proxytune.study.outputs import outputs_of
 from proxytune.study.preflight import run_preflight
@@ -75,7 +76,7 @@ class StudyObjective:
 
     def fresh_score(self, values: Values, seed: int) -> float | None:
         """PRPV of episodes that no engine has seen."""
-        return self.score(values, seed + FRESH)
+        return self.score(values, fresh_seed(seed, 1))
 
     def fresh_regret(self, values: Values, seed: int) -> float | None:
         """PRPV of fresh episodes above the noise floor."""

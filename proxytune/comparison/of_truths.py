@@ -14,10 +14,10 @@ from proxytune.scores import ScoreTable
 from proxytune.search.design import from_unit, to_unit
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Values
+from proxytune.seeds import target_seed
 from proxytune.space import Space
 from proxytune.study.evaluation import failure_of, plan, table
 from proxytune.study.family import load_family
-from proxytune.study.measure import SEED_OFFSET
 from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
 
@@ -121,7 +121,7 @@ class TruthObjective:
         study = self.run.study
         family = self.lacking[seed % len(self.lacking)] if self.lacking else study.family
         place = self.run.of(replace(study, family=family, identity=family.identity))
-        planned = plan(study.settings, self.space.theta(self.truth(seed)), seed + SEED_OFFSET)
+        planned = plan(study.settings, self.space.theta(self.truth(seed)), target_seed(seed))
         outcomes = place.outcomes(planned, f"target of seed {seed}")
         for outcome in outcomes.values():
             if outcome.failure:

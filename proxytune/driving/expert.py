@@ -12,6 +12,7 @@ from proxytune.driving.road.lane import lane_point, lane_pose
 from proxytune.driving.road.maps import LoopMap
 from proxytune.driving.robot import Robot
 from proxytune.effects import Signal
+from proxytune.seeds import expert_generator
 
 MEMORY = 0.9
 """Share of the disturbance of one control step that is left in the next: it lasts for half a second."""
@@ -65,7 +66,7 @@ class Expert:
     def act(self, sight: Sight, memory: Shown) -> tuple[Command, Shown]:
         """Steer for the point pursued, disturbed."""
         command, on_road = self._command(sight.pose, *memory.figures)
-        drawn = np.random.default_rng([self.seed, len(memory.commands)]).standard_normal()
+        drawn = expert_generator(self.seed, len(memory.commands)).standard_normal()
         push = MEMORY * memory.disturbance + np.sqrt(1.0 - MEMORY**2) * self.disturbance * float(drawn)
         shown = memory._replace(
             disturbance=push,

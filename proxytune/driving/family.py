@@ -1,7 +1,6 @@
 """The lane-following domain family: a robot on a map, its plant, camera and effects, as `study` takes it."""
 
 import functools
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import TICK_HZ, Course, Drive, Driver, Instance, Sight, drive, measured, picture_only
 from proxytune.driving.expert import Expert
+from proxytune.driving.identity import earlier_identities, identity_of
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
 from proxytune.driving.road.lane import off_map
@@ -41,8 +41,8 @@ from proxytune.effects import (
 )
 from proxytune.errors import SettingsError
 from proxytune.settings import Section, nearest
-from proxytune.shipped import shipped
 from proxytune.space import Parameter, Theta
+from proxytune.versions import versions_of
 
 PLANTS = ("bullet", "planar")
 CAMERAS = ("ground_plane", "renderer")
@@ -88,11 +88,22 @@ class LaneFollowing:
 
     @property
     def identity(self) -> str:
-        """A digest of settings, robot, code and the user's modules."""
-        settings = repr(tuple(getattr(self, name) for name in self.__dataclass_fields__ if name != "folder"))
-        own = b"".join(path.read_bytes() for path in sorted(self.folder.glob("*.py")))
-        parts = settings.encode() + own + _code_digest(self.robot)
-        return hashlib.sha256(parts).hexdigest()[:16]
+        """A digest of settings, of what robot, code and the user's modules mean, and of versions."""
+        settings = tuple(getattr(self, name) for name in self.__dataclass_fields__ if name != "folder")
+        return identity_of(settings, self.robot, self.folder, self.versions)
+
+    @property
+    def earlier_identities(self) -> tuple[str, ...]:
+        """Identities under which earlier code kept episodes that are the very same."""
+        world = (self.robot, self.plant, self.camera, self.map, self.seconds)
+        settings = (*world, self.position_noise_m, self.heading_noise_deg, self.effects)
+        return earlier_identities(settings, self.robot, self.folder)
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Versions of the packages that simulate."""
+        with_bullet = self.plant == "bullet" or self.camera == "renderer"
+        return versions_of(("numpy", "pybullet") if with_bullet else ("numpy",))
 
     @property
     def metrics(self) -> Mapping[str, str]:
@@ -224,17 +235,6 @@ def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) ->
     mounted = figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
     floor = draw_floor(MAPS[family.map])
     return GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)
-
-
-@functools.lru_cache
-def _code_digest(robot: str) -> bytes:
-    package = Path(__file__).resolve().parent.parent
-    sources = [*(package / "effects").rglob("*.py"), *(package / "driving").rglob("*.py")]
-    figures = sorted((shipped("robots") / robot).iterdir())
-    digest = hashlib.sha256()
-    for path in [*sorted(sources), *figures]:
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.digest()
 
 
 def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:

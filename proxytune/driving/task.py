@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from proxytune.driving.road.lane import LanePose, lane_length, lane_pose
 from proxytune.driving.road.maps import LoopMap
 from proxytune.errors import EpisodeError
+from proxytune.seeds import placement_generator
 
 Values = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ def start_pose(
         x [m], y [m], heading [rad].
     """
     x, y, heading_deg = road.starts[index]
-    noise = np.random.default_rng((seed, index)).standard_normal(3)
+    noise = placement_generator(seed, index).standard_normal(3)
     heading = math.radians(heading_deg + heading_noise_deg * float(noise[2]))
     return x + position_noise_m * float(noise[0]), y + position_noise_m * float(noise[1]), heading
 

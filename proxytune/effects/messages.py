@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from proxytune.effects.effect import Setting, Signal, Stage
 from proxytune.effects.trace import Cue, Draws, Lateness, Trace, WheelCurve
+from proxytune.seeds import message_generator
 from proxytune.space import Parameter
 
 BLOCK = 256
@@ -18,7 +19,7 @@ BLOCK = 256
 
 @functools.lru_cache(maxsize=1024)
 def _block(seed: int, number: int) -> Signal:
-    drawn = np.random.default_rng((seed, number)).random(BLOCK)
+    drawn = message_generator(seed, number).random(BLOCK)
     drawn.setflags(write=False)
     return drawn
 

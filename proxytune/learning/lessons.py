@@ -7,6 +7,7 @@ import numpy as np
 
 from proxytune.domain import Classroom, Demonstration, Episode, make_episode
 from proxytune.errors import LearnerError
+from proxytune.seeds import lesson_seeds
 from proxytune.space import Theta
 
 EXPERT = "expert"
@@ -76,8 +77,9 @@ def teach(classroom: Classroom, where: Distribution, *, count: int, seed: int, l
 
 
 def _lesson(classroom: Classroom, where: Distribution, seed: int, number: int) -> Episode:
-    theta_seed, start, episode_seed = np.random.SeedSequence([seed, number]).generate_state(3).tolist()
-    return make_episode(where.draw(theta_seed), agent=EXPERT, start=start % classroom.starts, seed=episode_seed)
+    drawn = lesson_seeds(seed, number)
+    start = drawn.start % classroom.starts
+    return make_episode(where.draw(drawn.theta), agent=EXPERT, start=start, seed=drawn.episode)
 
 
 def _told(where: Distribution) -> str:

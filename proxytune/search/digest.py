@@ -1,10 +1,11 @@
-"""Which code something depends on: with other code, a finished run may not be what would be run today."""
+"""Which code something depends on: with code of another meaning, a finished run may not be what would be run today."""
 
 import ast
-import hashlib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+
+from proxytune.meaning import meaning_of
 
 FOLDER = Path(__file__).resolve().parent.parent
 ROOMS = ("search", "comparison")
@@ -13,7 +14,7 @@ ROOMS = ("search", "comparison")
 
 @cache
 def code_of(*modules: str) -> str:
-    """A digest of modules of the search or a comparison and of all that they import of these, directly or not."""
+    """A digest of what modules of the search or a comparison mean, with all that they import of these."""
     found: dict[str, Path] = {}
     waiting = list(modules)
     while waiting:
@@ -23,8 +24,7 @@ def code_of(*modules: str) -> str:
         if module not in found and parts[:1] and parts[0] in ROOMS and path.is_file():
             found[module] = path
             waiting.extend(_imported(path))
-    files = [found[module] for module in sorted(found)]
-    return hashlib.sha256(b"".join(path.name.encode() + path.read_bytes() for path in files)).hexdigest()[:12]
+    return meaning_of(found.values(), FOLDER)[:12]
 
 
 def _imported(path: Path) -> Iterator[str]:

@@ -83,8 +83,3 @@ def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:
     kept = [trial.pending or trial.score is not None for trial in trials]
     pairs = zip(trials, kept, strict=True)
     return [trial if keep else replace(trial, score=score, outcome=outcome) for trial, keep in pairs]
-
-
-def proposal_seed(seed: int, count: int) -> int:
-    """The seed of what is drawn for the proposal after so many trials."""
-    return int(np.random.SeedSequence([seed, count]).generate_state(1)[0])

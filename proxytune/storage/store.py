@@ -14,6 +14,22 @@ from proxytune.storage.database import connect, disconnect, told
 from proxytune.storage.records import SweepRecord, TrialRecord
 
 FILE_NAME = "study.db"
+OF_EARLIER = "instance IN (SELECT id FROM instances WHERE identity = :earlier)"
+SAME_THETA = """
+    (SELECT renamed.id FROM instances AS renamed JOIN instances AS old USING (theta)
+    WHERE renamed.identity = :now AND old.id = instance)"""
+RENAMING = (
+    "INSERT OR IGNORE INTO instances (identity, theta) SELECT :now, theta FROM instances WHERE identity = :earlier",
+    f"UPDATE trials SET instance = {SAME_THETA} WHERE {OF_EARLIER}",
+    f"UPDATE OR IGNORE episodes SET instance = {SAME_THETA} WHERE {OF_EARLIER}",
+    f"DELETE FROM episodes WHERE {OF_EARLIER}",
+    "DELETE FROM instances WHERE identity = :earlier",
+    "UPDATE OR IGNORE sweeps SET identity = :now WHERE identity = :earlier",
+    "DELETE FROM sweeps WHERE identity = :earlier",
+    "UPDATE OR IGNORE sweeps SET replays = :now WHERE replays = :earlier",
+    "DELETE FROM sweeps WHERE replays = :earlier",
+)
+"""What gives one identity's instances, trials, episodes and sweeps to another, step by step."""
 
 
 def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
@@ -86,6 +102,25 @@ class Store:
             rows = [(key, json.dumps(value, allow_nan=False)) for key, value in facts.items()]
             connection.executemany("INSERT INTO facts VALUES (?, ?)", rows)
         self._trials.pop(objective, None)
+
+    def save_fact(self, key: str, value: Any) -> None:
+        """Write one more fact, over what it was before; trials are kept."""
+        with self._transaction() as connection:
+            row = (key, json.dumps(value, allow_nan=False))
+            connection.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", row)
+
+    def rename_identity(self, earlier: Collection[str], identity: str) -> None:
+        """Make all that is kept under earlier identities of a domain family belong to this one, at once.
+
+        Where both have the same episode or sweep, this one's is kept.
+        """
+        with self._transaction() as connection:
+            for name in earlier:
+                for statement in RENAMING:
+                    connection.execute(statement, {"earlier": name, "now": identity})
+                values = (json.dumps(identity), json.dumps(name))
+                connection.execute("UPDATE facts SET value = ? WHERE key = 'identity' AND value = ?", values)
+        self._outcomes.clear()
 
     def trials(self, objective: str = "prpv") -> list[TrialRecord]:
         """Every trial of a search, in order; the last ones may be open."""

@@ -16,8 +16,9 @@ import numpy as np
 from proxytune.domain import Episode, Outcome
 from proxytune.scores import ScoreTable
 from proxytune.search.knowledge.knowledge import Knowledge
+from proxytune.seeds import fresh_seed
 from proxytune.storage.records import TrialRecord
-from proxytune.study.evaluation import FRESH, plan, score, table
+from proxytune.study.evaluation import plan, score, table
 from proxytune.study.knowledge import knowledge_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.stopping import stopped
@@ -129,7 +130,7 @@ def most_episodes(settings: StudySettings) -> int:
 
 def _plans(settings: StudySettings, trial: TrialRecord) -> list[list[Episode]]:
     """The episodes of each fresh repetition of a trial."""
-    seeds = [settings.seed + repetition * FRESH for repetition in range(1, settings.confirm + 1)]
+    seeds = [fresh_seed(settings.seed, repetition) for repetition in range(1, settings.confirm + 1)]
     return [plan(settings, trial.theta, seed) for seed in seeds]
 
 

@@ -7,13 +7,11 @@ import numpy as np
 
 from proxytune.domain import Episode, Outcome, make_episode
 from proxytune.scores import Array, ScoreTable
+from proxytune.seeds import episode_seed
 from proxytune.space import Theta
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
 from proxytune.usefulness.prpv import dominance
-
-FRESH = 1_000_003
-"""Added to a seed for the episodes that judge an answer: no engine has seen them."""
 
 Instance = tuple[tuple[str, float], ...]
 """θ as an episode names it."""
@@ -46,11 +44,6 @@ class Evaluation:
     def prpv(self) -> float | None:
         """PRPV; None if an agent has no episode that worked."""
         return self.measures.get("prpv")
-
-
-def episode_seed(study_seed: int, start: int) -> int:
-    """The seed of every episode from this start: common random numbers for all agents and all θ."""
-    return int(np.random.SeedSequence([study_seed, start]).generate_state(1)[0])
 
 
 def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:

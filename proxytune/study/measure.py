@@ -7,12 +7,10 @@ from proxytune.errors import EpisodeError
 from proxytune.running.episodes import running
 from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
-from proxytune.study.evaluation import FRESH, failure_of, longest_first, plan
+from proxytune.seeds import fresh_seed
+from proxytune.study.evaluation import failure_of, longest_first, plan
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings
-
-SEED_OFFSET = 1000
-"""A target is measured under seeds that the study does not use, so that their noise has nothing in common."""
 
 
 def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
@@ -41,7 +39,7 @@ def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, r
 
 def _labelled(settings: StudySettings, seed: int, repeats: int) -> dict[Episode, str]:
     """Every episode with its label: by agent, then start, then repeat."""
-    runs = [plan(settings, {}, seed + repeat * FRESH) for repeat in range(repeats)]
+    runs = [plan(settings, {}, fresh_seed(seed, repeat)) for repeat in range(repeats)]
     return {
         episode: f"{episode.start}/{repeat}" if repeats > 1 else str(episode.start)
         for alike in zip(*runs, strict=True)

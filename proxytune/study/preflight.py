@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.domain import Episode, Outcome, make_episode
+from proxytune.seeds import preflight_noise_seed, preflight_seed
 from proxytune.space import Interval, Theta
-from proxytune.study.evaluation import episode_seed
 from proxytune.study.movement import LOOKS, Movement, judge
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
@@ -27,8 +27,6 @@ from proxytune.study.study_run import StudyRun
 
 PAIRS = 24
 """So many agents × places at least: with fewer, nothing short of a landslide would be beyond noise."""
-AGAIN = 7
-"""Tells the seeds of noise from those of places."""
 
 Array = NDArray[np.float64]
 
@@ -161,18 +159,13 @@ def _plan(settings: StudySettings, places: Sequence[Place], undecided: Sequence[
 
 
 def _episode(settings: StudySettings, theta: Theta, agent: str, place: Place) -> Episode:
-    seed = episode_seed(settings.seed, place.start) if place.turn == 0 else _seed(settings, place)
-    return make_episode(theta, agent=agent, start=place.start, seed=seed)
+    return make_episode(theta, agent=agent, start=place.start, seed=preflight_seed(settings.seed, *place))
 
 
 def _again(settings: StudySettings, agent: str, place: Place) -> Episode:
     """The base under a seed of its own: agents that shared it would share one draw of the noise."""
-    seed = _seed(settings, place, AGAIN, sorted(settings.agents).index(agent))
+    seed = preflight_noise_seed(settings.seed, *place, sorted(settings.agents).index(agent))
     return make_episode(_base(settings), agent=agent, start=place.start, seed=seed)
-
-
-def _seed(settings: StudySettings, place: Place, *more: int) -> int:
-    return int(np.random.SeedSequence([settings.seed, place.start, place.turn, *more]).generate_state(1)[0])
 
 
 def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episode, Outcome]) -> Movement:

@@ -11,12 +11,13 @@ from proxytune.storage.records import State, TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.cutting import Cut, reference, run_or_cut
 from proxytune.study.evaluation import Evaluation
+from proxytune.study.provenance import CODE, SEARCH, adopt, differ
 from proxytune.study.stopping import stopped
 from proxytune.study.study import Study, changes, facts
 from proxytune.study.study_run import StudyRun
 
-LEARNING = "plv"
-"""The fact under which a search for learning value keeps its own."""
+OTHERS = ("plv", SEARCH)
+"""Facts that the trials do not depend on: of a search for learning value, and which code proposed what."""
 
 
 def run_study(run: StudyRun, proposer: Proposer) -> None:
@@ -108,18 +109,19 @@ def _end(run: StudyRun, trial: TrialRecord, cut: Cut | None) -> TrialRecord:
 
 
 def check_facts(run: StudyRun) -> None:
-    """See to it that what is in the store was made by this very study.
+    """See to it that what is in the store was made by this very study, or by earlier code that does the same.
 
     Raises:
         SettingsError: If there are finished trials and what they depend on has changed.
     """
     study, store = run.study, run.store
+    adopt(study, store)
     before, after = _facts_before(study, store), facts(study)
     if before == after:
         return
     if run.finished_trials():
         raise _changed(study, store, before)
-    others = {key: value for key, value in store.facts().items() if key == LEARNING}
+    others = {key: value for key, value in store.facts().items() if key in OTHERS}
     store.begin({**after, **others}, study.objective.name)
 
 
@@ -131,14 +133,15 @@ def as_stored(study: Study, store: Store) -> Study:
     """
     before = _facts_before(study, store)
     then = replace(study, identity=before.get("identity", study.identity))
-    if before and before != facts(then):
-        raise _changed(then, store, before)
+    after = facts(then)
+    if before and differ(before, after):
+        raise _changed(then, store, {**before, **{key: after[key] for key in CODE if key in after}})
     return then
 
 
 def _facts_before(study: Study, store: Store) -> dict[str, Any]:
     """What the trials in the store were made by; before there was cutting off, nothing was said of it."""
-    before = {key: value for key, value in store.facts().items() if key != LEARNING}
+    before = {key: value for key, value in store.facts().items() if key not in OTHERS}
     return {"cut_off": study.settings.cut_off, **before} if before else {}
 
 

@@ -17,7 +17,9 @@ from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.objective import PRPV, Objective, objective_of
 from proxytune.study.settings import StudySettings, read_study_settings
+from proxytune.study.weights import unnoticed
 from proxytune.usefulness.repeats import start_of, starts_of
+from proxytune.versions import version_changes
 
 UNSAID = {"batch": 1, "engine": "gp"}
 """What a study.db that names none of these was run with."""
@@ -57,7 +59,8 @@ def open_study(path: Path) -> Study:
     family = load_family(settings, settings.proxy)
     known = _with_scores(settings)
     absent = [agent for agent in settings.agents if agent not in known.agents]
-    cautions = (f"the target has no scores of {', '.join(absent)}: left out",) if absent else ()
+    left_out = (f"the target has no scores of {', '.join(absent)}: left out",) if absent else ()
+    cautions = (*left_out, *unnoticed(settings.folder))
     target, objective = read_target(known, family), objective_of(settings)
     return Study(known, family, target, family.identity, _truth(settings), cautions, objective)
 
@@ -118,9 +121,9 @@ def facts(study: Study) -> dict[str, Any]:
     """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
 
     Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
-    identity covers it. The engine `gp` goes without saying, as it did when there was no other, and so do batches of one
-    trial. An engine that learns from every output depends on the whole of the target's table, and on the pre-flight's
-    noise.
+    identity covers it, and the versions of what simulates, which are here to be told. The engine `gp` goes without
+    saying, as it did when there was no other, and so do batches of one trial. An engine that learns from every output
+    depends on the whole of the target's table, and on the pre-flight's noise.
     """
     settings = study.settings
     named: dict[str, Any] = {"batch": settings.batch, "engine": settings.engine}
@@ -129,6 +132,9 @@ def facts(study: Study) -> dict[str, Any]:
     learns = settings.engine in WITH_OUTPUTS
     if learns:
         said["preflight"] = settings.preflight
+    versions = getattr(study.family, "versions", None)
+    if versions:
+        said["versions"] = dict(versions)
     return {
         "family": settings.family,
         "target": _table_digest(study.target if learns else study.target.select(compared)),
@@ -154,9 +160,12 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
     implied = {"target"} if {"agents", "metrics", "engine", "starts"} & set(keys) else set()
     implied |= {"preflight"} if "engine" in keys else set()
     told = any(key == "family" or key.startswith("domain.") for key in keys)
-    named = [key for key in keys if key not in implied | {"identity"}]
-    other = ["the domain family (its code, its robot or the proxy's model)"] if "identity" in keys and not told else []
-    return [*(_change(key, before.get(key), after.get(key)) for key in named), *other]
+    named = [key for key in keys if key not in implied | {"identity", "versions"}]
+    both = "versions" in before and "versions" in after and not told
+    versions = version_changes(before["versions"], after["versions"]) if both else []
+    other = ["the domain family (its code, its robot or the proxy's model)"]
+    unnamed = "identity" in keys and not (told or versions)
+    return [*(_change(key, before.get(key), after.get(key)) for key in named), *versions, *(other if unnamed else ())]
 
 
 def _change(key: str, before: Any, after: Any) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import InputError
+from proxytune.meaning import meaning_of
 from proxytune.space import Parameter
 from proxytune.study.family import load_family
 from proxytune.study.study import Study
@@ -60,7 +61,7 @@ class Discrepancy:
     @property
     def identity(self) -> str:
         """A digest of both families and of how they are compared."""
-        parts = [self.proxy.identity, self.target.identity, Path(__file__).read_text(encoding="utf-8")]
+        parts = [self.proxy.identity, self.target.identity, meaning_of([Path(__file__)], Path(__file__).parent)]
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
     @property

@@ -16,6 +16,7 @@ from proxytune.learning.learner import Learner
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Curve, Teaching, converged_level, settled, teaching
 from proxytune.learning.settings import NONE, TeachingSettings
+from proxytune.meaning import meaning_of
 from proxytune.running.progress import Watcher
 from proxytune.study.family import check_bounds, import_beside, load_family
 from proxytune.study.settings import StudySettings
@@ -182,7 +183,7 @@ def _classroom(settings: StudySettings, model: Path | None) -> Classroom:
 
 
 def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
-    """The learner and a digest of its code and settings."""
+    """The learner and a digest of what its code means and of its settings."""
     module, _, attribute = name.partition(":")
     try:
         found: Any = getattr(import_beside(settings, module), attribute)
@@ -191,8 +192,9 @@ def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
         raise _no_learner(settings, f"'{name}' cannot be loaded: {problem}; write module:attribute") from None
     if not (hasattr(made, "train") and hasattr(made, "act")):
         raise _no_learner(settings, f"'{name}' has no train and act; see proxytune.learning.learner.Learner")
-    source = Path(inspect.getfile(type(made))).read_bytes()
-    return cast(Learner, made), hashlib.sha256(source + repr(made).encode()).hexdigest()[:16]
+    source = Path(inspect.getfile(type(made)))
+    code = meaning_of([source], source.parent)
+    return cast(Learner, made), hashlib.sha256(code.encode() + repr(made).encode()).hexdigest()[:16]
 
 
 def _no_learner(settings: StudySettings, problem: str) -> InputError:

@@ -16,12 +16,10 @@ from proxytune.learning.learner import Learner, Weights
 from proxytune.learning.lessons import Distribution, teach
 from proxytune.learning.settings import TeachingSettings
 from proxytune.running.workers import working
+from proxytune.seeds import exam_seed, proxy_lessons_seed, target_lessons_seed
 
 PUPIL = "pupil"
 """Who drives in an examination, in place of an agent."""
-
-PROXY, TARGET, EXAM = range(3)
-"""What a seed is for: no two of them have anything in common."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ class School:
         return {
             "target": self.identities[1],
             "starts": self.starts,
-            "seed": self._seed(EXAM, 0),
+            "seed": exam_seed(self.seed, 0),
             "weights": digest(weights) if weights else None,
         }
 
@@ -128,11 +126,11 @@ class School:
         }
 
     def _proxy_facts(self, proxy: Distribution, repetition: int) -> dict[str, Any]:
-        domain, seed = self.identities[0], self._seed(PROXY, repetition)
+        domain, seed = self.identities[0], proxy_lessons_seed(self.seed, repetition)
         return self._lessons_facts(domain, proxy.bounds, self.settings.proxy_samples, seed)
 
     def _target_facts(self, repetition: int) -> dict[str, Any]:
-        domain, seed = self.identities[1], self._seed(TARGET, repetition)
+        domain, seed = self.identities[1], target_lessons_seed(self.seed, repetition)
         return self._lessons_facts(domain, {}, self.settings.target_samples[-1], seed)
 
     def _lessons_facts(self, domain: str, bounds: Mapping[str, Any], count: int, seed: int) -> dict[str, Any]:
@@ -145,16 +143,13 @@ class School:
             "lesson_s": self.settings.lesson_s,
         }
 
-    def _seed(self, purpose: int, repetition: int) -> int:
-        return int(np.random.SeedSequence([self.seed, purpose, repetition]).generate_state(1)[0])
-
     def _examine(self, point: Point) -> Arrays:
         weights = self._weights(point)
         if weights is None:
             return {"scores": np.full(self.starts, np.nan)}
         policy = functools.partial(self.learner.act, weights)
         scores = [
-            self.target.examine(make_episode({}, agent=PUPIL, start=start, seed=self._seed(EXAM, start)), policy)
+            self.target.examine(make_episode({}, agent=PUPIL, start=start, seed=exam_seed(self.seed, start)), policy)
             for start in range(self.starts)
         ]
         return {"scores": np.array(scores)}

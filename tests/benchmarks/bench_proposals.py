@@ -22,7 +22,7 @@ from proxytune.comparison.runs import Run, RunKey
 from proxytune.comparison.summary import summarise
 from proxytune.search.design import design_point, from_unit, unit_points
 from proxytune.search.engines.gaussian_process import GaussianProcess, highest
-from proxytune.search.proposer import Trial, proposal_seed
+from proxytune.search.proposer import Trial
 from proxytune.search.surrogate import (
     AMPLITUDE,
     LENGTH_SCALE,
@@ -32,6 +32,7 @@ from proxytune.search.surrogate import (
     most_probable,
     unit_array,
 )
+from proxytune.seeds import proposal_seed
 from proxytune.usefulness import compare
 from proxytune.usefulness.prpv import prpv_of_means
 from proxytune.usefulness.resampling import bootstrap_means

@@ -16,10 +16,10 @@ from proxytune.running.progress import Bars
 from proxytune.search.design import from_unit, unit_points
 from proxytune.search.knowledge.knowledge import learn
 from proxytune.search.proposer import Trial
+from proxytune.seeds import TARGET_OFFSET
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import plan, table
 from proxytune.study.knowledge import goal_of
-from proxytune.study.measure import SEED_OFFSET
 from proxytune.study.outputs import outputs_of
 from proxytune.study.preflight import run_preflight
 from proxytune.study.study import open_study
@@ -75,7 +75,7 @@ def main():
         run_preflight(study_run)
         seed = study.settings.seed
         trials = [Trial(v, 0.0, outputs_of(study, driven(study, store, bars, v, seed))) for v in points]
-        seeds = range(SEED_OFFSET + 1, SEED_OFFSET + 1 + given.truths)
+        seeds = range(TARGET_OFFSET + 1, TARGET_OFFSET + 1 + given.truths)
         found = [
             known_of(study, store, bars, trials, values, study.family, number)
             for values, number in zip(truths, seeds, strict=True)
@@ -83,7 +83,9 @@ def main():
         told(f"{given.truths} truths, {given.trials} trials", found, truths)
         for name, family in zip(models, lacking_families(study, models), strict=True):
             both = truths[:2]
-            lacking = [known_of(study, store, bars, trials, v, family, SEED_OFFSET + 1 + n) for n, v in enumerate(both)]
+            lacking = [
+                known_of(study, store, bars, trials, v, family, TARGET_OFFSET + 1 + n) for n, v in enumerate(both)
+            ]
             p_values = ", ".join(f"{one.misfit.p_value:.3f}" for one in lacking)
             print(f"{name.stem}: misfit of two truths p = {p_values}")
 

@@ -16,9 +16,9 @@ from proxytune.search.engines.registry import make_proposer
 from proxytune.search.goal import Goal
 from proxytune.search.knowledge.knowledge import learn
 from proxytune.search.proposer import Trial
+from proxytune.seeds import episode_seed
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import episode_seed
 from proxytune.usefulness.prpv import prpv_of_means
 
 COUNTS = (25, 100, 400)

@@ -18,8 +18,8 @@ from proxytune.scores import ScoreTable
 from proxytune.search.design import from_unit
 from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.proposer import Trial
+from proxytune.seeds import TARGET_OFFSET
 from proxytune.study.evaluation import plan
-from proxytune.study.measure import SEED_OFFSET
 from proxytune.study.study import open_study
 
 POINTS, PAIRS = 48, 24
@@ -70,7 +70,7 @@ def main(folder, output):
     points = [from_unit(space, unit) for unit in sobol(len(space.names), POINTS, 5)]
     others = [from_unit(space, 0.1 + 0.8 * unit) for unit in sobol(len(space.names), PAIRS, 77)]
     means = np.array([simulated(study, values, seed) for values in points])
-    pairs = np.array([[simulated(study, values, s) for s in (seed, seed + SEED_OFFSET)] for values in others])
+    pairs = np.array([[simulated(study, values, s) for s in (seed, seed + TARGET_OFFSET)] for values in others])
     with Path(output).open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(table_of(space, study.settings.agents, points, means, pairs))
 

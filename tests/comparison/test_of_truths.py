@@ -7,9 +7,10 @@ from proxytune.comparison.of_truths import TruthObjective, lacking_families
 from proxytune.errors import EpisodeError, InputError
 from proxytune.running.progress import Silent
 from proxytune.search.design import design_point, to_unit
+from proxytune.seeds import fresh_seed, target_seed
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import FRESH, plan
-from proxytune.study.measure import SEED_OFFSET, measure
+from proxytune.study.evaluation import plan
+from proxytune.study.measure import measure
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 
@@ -66,7 +67,7 @@ def test_the_target_is_what_measure_makes_of_the_truth_under_seeds_that_the_stud
     objective = opened()
     theta = objective.space.theta(objective.truth(2))
     truth = model(tmp_path, "".join(f"{name} = {value!r}\n" for name, value in theta.items()))
-    expected = measure(objective.run.study.settings, truth, 2 + SEED_OFFSET, Silent())
+    expected = measure(objective.run.study.settings, truth, target_seed(2), Silent())
     goal = objective.goal(2)
     assert np.array_equal(
         goal.values.reshape(expected.means.shape), expected.select(objective.run.study.target.metrics).means
@@ -122,9 +123,9 @@ def test_fresh_episodes_are_left_out_where_they_cannot_lower_the_lowest_regret(o
 def test_the_answer_is_held_against_the_truth_under_the_same_fresh_placements(opened):
     objective = opened()
     answer, truth = point(objective), objective.truth(3)
-    expected = objective.score(answer, 3 + FRESH)
+    expected = objective.score(answer, fresh_seed(3, 1))
     # Against the target of the seed, not of the fresh one.
-    assert objective.fresh_score(answer, 3) != expected or objective.truth(3 + FRESH) != truth
+    assert objective.fresh_score(answer, 3) != expected or objective.truth(fresh_seed(3, 1)) != truth
     assert objective.fresh_regret(answer, 3) == objective.fresh_score(answer, 3) - objective.fresh_score(truth, 3)
     assert objective.fresh_regret(truth, 3) == 0.0
 
@@ -174,4 +175,4 @@ def test_targets_are_driven_from_the_studys_starts(opened):
     objective.score(point(objective), 1)
     theta = objective.space.theta(objective.truth(1))
     driven = objective.run.store.outcomes(objective.run.study.identity, theta)
-    assert set(driven) == set(plan(objective.run.study.settings, theta, 1 + SEED_OFFSET))
+    assert set(driven) == set(plan(objective.run.study.settings, theta, target_seed(1)))

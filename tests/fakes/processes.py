@@ -45,7 +45,7 @@ def trials(folder):
     """Every trial with its scores."""
     with sqlite3.connect(folder / "study.db") as plain:
         query = (
-            "SELECT number, theta, state, prpv, ppv, failed_episodes"
+            "SELECT number, theta, state, score, measures, failed_episodes"
             " FROM trials JOIN instances ON instances.id = instance ORDER BY number"
         )
         return plain.execute(query).fetchall()

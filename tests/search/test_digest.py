@@ -24,7 +24,7 @@ def folder(tmp_path, monkeypatch):
 
 def edited(path):
     before = code_of("proxytune.search.a")
-    path.write_text(path.read_text() + "# edited\n")
+    path.write_text(path.read_text() + "y = 2\n")
     code_of.cache_clear()
     return code_of("proxytune.search.a") != before
 
@@ -32,6 +32,13 @@ def edited(path):
 @pytest.mark.parametrize("name", ["a", "b", "c"])
 def test_an_edit_of_what_a_module_imports_anywhere_changes_its_digest(folder, name):
     assert edited(folder / "search" / f"{name}.py")
+
+
+def test_a_comment_changes_no_digest(folder):
+    before, path = code_of("proxytune.search.a"), folder / "search" / "b.py"
+    path.write_text(f"# edited\n{path.read_text()}")
+    code_of.cache_clear()
+    assert code_of("proxytune.search.a") == before
 
 
 def test_an_edit_of_anything_else_does_not(folder):
@@ -49,7 +56,7 @@ def test_runs_of_a_peer_outlast_an_edit_of_another_engine(tmp_path, monkeypatch)
     code_of.cache_clear()
     before = {engine: engine_code(engine) for engine in ("outcomes", "gp", "qlognei", "random")}
     with (tmp_path / "search" / "knowledge" / "likelihood.py").open("a") as file:
-        file.write("# edited\n")
+        file.write("EDITED = 1\n")
     code_of.cache_clear()
     changed = {engine for engine, code in before.items() if engine_code(engine) != code}
     code_of.cache_clear()

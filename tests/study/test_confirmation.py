@@ -12,6 +12,7 @@ from proxytune.report.study.table import fresh_lines
 from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.search.knowledge.misfit import Misfit
+from proxytune.seeds import fresh_seed
 from proxytune.storage.store import Store
 from proxytune.study import confirmation
 from proxytune.study.confirmation import (
@@ -21,7 +22,7 @@ from proxytune.study.confirmation import (
     most_episodes,
     run_confirmation,
 )
-from proxytune.study.evaluation import FRESH, plan, table
+from proxytune.study.evaluation import plan, table
 from proxytune.study.knowledge import knowledge_of
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
@@ -87,7 +88,7 @@ def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_lik
 
 def plant(study, store, trial, shift):
     """Fresh episodes of this trial in which the agents rank as on the target, or the other way round."""
-    for episode in plan(study.settings, trial.theta, study.settings.seed + FRESH):
+    for episode in plan(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
         row = study.target.agents.index(episode.agent)
         metrics = dict(zip(study.target.metrics, (shift * study.target.means[row]).tolist(), strict=True))
         store.save_outcome(study.identity, Outcome(episode, metrics, "", 0.0))
@@ -194,7 +195,7 @@ def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_s
     study = opened(finished)
     with Store.open(finished) as store:
         for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
-            for episode in plan(study.settings, trial.theta, study.settings.seed + FRESH):
+            for episode in plan(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
                 if episode.agent == "agent3":
                     store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
     _, found = confirmed(finished)

@@ -4,9 +4,9 @@ import pytest
 
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError
+from proxytune.seeds import episode_seed
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import (
-    episode_seed,
     longest_first,
     plan,
     score,

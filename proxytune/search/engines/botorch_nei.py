@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from proxytune.search.design import from_unit
 from proxytune.search.engines.one_thread import on_one_thread
-from proxytune.search.proposer import Trial, Values, proposal_seed
+from proxytune.search.proposer import Trial, Values
 from proxytune.search.surrogate import unit_array
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
 Array = NDArray[np.float64]

@@ -10,8 +10,9 @@ from proxytune.search.design import from_unit
 from proxytune.search.engines.gaussian_process import highest
 from proxytune.search.goal import Goal
 from proxytune.search.knowledge.output_model import OutputModel, fit_outputs
-from proxytune.search.proposer import Trial, Values, proposal_seed
+from proxytune.search.proposer import Trial, Values
 from proxytune.search.surrogate import Array, unit_array
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
 FRESH_DRAWS = 400

@@ -12,8 +12,9 @@ from skopt.acquisition import gaussian_ei
 from threadpoolctl import threadpool_limits
 
 from proxytune.search.design import from_unit, unit_points
-from proxytune.search.proposer import Trial, Values, proposal_seed, with_failures_as_worst
+from proxytune.search.proposer import Trial, Values, with_failures_as_worst
 from proxytune.search.surrogate import Array, Surrogate, fit_surrogate, unit_array
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
 CLOUD = 2048

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from proxytune.search.engines.one_thread import on_one_thread
 from proxytune.search.engines.tree_parzen import quiet, suggested
-from proxytune.search.proposer import Trial, Values, proposal_seed
+from proxytune.search.proposer import Trial, Values
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
 

@@ -16,7 +16,8 @@ from proxytune.search.goal import Goal
 from proxytune.search.knowledge.likelihood import Likelihood
 from proxytune.search.knowledge.output_model import fit_outputs
 from proxytune.search.knowledge.region import posterior_of
-from proxytune.search.proposer import Trial, Values, proposal_seed
+from proxytune.search.proposer import Trial, Values
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.search.design import from_unit
-from proxytune.search.proposer import Trial, Values, proposal_seed
+from proxytune.search.proposer import Trial, Values
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
 

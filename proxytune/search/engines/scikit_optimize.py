@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from skopt import Optimizer
 from threadpoolctl import threadpool_limits
 
-from proxytune.search.proposer import Trial, Values, proposal_seed
+from proxytune.search.proposer import Trial, Values
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
 

@@ -6,7 +6,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from proxytune.search.proposer import Trial, Values, proposal_seed
+from proxytune.search.proposer import Trial, Values
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
 

@@ -1,0 +1,50 @@
+"""Earlier code that drives the same episodes as today's, to the last bit: studies that were made by it go on.
+
+Any change in what `effects/` or `driving/` mean makes every episode another one, unless it is stated here that it does
+not. tests/driving/test_identity.py fails after such a change, and says the new digest. Then,
+
+- if every episode is proven to be what it was (something was moved or renamed, an effect was added), append the digest
+  to SAME_CODE: the episodes keep their name;
+- if any episode differs, let SAME_CODE be the new digest alone and empty OF_54760AD: what was kept is other episodes.
+
+This module is no part of what the digest is of.
+"""
+
+SAME_CODE = ("54d4e295fdcf2c543cd2c37666fec071555ee281b1c150f2b466aa54d873b2f4",)
+"""What code means that drives the same episodes, the oldest first: that one names them all."""
+
+OF_54760AD = {
+    "duckiebot": (
+        "1efcd5036c19ecf30dd250002198b11b135867138949e53749499ec664f404bc",
+        "1af6058c222d4275ee79257016c62b6264085a7804884d56bdb6803832f8f3f8",
+    ),
+    "husky": (
+        "c364eeb9c2599371414df5e36dede100461061ae28ee3720a95db23fe4056b04",
+        "9006030493e8955afccc62cfc48016bda2b8ec1741e86cc4e5bc7f159e7d7809",
+    ),
+    "irobot_create": (
+        "c00e6158203ee29076f43f29950cf3202243e79d3cf14796cc703d135cd0dbaf",
+        "cd561ef9f9f4def75ffb7ea51261eb0fd7591f40f217fbe58e1bb95dcecdcae7",
+    ),
+}
+"""Up to commit 54760ad, code and robots were digested by their bytes. For each robot: what its files mean, as they were
+then, and what that digest was. SAME_CODE drives the episodes of that commit."""
+
+
+def named(code: str) -> str:
+    """The code that names the episodes of this one."""
+    return SAME_CODE[0] if code in SAME_CODE else code
+
+
+def digest_of_54760ad(robot: str, files: str, code: str) -> bytes | None:
+    """How commit 54760ad digested code and robot; None where today's drive other episodes.
+
+    Args:
+        robot: Name of the robot.
+        files: What its files mean today.
+        code: What the code means today.
+    """
+    if robot not in OF_54760AD or code not in SAME_CODE:
+        return None
+    then, digest = OF_54760AD[robot]
+    return bytes.fromhex(digest) if files == then else None

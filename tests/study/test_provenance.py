@@ -1,0 +1,149 @@
+"""Studies of earlier code go on; which search proposed which trials is kept; changed versions are told by name."""
+
+import sqlite3
+
+import pytest
+
+from proxytune.errors import SettingsError
+from proxytune.search.engines.registry import make_proposer
+from proxytune.storage.store import Store
+from proxytune.study.provenance import SEARCH, note_search
+from proxytune.study.run import as_stored, check_facts, run_study
+from proxytune.study.study import changes, facts, open_study
+from proxytune.study.study_run import StudyRun
+
+NOW = {"numpy": "2.0", "pybullet": "3.2.6"}
+
+
+@pytest.fixture
+def newer(monkeypatch):
+    """A later version of the family: the same episodes under another identity, and versions of packages."""
+    monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly by another rule", raising=False)
+    monkeypatch.setattr("wobbly.Wobbly.earlier_identities", ("unheard of", "wobbly 1 ()"), raising=False)
+    monkeypatch.setattr("wobbly.Wobbly.versions", NOW, raising=False)
+
+
+def resumed(folder):
+    with Store.open(folder) as store:
+        study_run = StudyRun(open_study(folder), store)
+        run_study(study_run, make_proposer("gp", 5))
+        return study_run.spent, store.trials()
+
+
+def test_a_study_of_an_earlier_identity_goes_on_without_an_episode_run_again(finished, make_study, newer):
+    with Store.read(finished) as store:
+        trials = store.trials()
+    assert resumed(finished)[0].episodes == 0
+    make_study(budget="9")
+    spent, after = resumed(finished)
+    assert (spent.episodes, after[:7], len(after)) == (2 * 6 * 3, trials, 9)
+    with Store.read(finished) as store:
+        assert store.facts()["identity"] == "wobbly by another rule"
+        assert store.facts()["versions"] == NOW
+
+
+def test_it_goes_on_to_the_trials_that_it_would_have_had(finished, make_study, make_studies, newer):
+    make_study(budget="9")
+    fresh = make_studies("fresh", budget="9")
+    assert resumed(finished)[1] == resumed(fresh)[1]
+
+
+def test_the_result_of_an_earlier_identity_can_be_looked_at_and_stays_as_it_is(finished, newer):
+    before = (finished / "study.db").read_bytes()
+    with Store.read(finished) as store:
+        assert as_stored(open_study(finished), store).identity == "wobbly 1 ()"
+    assert (finished / "study.db").read_bytes() == before
+
+
+def test_an_identity_that_is_none_of_the_earlier_is_refused(finished, newer, monkeypatch):
+    monkeypatch.setattr("wobbly.Wobbly.earlier_identities", ("unheard of",))
+    with pytest.raises(SettingsError, match="the domain family"):
+        resumed(finished)
+
+
+def test_another_version_of_a_package_is_told_by_its_name(finished, newer, monkeypatch):
+    resumed(finished)
+    monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, other PyBullet")
+    monkeypatch.setattr("wobbly.Wobbly.versions", {**NOW, "pybullet": "3.2.7"})
+    with pytest.raises(SettingsError, match=r"since the first trial: PyBullet 3\.2\.7 \(was 3\.2\.6\); put it back"):
+        resumed(finished)
+    with Store.read(finished) as store:
+        assert as_stored(open_study(finished), store).identity == "wobbly by another rule"
+
+
+def test_looking_at_a_study_edited_since_names_the_edit_alone(finished, make_study, newer, monkeypatch):
+    resumed(finished)
+    monkeypatch.setattr("wobbly.Wobbly.identity", "wobbly, other PyBullet")
+    monkeypatch.setattr("wobbly.Wobbly.versions", {**NOW, "pybullet": "3.2.7"})
+    make_study(seed="3")
+    with (
+        Store.read(finished) as store,
+        pytest.raises(SettingsError, match=r"trial: seed \(was 1\); put"),
+    ):
+        as_stored(open_study(finished), store)
+
+
+def test_versions_of_a_family_that_is_told_something_else_go_without_saying(make_study, newer, monkeypatch):
+    before = facts(open_study(make_study()))
+    monkeypatch.setattr("wobbly.Wobbly.versions", {"numpy": "2.0"})
+    monkeypatch.setattr("wobbly.Wobbly.identity", "another")
+    assert changes(before, facts(open_study(make_study(domain={"version": '"2"'})))) == ["domain.version (was nothing)"]
+
+
+def searches(folder):
+    with Store.read(folder) as store:
+        return [(one["first_trial"], one["code"]) for one in store.facts()[SEARCH]]
+
+
+def noted(folder):
+    with Store.open(folder) as store:
+        check_facts(StudyRun(open_study(folder), store))
+        return note_search(open_study(folder), store)
+
+
+@pytest.fixture
+def code(monkeypatch):
+    """Make the engine's code another one."""
+
+    def change(name):
+        monkeypatch.setattr("proxytune.study.provenance.engine_code", lambda engine: name)
+
+    change("one")
+    return change
+
+
+def test_which_search_proposed_which_trials_is_kept_and_a_change_is_told_but_not_refused(make_study, code, monkeypatch):
+    folder = make_study()
+    assert (noted(folder), searches(folder)) == ("", [(1, "one")])
+    resumed(folder)
+    make_study(budget="9")
+    assert (noted(folder), searches(folder)) == ("", [(1, "one")])
+    code("two")
+    assert noted(folder) == (
+        "trials from 8 on are proposed by another search than those before: the code of the engine"
+    )
+    assert searches(folder) == [(1, "one"), (8, "two")]
+    monkeypatch.setattr("proxytune.study.provenance.versions_of", lambda packages: dict.fromkeys(packages, "9"))
+    assert "scikit-learn 9 (was " in noted(folder)
+    assert len(resumed(folder)[1]) == 9
+
+
+def test_a_search_that_proposed_nothing_is_forgotten(finished, make_study, code):
+    make_study(budget="8")
+    noted(finished)
+    make_study(budget="9")
+    resumed(finished)
+    make_study(budget="10")
+    code("two")
+    noted(finished)
+    code("one")
+    assert (noted(finished), searches(finished)[:1]) == ("", [(8, "one")])
+    code("three")
+    noted(finished)
+    assert searches(finished) == [(8, "one"), (10, "three")]
+
+
+def test_nothing_is_said_or_kept_of_the_search_once_all_trials_are_proposed(finished, code):
+    before = sqlite3.connect(finished / "study.db").execute("SELECT * FROM facts").fetchall()
+    assert noted(finished) == ""
+    assert sqlite3.connect(finished / "study.db").execute("SELECT * FROM facts").fetchall() == before

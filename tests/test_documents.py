@@ -23,6 +23,7 @@ from proxytune.effects.learnt.features import GROUPS
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
 from proxytune.search.engines.registry import ENGINES
 from proxytune.study.settings import KEYS
+from proxytune.usefulness import MEASURES, PODS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -76,6 +77,15 @@ def test_every_engine_is_listed_with_how_it_proposes(capsys):
         assert (row["label"], row["what_it_proposes"]) == (engine.label, engine.summary)
         assert row["label"]
         assert row["what_it_proposes"]
+
+
+@pytest.mark.parametrize("measure", [*MEASURES, *PODS], ids=lambda measure: measure.key)
+def test_every_measure_is_documented_with_its_name_spelt_out_and_its_direction(measure):
+    table = STUDIES.split("## Measures of usefulness")[1].split("\n## ")[0]
+    row = next((line for line in table.splitlines() if line.startswith(f"| {measure.name} |")), "")
+    assert row, f"studies/README.md has no row for the measure '{measure.name}'"
+    assert f"| `{measure.key}` | {measure.title} | {measure.better} |" in row
+    assert ("per metric" in row) == measure.per_metric
 
 
 @pytest.mark.parametrize("name", STAND_INS)

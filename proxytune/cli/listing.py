@@ -1,4 +1,4 @@
-"""`list`: the robots, effects, agents, metrics and engines there are."""
+"""`list`: the robots, effects, agents, metrics, engines and measures of usefulness there are."""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -11,6 +11,7 @@ from proxytune.driving.robot import read_robot, robot_names
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE, DECLARED, theta_names
 from proxytune.search.engines.registry import ENGINES, installed
+from proxytune.usefulness import MEASURES, PODS
 
 Row = dict[str, object]
 
@@ -75,10 +76,25 @@ def _engines() -> list[Row]:
     ]
 
 
+def _measures() -> list[Row]:
+    return [
+        {
+            "name": measure.name,
+            "key": measure.key,
+            "spelt_out": measure.title,
+            "better": measure.better,
+            "unit": measure.unit,
+            "per_metric": "yes" if measure.per_metric else "",
+        }
+        for measure in (*MEASURES, *PODS)
+    ]
+
+
 _KINDS: Mapping[str, Callable[[], list[Row]]] = {
     "robots": _robots,
     "effects": _effects,
     "agents": _agents,
     "metrics": _metrics,
     "engines": _engines,
+    "measures": _measures,
 }

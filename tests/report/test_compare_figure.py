@@ -118,6 +118,14 @@ def test_the_tables_tell_how_good_how_soon_and_what_is_known():
         assert expected in told
 
 
+def test_every_engine_is_in_the_tables_and_in_the_document():
+    together = [runs(engine, [9.0, 5.0, 3.0], [8.0, 5.0, 4.0]) for engine in NAMES]
+    summaries = [summarise(group, together[0], 1.0) for group in together]
+    for table in compare_tables("analytic", summaries, 3):
+        assert list(table.columns[0].cells) == list(NAMES)
+    assert [row["engine"] for row in compare_document("analytic", summaries, 3, 1.0)["engines"]] == list(NAMES)
+
+
 def test_a_verdict_needs_an_interval_clear_of_zero():
     found = summarise(SOBOL, GP, 1.0)
     cases = {(0.5, 3.0): "in fewer", (-3.0, -0.5): "in more", (-0.5, 3.0): "no fewer"}

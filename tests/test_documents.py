@@ -21,8 +21,9 @@ from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE
 from proxytune.effects.learnt.features import GROUPS
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
-from proxytune.search.engines.registry import ENGINES, STUDY_ENGINES
+from proxytune.search.engines.registry import ENGINES
 from proxytune.study.settings import KEYS
+from proxytune.usefulness import MEASURES, PODS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -57,16 +58,34 @@ def test_every_option_is_in_the_readme(command, option):
     assert "`--json`" in README
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_every_engine_that_can_be_compared_is_in_the_readme(engine):
-    row = next(line for line in README.splitlines() if line.startswith("| `compare"))
-    assert re.search(rf"\b{engine}\b", row)
+@pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
+def test_every_engine_is_documented_with_what_it_learns_from_and_what_installs_it(engine):
+    table = STUDIES.split("## Engines")[1].split("\n## ")[0]
+    row = next((line for line in table.splitlines() if line.startswith(f"| `{engine.name}` |")), "")
+    assert row, f"studies/README.md has no row for the engine '{engine.name}'"
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells[1:3] == [engine.learns_from, "yes" if engine.in_studies else ""]
+    assert engine.needs is None or f'pip install "proxytune[{engine.needs.extra}]"' in cells[3]
 
 
-@pytest.mark.parametrize("engine", STUDY_ENGINES)
-def test_every_engine_of_a_study_is_documented(engine):
-    row = next(line for line in STUDIES.splitlines() if line.startswith("| `engine`"))
-    assert f'`"{engine}"`' in row
+def test_every_engine_is_listed_with_how_it_proposes(capsys):
+    assert main(["list", "engines", "--json"]) == 0
+    listed = {row["name"]: row for row in json.loads(capsys.readouterr().out)["engines"]}
+    assert list(listed) == [engine.name for engine in ENGINES]
+    for engine in ENGINES:
+        row = listed[engine.name]
+        assert (row["label"], row["what_it_proposes"]) == (engine.label, engine.summary)
+        assert row["label"]
+        assert row["what_it_proposes"]
+
+
+@pytest.mark.parametrize("measure", [*MEASURES, *PODS], ids=lambda measure: measure.key)
+def test_every_measure_is_documented_with_its_name_spelt_out_and_its_direction(measure):
+    table = STUDIES.split("## Measures of usefulness")[1].split("\n## ")[0]
+    row = next((line for line in table.splitlines() if line.startswith(f"| {measure.name} |")), "")
+    assert row, f"studies/README.md has no row for the measure '{measure.name}'"
+    assert f"| `{measure.key}` | {measure.title} | {measure.better} |" in row
+    assert ("per metric" in row) == measure.per_metric
 
 
 @pytest.mark.parametrize("name", STAND_INS)

@@ -19,7 +19,7 @@ from proxytune.errors import InputError, StoreError
 from proxytune.report.compare.document import compare_document, compare_lines, compare_tables
 from proxytune.report.compare.figure import compare_figure
 from proxytune.report.writing import save, write_text
-from proxytune.search.engines.registry import ENGINES, STUDY_ENGINES, engine_code, why_not
+from proxytune.search.engines.registry import NAMES, STUDY_ENGINES, engine_code, why_not
 from proxytune.storage.lock import locked
 
 FILE_NAME = "runs.jsonl"
@@ -31,7 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--engines",
         metavar="NAME,…",
-        help=f"of {', '.join(ENGINES)}; the others are compared with the first [all of a study's that can be used]",
+        help=f"of {', '.join(NAMES)}; the others are compared with the first [all of a study's that can be used]",
     )
     parser.add_argument(
         "--seeds", type=int, default=30, metavar="N", help="runs per engine, the same seeds for all [30]"
@@ -94,7 +94,7 @@ def _engines(arguments: argparse.Namespace) -> list[str]:
         if reason:
             raise InputError(f"--engines: {reason}")
     if not named:
-        raise InputError(f"--engines: names none; give some of {', '.join(ENGINES)}")
+        raise InputError(f"--engines: names none; give some of {', '.join(NAMES)}")
     return list(dict.fromkeys(named))
 
 

@@ -1,4 +1,4 @@
-"""`list`: the robots, effects, agents and metrics there are."""
+"""`list`: the robots, effects, agents, metrics, engines and measures of usefulness there are."""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -10,6 +10,8 @@ from proxytune.driving.agents import AGENTS
 from proxytune.driving.robot import read_robot, robot_names
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE, DECLARED, theta_names
+from proxytune.search.engines.registry import ENGINES, installed
+from proxytune.usefulness import MEASURES, PODS
 
 Row = dict[str, object]
 
@@ -60,9 +62,39 @@ def _metrics() -> list[Row]:
     return [{"name": name, "unit": unit} for name, unit in METRICS.items()]
 
 
+def _engines() -> list[Row]:
+    return [
+        {
+            "name": engine.name,
+            "label": engine.label,
+            "learns_from": engine.learns_from,
+            "of_studies": "yes" if engine.in_studies else "",
+            "install": "" if installed(engine) or not engine.needs else f"proxytune[{engine.needs.extra}]",
+            "what_it_proposes": engine.summary,
+        }
+        for engine in ENGINES
+    ]
+
+
+def _measures() -> list[Row]:
+    return [
+        {
+            "name": measure.name,
+            "key": measure.key,
+            "spelt_out": measure.title,
+            "better": measure.better,
+            "unit": measure.unit,
+            "per_metric": "yes" if measure.per_metric else "",
+        }
+        for measure in (*MEASURES, *PODS)
+    ]
+
+
 _KINDS: Mapping[str, Callable[[], list[Row]]] = {
     "robots": _robots,
     "effects": _effects,
     "agents": _agents,
     "metrics": _metrics,
+    "engines": _engines,
+    "measures": _measures,
 }

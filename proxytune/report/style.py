@@ -1,9 +1,8 @@
-"""What figures share: colours, axes, legends, and what those of a diagnosis call models."""
+"""What figures share: colours, axes and legends."""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.usefulness import NoiseFloor
 
 BLUE, LIGHT_BLUE, GREEN = "#0072B2", "#56B4E9", "#009E73"  # Okabe and Ito, safe for the colour-blind
@@ -13,18 +12,8 @@ GREY, LIGHT_GREY = "0.55", "0.9"
 COLUMN = 85.0 / 25.4
 """Width in inches of a figure that is to be read at 85 mm, one column of a paper."""
 
-BEFORE = "declared model"
-LONGEST = 45
-"""Characters of added effects that are named one by one."""
-
 CHARACTERS_PER_INCH, HANDLE = 19, 8
 """Characters of a legend that fit into an inch, and the space that a line beside them takes, in characters."""
-
-
-def after(diagnosis: Diagnosis) -> str:
-    """What a legend calls the extended model."""
-    added = ", ".join(plain(effect.effect) for effect in diagnosis.effects)
-    return f"with {added}" if len(added) < LONGEST else f"with {len(diagnosis.effects)} effects added"
 
 
 def plain(name: str) -> str:

@@ -3,19 +3,22 @@
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
-from sklearn.exceptions import ConvergenceWarning
-from skopt.learning import GaussianProcessRegressor
-from skopt.learning.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 from threadpoolctl import threadpool_limits
 
 from proxytune.errors import RunError
 from proxytune.search.design import to_unit
 from proxytune.search.proposer import Trial, Values
 from proxytune.space import Space
+
+# Loading scikit-optimize takes longer than all else that a figure needs, so it waits for the first fit.
+if TYPE_CHECKING:
+    from skopt.learning import GaussianProcessRegressor
+    from skopt.learning.gaussian_process.kernels import ConstantKernel
 
 Array = NDArray[np.float64]
 
@@ -61,7 +64,7 @@ class Surrogate:
     """
 
     space: Space
-    model: GaussianProcessRegressor
+    model: "GaussianProcessRegressor"
     visited: tuple[Trial, ...]
 
     @property
@@ -105,6 +108,9 @@ def fit_surrogate(space: Space, trials: Sequence[Trial]) -> Surrogate:
     Raises:
         RunError: If no trial has a score.
     """
+    from sklearn.exceptions import ConvergenceWarning
+    from skopt.learning import GaussianProcessRegressor
+
     visited = tuple(sorted((t for t in trials if t.score is not None), key=lambda t: (t.values, t.score)))
     if not visited:
         raise RunError("no trial has a score, so there is nothing to learn from")
@@ -124,8 +130,10 @@ def unit_array(space: Space, points: Sequence[Values]) -> Array:
     return np.array([to_unit(space, values) for values in points]).reshape(-1, len(space.intervals))
 
 
-def prior_kernel(dimensions: int) -> ConstantKernel:
+def prior_kernel(dimensions: int) -> "ConstantKernel":
     """Covariance of a score over the unit cube, noise last, at the medians of its priors."""
+    from skopt.learning.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
     scales, bounds = np.full(dimensions, LENGTH_SCALE.median), [LENGTH_SCALE.bounds] * dimensions
     smooth = Matern(scales, length_scale_bounds=bounds, nu=2.5)
     return ConstantKernel(AMPLITUDE.median, AMPLITUDE.bounds) * smooth + WhiteKernel(NOISE.median, NOISE.bounds)

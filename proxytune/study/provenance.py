@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from proxytune.search.engines.registry import NEEDS, engine_code
+from proxytune.search.engines.registry import engine_code, engine_of
 from proxytune.storage.store import Store
 from proxytune.study.study import Study
 from proxytune.versions import version_changes, versions_of
@@ -42,7 +42,8 @@ def note_search(study: Study, store: Store) -> str:
     engine, first = study.settings.engine, len(store.trials()) + 1
     if first > study.settings.budget:
         return ""
-    needs = NEEDS[engine][0] if engine in NEEDS else ()
+    library = engine_of(engine).needs
+    needs = library.modules if library else ()
     now = {"first_trial": first, "code": engine_code(engine), "versions": versions_of((*PACKAGES, *needs))}
     known = [one for one in store.facts().get(SEARCH, []) if one["first_trial"] < first]
     changed = _changes(known[-1], now) if known else []

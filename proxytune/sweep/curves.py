@@ -1,15 +1,13 @@
 """A sweep's curve as one series per measure, each with its interval and direction."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from proxytune.sweep.sweep import Curve, SweepPoint
-from proxytune.usefulness import Assessment
+from proxytune.usefulness import MEASURES, PODS, Measure, Measured
+from proxytune.usefulness.intervals import Ends
+from proxytune.usefulness.measure import ALL
 
-Ends = tuple[float, float]
-PER_METRIC = {"srcc": ("SRCC", True), "kendall_tau": ("Kendall τ", True), "mmrv": ("MMRV", False)}
-"""Measures that each metric has: what they are called, and whether higher is better."""
-PODS = {"pod_pose": "POD pose", "pod_image": "POD image"}
+UNKNOWN = Measured(None, None)
 
 
 @dataclass(frozen=True)
@@ -26,60 +24,54 @@ class Series:
     """One measure along the parameter.
 
     Attributes:
-        key: Its name in files: prpv, ppv, srcc_<metric>, kendall_tau_<metric>, mmrv_<metric>, pod_pose, pod_image.
-        name: Its name for people.
-        higher_is_better: Its direction.
+        measure: What is measured.
+        metric: Of which metric; ALL where there is one value for all metrics.
         estimates: One per point, in rising order of the parameter.
     """
 
-    key: str
-    name: str
-    higher_is_better: bool
+    measure: Measure
+    metric: str
     estimates: tuple[Estimate, ...]
+
+    @property
+    def key(self) -> str:
+        """Its name in files: prpv, ppv, srcc_<metric>, kendall_tau_<metric>, mmrv_<metric>, pod_pose, pod_image."""
+        return self.measure.key_for(self.metric)
+
+    @property
+    def name(self) -> str:
+        """Its name for people."""
+        return self.measure.name_for(self.metric)
+
+    @property
+    def higher_is_better(self) -> bool:
+        """Its direction."""
+        return not self.measure.lower_is_better
 
 
 def series_of(curve: Curve) -> tuple[Series, ...]:
     """Every measure of a curve; POD only where it was asked for."""
-    found = [
-        _series(curve, "prpv", "PRPV", False, _assessed(_prpv)),
-        _series(curve, "ppv", "PPV", False, _assessed(_ppv)),
-    ]
-    for measure, (name, higher) in PER_METRIC.items():
-        for metric in curve.metrics:
-            key, called = f"{measure}_{metric}", f"{name} {metric}"
-            found.append(_series(curve, key, called, higher, _assessed(_per_metric(measure, metric))))
-    if curve.has_pod:
-        found += [_series(curve, key, name, False, _pod(key)) for key, name in PODS.items()]
-    return tuple(found)
+    on_scores = [one for measure in MEASURES for one in _of_measure(curve, measure)]
+    pods = [_of_pod(curve, measure) for measure in PODS] if curve.has_pod else []
+    return (*on_scores, *pods)
 
 
-Reader = Callable[[SweepPoint], tuple[float | None, Ends | None]]
+def _of_measure(curve: Curve, measure: Measure) -> list[Series]:
+    """One series, or one per metric."""
+    found = [measure.measured(point.assessment) if point.assessment else {} for point in curve.points]
+    metrics = curve.metrics if measure.per_metric else (ALL,)
+    return [_series(curve, measure, metric, [one.get(metric, UNKNOWN) for one in found]) for metric in metrics]
 
 
-def _series(curve: Curve, key: str, name: str, higher: bool, read: Reader) -> Series:
-    return Series(key, name, higher, tuple(Estimate(point.value, *read(point)) for point in curve.points))
+def _of_pod(curve: Curve, measure: Measure) -> Series:
+    return _series(curve, measure, ALL, [_pod(point, measure) for point in curve.points])
 
 
-def _assessed(read: Callable[[Assessment], tuple[float | None, Ends | None]]) -> Reader:
-    return lambda point: (None, None) if point.assessment is None else read(point.assessment)
+def _pod(point: SweepPoint, measure: Measure) -> Measured:
+    found = point.pod.get(measure.key)
+    return Measured(found.value, found.interval) if found else UNKNOWN
 
 
-def _prpv(found: Assessment) -> tuple[float | None, Ends | None]:
-    inner = found.prpv_interval
-    return found.prpv.value, None if inner.low is None or inner.high is None else (inner.low, inner.high)
-
-
-def _ppv(found: Assessment) -> tuple[float | None, Ends | None]:
-    return found.ppv.value, found.intervals.ppv if found.intervals else None
-
-
-def _per_metric(measure: str, metric: str) -> Callable[[Assessment], tuple[float | None, Ends | None]]:
-    def read(found: Assessment) -> tuple[float | None, Ends | None]:
-        inner = getattr(found.intervals, measure)[metric] if found.intervals else None
-        return getattr(found, measure).value[metric], inner
-
-    return read
-
-
-def _pod(key: str) -> Reader:
-    return lambda point: (point.pod[key].value, point.pod[key].interval) if key in point.pod else (None, None)
+def _series(curve: Curve, measure: Measure, metric: str, found: list[Measured]) -> Series:
+    pairs = zip(curve.points, found, strict=True)
+    return Series(measure, metric, tuple(Estimate(point.value, *one) for point, one in pairs))

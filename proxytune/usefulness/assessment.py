@@ -40,6 +40,7 @@ class Assessment:
         intervals: Their bootstrap intervals; None where episodes are not repeated.
         noise_floor: PRPV of the target, or of a domain like it, against itself.
         chance: PRPV of a proxy that knows nothing.
+        seed: Seed of the resampling.
     """
 
     inputs: Comparison
@@ -52,6 +53,7 @@ class Assessment:
     intervals: Intervals | None
     noise_floor: NoiseFloor
     chance: Chance
+    seed: int
 
     @property
     def at_noise_floor(self) -> bool | None:
@@ -114,6 +116,7 @@ def assess(
         intervals=intervals(inputs=inputs, error=error, resamples=resamples, seed=seed),
         noise_floor=floor or noise_floor(target=other, metrics=metrics, seed=seed),
         chance=chance(proxy=one, target=other, metrics=metrics, permutations=resamples, seed=seed),
+        seed=seed,
     )
 
 

@@ -50,8 +50,10 @@ def intervals(*, inputs: Comparison, error: Ppv, resamples: int, seed: int) -> I
 
 def _per_metric(metrics: Sequence[Metric], values: Array) -> dict[str, Ends | None]:
     """Intervals of values of shape (resamples, metrics)."""
-    undefined = np.isnan(values).mean(axis=0)
-    return {
-        metric.name: interval(column[~np.isnan(column)]) if share <= UNDEFINED_SHARE else None
-        for metric, column, share in zip(metrics, values.T, undefined, strict=True)
-    }
+    return {metric.name: interval_where_defined(column) for metric, column in zip(metrics, values.T, strict=True)}
+
+
+def interval_where_defined(values: Array) -> Ends | None:
+    """The interval of values of resamples, the undefined ones left out; None if these are too many."""
+    undefined = np.isnan(values)
+    return interval(values[~undefined]) if undefined.mean() <= UNDEFINED_SHARE else None

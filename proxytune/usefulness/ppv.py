@@ -44,12 +44,12 @@ def ppv_of_means(proxy: Array, target: Array, weights: Array) -> Array:
     Args:
         proxy: Mean scores in the proxy, shape (…, agents, metrics).
         target: Mean scores on the target, broadcastable to the same shape.
-        weights: β, one per metric.
+        weights: β, one per metric, shape (…, metrics).
 
     Returns:
         Shape (…).
     """
-    return np.asarray((np.abs(proxy - target) @ weights).mean(axis=-1), dtype=np.float64)
+    return np.asarray((np.abs(proxy - target) @ weights[..., None])[..., 0].mean(axis=-1), dtype=np.float64)
 
 
 def ppv(
@@ -75,15 +75,22 @@ def ppv(
         InputError: If a weight is missing, unknown, negative or not finite.
     """
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
-    weights = _given(inputs, beta) if beta is not None else _from_spread(inputs)
+    weights = _given(inputs, beta) if beta is not None else weights_of_spread(inputs.target.means)
     named = {m.name: float(weight) if weight > 0 or beta else None for m, weight in zip(metrics, weights, strict=True)}
     value = float(ppv_of_means(*inputs.means, weights)) if any(w is not None for w in named.values()) else None
     return Ppv(value, named, inputs)
 
 
-def _from_spread(inputs: Comparison) -> Array:
-    spreads = inputs.target.means.std(axis=0, ddof=1)
-    varied = varies(inputs.target.means)
+def weights_of_spread(target: Array) -> Array:
+    """One over the spread of the agents' mean scores on the target.
+
+    Args:
+        target: Mean scores, shape (…, agents, metrics).
+
+    Returns:
+        Shape (…, metrics), 0 where all agents score alike.
+    """
+    spreads, varied = target.std(axis=-2, ddof=1), varies(target)
     return np.where(varied, 1.0 / np.where(varied, spreads, 1.0), 0.0)
 
 

@@ -1,14 +1,18 @@
 import io
 
 import numpy as np
+import pytest
 from rich.console import Console
 
 from proxytune.comparison.judgement import Judgement, Reading
 from proxytune.comparison.runs import Run, RunKey
 from proxytune.comparison.summary import Estimate, summarise
 from proxytune.report.compare.document import compare_document, compare_lines, compare_tables, verdict
-from proxytune.report.compare.figure import LOOKS, compare_figure, spread
-from proxytune.search.engines.registry import ENGINES
+from proxytune.report.compare.figure import PALETTE, compare_figure, looks_of, spread
+from proxytune.search.engines import registry
+from proxytune.search.engines.engine import Engine, Look
+from proxytune.search.engines.registry import ENGINES, NAMES
+from proxytune.search.engines.sobol import Sobol
 
 
 def runs(engine, *curves, reading=None):
@@ -37,20 +41,47 @@ def test_every_engine_has_its_median_and_the_floor_is_drawn():
 
 
 def test_every_engine_is_named_at_the_end_of_its_line_and_no_two_names_overlap():
-    together = [runs(engine, [9.0, 5.0 + number % 3, 3.0]) for number, engine in enumerate(ENGINES)]
+    together = [runs(engine, [9.0, 5.0 + number % 3, 3.0]) for number, engine in enumerate(NAMES)]
     figure = compare_figure(together, 1.0)
     figure.canvas.draw()
-    names = [text for text in figure.axes[0].texts if text.get_text() in ENGINES]
+    names = [text for text in figure.axes[0].texts if text.get_text() in NAMES]
     boxes = [text.get_window_extent() for text in names]
-    assert [text.get_text() for text in names] == list(ENGINES)
+    assert [text.get_text() for text in names] == list(NAMES)
     assert not any(one.overlaps(other) for row, one in enumerate(boxes) for other in boxes[:row])
     assert max(box.x1 for box in boxes) <= figure.bbox.x1
     assert figure.get_figwidth() * 25.4 <= 86.0
 
 
-def test_every_engine_has_a_look_of_its_own():
-    assert set(LOOKS) == set(ENGINES)
-    assert len({(colour, str(line)) for colour, line in LOOKS.values()}) == len(ENGINES)
+def test_every_engine_is_drawn_with_a_look_of_its_own():
+    looks = looks_of(NAMES)
+    assert list(looks) == list(NAMES)
+    assert len(set(looks.values())) == len(NAMES)
+
+
+def test_the_engines_that_come_along_keep_their_colours():
+    colours = {"outcomes": "#D55E00", "gp": "#0072B2", "composite": "#E69F00", "random": "0.55", "sobol": "0.55"}
+    colours |= {"tpe": "#009E73", "skopt": "#CC79A7", "gpsampler": "#56B4E9", "qlognei": "0.15"}
+    assert {name: look.colour for name, look in looks_of(NAMES).items()} == colours
+
+
+def test_engines_that_nobody_knows_are_drawn_apart_from_those_that_come_along_and_from_each_other():
+    strangers = [f"stranger{number}" for number in range(9)]
+    looks = looks_of([*NAMES, *strangers])
+    assert len(set(looks.values())) == len(NAMES) + len(strangers)
+    assert not {looks[name] for name in strangers} & {engine.look for engine in ENGINES}
+
+
+def test_more_engines_than_there_are_looks_are_drawn_all_the_same():
+    together = [runs(f"stranger{number}", [9.0, 5.0], [8.0, 4.0]) for number in range(len(PALETTE) + 3)]
+    (axes,) = compare_figure(together, 1.0).axes
+    assert sum(line.get_label().startswith("stranger") for line in axes.get_lines()) == len(together)
+
+
+@pytest.mark.parametrize("wish", [Look("blurple"), Look("#D55E00", "wavy")])
+def test_a_look_that_cannot_be_drawn_is_one_of_the_palette(wish, monkeypatch):
+    odd = Engine("odd", "odd", "proposes oddly", Sobol, look=wish)
+    monkeypatch.setattr(registry, "ENGINES", (*ENGINES, odd))
+    assert looks_of(["odd"])["odd"] in PALETTE
 
 
 def test_places_are_moved_as_little_as_it_takes_and_keep_their_order():
@@ -85,6 +116,14 @@ def test_the_tables_tell_how_good_how_soon_and_what_is_known():
         "0 of 2",
     ):
         assert expected in told
+
+
+def test_every_engine_is_in_the_tables_and_in_the_document():
+    together = [runs(engine, [9.0, 5.0, 3.0], [8.0, 5.0, 4.0]) for engine in NAMES]
+    summaries = [summarise(group, together[0], 1.0) for group in together]
+    for table in compare_tables("analytic", summaries, 3):
+        assert list(table.columns[0].cells) == list(NAMES)
+    assert [row["engine"] for row in compare_document("analytic", summaries, 3, 1.0)["engines"]] == list(NAMES)
 
 
 def test_a_verdict_needs_an_interval_clear_of_zero():

@@ -25,8 +25,8 @@ from proxytune.effects.catalogue import CATALOGUE
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.figures import SHOWN, diagnosis_figures
 from proxytune.report.diagnosis.means import ANY, GROUPS, MEASURED, retuned
+from proxytune.report.diagnosis.model_names import BEFORE
 from proxytune.report.diagnosis.residual_figure import MANY_WINDOWS, residual_map, residual_over_time, strayed
-from proxytune.report.style import BEFORE
 
 WIDTH = 0.12
 AFTER = "with dead band"

@@ -9,11 +9,19 @@ from proxytune.errors import InputError
 from proxytune.search.design import design_point
 from proxytune.search.engines import registry as engines
 from proxytune.search.engines.after_design import AfterDesign
-from proxytune.search.engines.registry import ENGINES, NEEDS, STUDY_ENGINES, engine_code, make_proposer, why_not
+from proxytune.search.engines.registry import (
+    ENGINES,
+    NAMES,
+    STUDY_ENGINES,
+    engine_code,
+    engine_of,
+    make_proposer,
+    why_not,
+)
 from proxytune.search.proposer import Trial
 
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
-HERE = [pytest.param(name, marks=pytest.mark.skipif(bool(lacking(name)), reason=lacking(name))) for name in ENGINES]
+HERE = [pytest.param(name, marks=pytest.mark.skipif(bool(lacking(name)), reason=lacking(name))) for name in NAMES]
 
 
 def made(engine, initial):
@@ -114,6 +122,7 @@ def test_a_peer_leaves_the_threads_and_the_random_numbers_of_pytorch_as_they_wer
         assert torch.equal(torch.random.get_rng_state(), before[1])
 
 
+NEEDY = [engine.name for engine in ENGINES if engine.needs]
 NEED = {
     "tpe": "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]'",
     "gpsampler": "'gpsampler' needs Optuna and PyTorch, which are not installed; pip install 'proxytune[peers]'",
@@ -121,7 +130,7 @@ NEED = {
 }
 
 
-@pytest.mark.parametrize("engine", NEEDS)
+@pytest.mark.parametrize("engine", NEEDY)
 def test_an_engine_whose_library_is_missing_is_refused_in_one_line_with_what_to_do(engine, monkeypatch):
     monkeypatch.setattr(engines, "find_spec", lambda name: None)
     with pytest.raises(InputError) as refused:
@@ -139,15 +148,15 @@ def test_no_other_engine_needs_these_libraries(monkeypatch):
 
     monkeypatch.setattr(builtins, "__import__", without)
     told = [Trial(design_point(SPACE, index, 1), float(index), (float(index),)) for index in range(3)]
-    for engine in ENGINES:
-        if engine not in NEEDS:
+    for engine in NAMES:
+        if engine not in NEEDY:
             assert len(made(engine, 3).propose(SPACE, told, 1)) == 2
 
 
 def test_every_engine_that_is_not_refused_can_be_made_and_has_a_digest_of_its_own_code():
-    digests = [engine_code(engine) for engine in ENGINES]
-    assert len(set(digests)) == len(ENGINES)
-    for engine in ENGINES:
+    digests = [engine_code(engine) for engine in NAMES]
+    assert len(set(digests)) == len(NAMES)
+    for engine in NAMES:
         if not why_not(engine, composed=True):
             assert made(engine, 3).initial == 3
 
@@ -157,5 +166,15 @@ def test_an_unknown_engine_is_refused_with_the_nearest_name():
         make_proposer("sobool", 3)
 
 
+def test_an_engine_in_a_file_of_ones_own_is_unknown():
+    with pytest.raises(InputError, match="unknown engine 'mine:ENGINE'; known are: composite, gp"):
+        engine_of("mine:ENGINE")
+
+
+def test_every_engine_has_a_name_of_its_own_and_is_found_by_it():
+    assert len(set(NAMES)) == len(ENGINES)
+    assert [engine_of(name) for name in NAMES] == list(ENGINES)
+
+
 def test_what_is_for_comparison_only_is_no_engine_of_a_study():
-    assert set(ENGINES) - set(STUDY_ENGINES) == {"skopt", "gpsampler", "qlognei"}
+    assert set(NAMES) - set(STUDY_ENGINES) == {"skopt", "gpsampler", "qlognei"}

@@ -7,10 +7,10 @@ from steps import SPACE, WHOLE, search, steps
 
 from proxytune.search.design import design_point
 from proxytune.search.engines.gaussian_process import GaussianProcess
-from proxytune.search.engines.registry import ENGINES, AfterDesign, make_proposer, why_not
+from proxytune.search.engines.registry import NAMES, AfterDesign, make_proposer, why_not
 from proxytune.search.proposer import Trial, batch_at, propose_batch, with_failures_as_worst
 
-HERE = [name for name in ENGINES if not why_not(name, composed=True)]
+HERE = [name for name in NAMES if not why_not(name, composed=True)]
 
 
 @given(st.integers(0, 200), st.integers(1, 20), st.integers(1, 30))

@@ -1,9 +1,13 @@
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxytune.sweep.curves import Estimate, Series
 from proxytune.sweep.trend import shape_of, told
+from proxytune.usefulness.catalogue import PRPV
+from proxytune.usefulness.measure import ALL
 
 
 def series(scores, spread=0.0, higher=False):
@@ -11,7 +15,8 @@ def series(scores, spread=0.0, higher=False):
         Estimate(float(place), score, None if score is None or spread is None else (score - spread, score + spread))
         for place, score in enumerate(scores)
     ]
-    return Series("prpv", "PRPV", higher, tuple(found))
+    measure = replace(PRPV, better="higher" if higher else "lower")
+    return Series(measure, ALL, tuple(found))
 
 
 def test_a_valley_at_the_held_value_worsens_on_both_sides():

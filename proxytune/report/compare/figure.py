@@ -1,28 +1,27 @@
 """The figure of a comparison: how fast each engine gets near the optimum."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure
 
 from proxytune.comparison.runs import Run
 from proxytune.comparison.summary import median_curve
-from proxytune.report.style import BLUE, GREEN, GREY, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
+from proxytune.errors import InputError
+from proxytune.report.style import BLUE, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
+from proxytune.search.engines.engine import Look
+from proxytune.search.engines.registry import ENGINES, engine_of
 
-SOLID, DASHED, DOTTED, MIXED = "-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1))
-LOOKS = {
-    "outcomes": (VERMILLION, SOLID),
-    "gp": (BLUE, SOLID),
-    "composite": (ORANGE, SOLID),
-    "random": (GREY, DOTTED),
-    "sobol": (GREY, MIXED),
-    "tpe": (GREEN, DASHED),
-    "skopt": (PURPLE, DASHED),
-    "gpsampler": (LIGHT_BLUE, DASHED),
-    "qlognei": ("0.15", MIXED),
-}
-"""Colour and line: those a reader looks for first are solid; no two of one line have colours that could be confused."""
+LINES = {"solid": "-", "dashed": (0, (4, 1.5)), "dotted": (0, (1, 1)), "dashdot": (0, (5, 1, 1, 1))}
+PALETTE = tuple(
+    Look(colour, line)
+    for line in ("solid", "dashed", "dotted", "dashdot")
+    for colour in (GREEN, PURPLE, LIGHT_BLUE, BLUE, VERMILLION, ORANGE)
+)
+"""For engines that do not say how they would like to be drawn, in this order."""
 WIDE, PANEL, APART = (3.35, 3.0), (0.13, 0.14, 0.67, 0.83), 0.05
 """Size [inch], which is 85 mm wide; what of it the panel takes, leaving room for names; how far these are apart at
 least, as a share of the panel's height."""
@@ -39,9 +38,10 @@ def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure
     """
     figure = Figure(figsize=WIDE)
     axes = figure.add_axes(PANEL)
-    key = engines[0][0].key
+    key, names = engines[0][0].key, [runs[0].key.engine for runs in engines]
+    looks = looks_of(names)
     for number, runs in enumerate(engines):
-        _curve(axes, runs, banded=number == 0)
+        _curve(axes, runs, looks[names[number]], banded=number == 0)
     axes.axvline(key.initial + 0.5, color="0.6", linewidth=0.8)
     axes.axhline(tolerance, color="0.3", linewidth=0.8, linestyle="--", label="noise floor")
     axes.annotate("noise floor", (1.2, tolerance), (0, 2), textcoords="offset points", fontsize=6, color="0.3")
@@ -50,12 +50,29 @@ def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure
     axes.set_xlim(1, key.budget + BEYOND)
     axes.set_ylim(*_range(engines, tolerance))
     dress(axes)
-    _name(axes, [runs[0].key.engine for runs in engines], [float(median_curve(runs)[0][-1]) for runs in engines])
+    _name(axes, looks, [float(median_curve(runs)[0][-1]) for runs in engines])
     return figure
 
 
-def _curve(axes: Axes, runs: Sequence[Run], *, banded: bool) -> None:
-    colour, line = LOOKS[runs[0].key.engine]
+def looks_of(names: Sequence[str]) -> dict[str, Look]:
+    """How each engine is drawn: as it would like to be, else by the next of the palette that no engine asked for."""
+    wished = {name: look for name in names if (look := _wish(name))}
+    asked_for = {*wished.values(), *(engine.look for engine in ENGINES)}
+    free = cycle([look for look in PALETTE if look not in asked_for] or PALETTE)
+    return {name: wished.get(name) or next(free) for name in names}
+
+
+def _wish(name: str) -> Look | None:
+    """How an engine would like to be drawn, if that can be drawn; runs outlast engines, so it may be unknown."""
+    try:
+        look = engine_of(name).look
+    except InputError:
+        return None
+    return look if look and look.line in LINES and is_color_like(look.colour) else None
+
+
+def _curve(axes: Axes, runs: Sequence[Run], look: Look, *, banded: bool) -> None:
+    colour, line = look.colour, LINES[look.line]
     middle, low, high = median_curve(runs)
     places = np.append(np.arange(1, len(middle) + 1), len(middle) + BEYOND)
     middle, low, high = (np.append(curve, curve[-1]) for curve in (middle, low, high))
@@ -73,12 +90,12 @@ def _range(engines: Sequence[Sequence[Run]], tolerance: float) -> tuple[float, f
     return low - 0.04 * (high - low) if low < 0.0 else 0.0, high + 0.04 * (high - low)
 
 
-def _name(axes: Axes, names: Sequence[str], ends: Sequence[float]) -> None:
+def _name(axes: Axes, looks: Mapping[str, Look], ends: Sequence[float]) -> None:
     """Write each engine's name beside the end of its line, moved apart where lines end together."""
     bottom, top = axes.get_ylim()
     places = spread([(min(max(end, bottom), top) - bottom) / (top - bottom) for end in ends], APART)
-    for name, place in zip(names, places, strict=True):
-        axes.text(1.02, place, name, transform=axes.transAxes, fontsize=7, color=LOOKS[name][0], va="center", ha="left")
+    for (name, look), place in zip(looks.items(), places, strict=True):
+        axes.text(1.02, place, name, transform=axes.transAxes, fontsize=7, color=look.colour, va="center", ha="left")
 
 
 def spread(places: Sequence[float], apart: float) -> list[float]:

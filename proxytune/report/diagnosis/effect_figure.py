@@ -14,7 +14,8 @@ from proxytune.diagnosis.naming.flexible import Curve
 from proxytune.diagnosis.naming.found import Adopted
 from proxytune.effects import CATALOGUE, Means, WheelCurve
 from proxytune.report.diagnosis.means import ANY, GROUPS, draw_means, means_figure, rates_of, retuned
-from proxytune.report.style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
+from proxytune.report.diagnosis.model_names import BEFORE, after
+from proxytune.report.style import BLUE, GREY, PURPLE, VERMILLION, dress, legend_below
 from proxytune.space import Theta
 
 HELD_S = 5.0

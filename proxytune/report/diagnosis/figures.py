@@ -15,20 +15,9 @@ from proxytune.diagnosis.naming.found import Tried
 from proxytune.diagnosis.naming.round import LEAST_GAIN
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.learnt_figure import learnt_figure
+from proxytune.report.diagnosis.model_names import BEFORE, after
 from proxytune.report.diagnosis.residual_figure import residual_map, residual_over_time, strayed
-from proxytune.report.style import (
-    BEFORE,
-    BLUE,
-    GREEN,
-    GREY,
-    LIGHT_BLUE,
-    PURPLE,
-    VERMILLION,
-    after,
-    dress,
-    legend_below,
-    plain,
-)
+from proxytune.report.style import BLUE, GREEN, GREY, LIGHT_BLUE, PURPLE, VERMILLION, dress, legend_below, plain
 
 SHOWN = 15
 """So many candidates are ranked."""

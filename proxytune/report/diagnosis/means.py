@@ -15,7 +15,8 @@ from proxytune.diagnosis.model.innovations import HUBER
 from proxytune.diagnosis.model.replay import disturbed, increments
 from proxytune.diagnosis.naming.flexible import Curve
 from proxytune.effects.trace import TURN, Panel
-from proxytune.report.style import BEFORE, BLUE, GREY, PURPLE, VERMILLION, after, dress, legend_below
+from proxytune.report.diagnosis.model_names import BEFORE, after
+from proxytune.report.style import BLUE, GREY, PURPLE, VERMILLION, dress, legend_below
 from proxytune.space import Theta
 
 BINS = 20

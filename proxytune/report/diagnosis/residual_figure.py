@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.horizon.windows import cut, strays
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
-from proxytune.report.style import BEFORE, BLUE, GREY, VERMILLION, after, dress, legend_below
+from proxytune.report.diagnosis.model_names import BEFORE, after
+from proxytune.report.style import BLUE, GREY, VERMILLION, dress, legend_below
 from proxytune.space import Theta
 
 HORIZON_S = 2.0

@@ -1,16 +1,20 @@
 """What `score --json` prints; its keys are promises."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from proxytune.usefulness import Assessment, Selection
+from proxytune.usefulness import MEASURES, Assessment, Measure, Measured, Selection
+from proxytune.usefulness.catalogue import PPV, PRPV
+from proxytune.usefulness.measure import ALL
 
 
 def document_of(assessment: Assessment) -> dict[str, Any]:
     """Every figure of one proxy as plain JSON; None where one is undefined, and a note says why."""
     inner, noise, random = assessment.prpv_interval, assessment.noise_floor, assessment.chance
+    found = {measure: measure.measured(assessment) for measure in MEASURES}
+    values = {measure.key: _per_metric(measure, one, _value) for measure, one in found.items()}
     return {
-        "prpv": assessment.prpv.value,
+        PRPV.key: values[PRPV.key],
         "prpv_normalised": assessment.prpv.normalised,
         "prpv_interval": _ends(inner.low, inner.high),
         "expected_prpv": inner.expected,
@@ -21,12 +25,10 @@ def document_of(assessment: Assessment) -> dict[str, Any]:
         "chance": random.mean,
         "chance_deviation": random.deviation,
         "p_value": random.p_value,
-        "ppv": assessment.ppv.value,
+        PPV.key: values[PPV.key],
         "beta": dict(assessment.ppv.beta),
-        "srcc": dict(assessment.srcc.value),
-        "kendall_tau": dict(assessment.kendall_tau.value),
-        "mmrv": dict(assessment.mmrv.value),
-        "intervals": _intervals(assessment),
+        **values,
+        "intervals": _intervals(found) if assessment.intervals else None,
         "pairs": [{"better": pair.better, "worse": pair.worse, "flip": pair.flip} for pair in assessment.prpv.pairs],
         "agents": list(assessment.inputs.agents),
         "metrics": [str(metric) for metric in assessment.inputs.metrics],
@@ -55,17 +57,22 @@ def document_of_ranking(assessments: Mapping[str, Assessment], selection: Select
     }
 
 
-def _intervals(assessment: Assessment) -> dict[str, Any] | None:
-    """Intervals of the measures beside PRPV; None where episodes are not repeated."""
-    inner = assessment.intervals
-    if inner is None:
-        return None
-    per_metric = {"srcc": inner.srcc, "kendall_tau": inner.kendall_tau, "mmrv": inner.mmrv}
-    named = {
-        measure: {metric: ends and list(ends) for metric, ends in found.items()}
-        for measure, found in per_metric.items()
-    }
-    return {"ppv": inner.ppv and list(inner.ppv), **named}
+def _per_metric(measure: Measure, found: Mapping[str, Measured], plain: Callable[[Measured], Any]) -> Any:
+    """One plain value, or one for each metric by its name."""
+    return {metric: plain(one) for metric, one in found.items()} if measure.per_metric else plain(found[ALL])
+
+
+def _value(one: Measured) -> float | None:
+    return one.value
+
+
+def _interval(one: Measured) -> list[float] | None:
+    return one.interval and list(one.interval)
+
+
+def _intervals(found: Mapping[Measure, Mapping[str, Measured]]) -> dict[str, Any]:
+    """Intervals of the measures beside PRPV, which has keys of its own."""
+    return {measure.key: _per_metric(measure, one, _interval) for measure, one in found.items() if measure is not PRPV}
 
 
 def _episodes(assessment: Assessment) -> dict[str, Any]:

@@ -7,9 +7,11 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.usefulness import Assessment, Selection
+from proxytune.usefulness import MEASURES, Assessment, Measure, Selection
+from proxytune.usefulness.catalogue import PRPV
 
 Row = tuple[str, str, str, str, str]
+BESIDE_PRPV = tuple(measure for measure in MEASURES if measure is not PRPV)
 
 
 def measures(assessment: Assessment, *, proxy: str, target: str) -> Group:
@@ -17,7 +19,8 @@ def measures(assessment: Assessment, *, proxy: str, target: str) -> Group:
     table = _table(f"{proxy} as a proxy of {target}: {_sizes(assessment)}")
     for column in ("measure", "value", "95 % interval", "better", "what it says"):
         table.add_column(column, justify="right" if column in ("value", "95 % interval") else "left")
-    for row in (*_prpv_rows(assessment), _ppv_row(assessment), *_metric_rows(assessment)):
+    beside = [row for measure in BESIDE_PRPV for row in _rows(measure, assessment)]
+    for row in (*_prpv_rows(assessment), *beside):
         table.add_row(*map(escape, row))
     return Group(table, *_notes({proxy: assessment}))
 
@@ -25,28 +28,19 @@ def measures(assessment: Assessment, *, proxy: str, target: str) -> Group:
 def ranking(assessments: Mapping[str, Assessment], selection: Selection, *, target: str) -> Group:
     """Show proxies best first, each with those that are worse beyond noise, and the notes below."""
     first = next(iter(assessments.values()))
-    metrics = [metric.name for metric in first.inputs.metrics]
+    beside = [measure for measure in BESIDE_PRPV if measure.in_paper]
     table = _table(f"{len(assessments)} proxies of {target}: {_sizes(first)}")
-    for column in (
-        "",
-        "proxy",
-        "PRPV",
-        "95 % interval",
-        "chance",
-        "p",
-        "PPV",
-        *(f"SRCC {escape(name)}" for name in metrics),
-    ):
+    titles = [row[0] for measure in beside for row in _rows(measure, first)]
+    for column in ("", "proxy", PRPV.name, "95 % interval", "chance", "p", *map(escape, titles)):
         table.add_column(column, justify="left" if column == "proxy" else "right")
     table.add_column("better beyond noise than")
     for rank, (name, value) in enumerate(selection.ranking, 1):
         found = assessments[name]
         inner = _ends((found.prpv_interval.low, found.prpv_interval.high))
         random = (_number(found.chance.mean), f"{found.chance.p_value:.2g}")
-        correlations = [_number(found.srcc.value[metric]) for metric in metrics]
+        others = [row[1] for measure in beside for row in _rows(measure, found)]
         worse = [pair.worse for pair in selection.differences if pair.better == name and pair.beyond_noise]
-        figures = (str(rank), name, str(value), inner, *random, _number(found.ppv.value), *correlations)
-        table.add_row(*map(escape, (*figures, ", ".join(worse))))
+        table.add_row(*map(escape, (str(rank), name, str(value), inner, *random, *others, ", ".join(worse))))
     noise = first.noise_floor
     floor = f"{noise.title} {_number(noise.value)}, 95 % interval {_ends((noise.low, noise.high))}: {noise.meaning}"
     return Group(table, *([Text(floor)] if noise.value is not None else []), *_notes(assessments))
@@ -70,12 +64,12 @@ def _prpv_rows(assessment: Assessment) -> list[Row]:
     prpv, inner, noise = assessment.prpv, assessment.prpv_interval, assessment.noise_floor
     flips = [sum(pair.flip == flip for pair in prpv.pairs) for flip in ("reversed", "lost", "invented")]
     reading = f"{flips[0]} reversed, {flips[1]} lost, {flips[2]} invented"
-    random = assessment.chance
+    random, better = assessment.chance, PRPV.better
     return [
-        ("PRPV", str(prpv.value), _ends((inner.low, inner.high)), "lower", f"0 (same order) to {prpv.range[1]}"),
-        ("  normalised", _number(prpv.normalised), "", "lower", "0 to 1"),
-        ("  flipped pairs", str(len(prpv.pairs)), "", "lower", reading),
-        ("  expected", _number(inner.expected), "", "lower", "mean over resampled episodes"),
+        (PRPV.name, str(prpv.value), _ends((inner.low, inner.high)), better, f"{PRPV.meaning} to {prpv.range[1]}"),
+        ("  normalised", _number(prpv.normalised), "", better, "0 to 1"),
+        ("  flipped pairs", str(len(prpv.pairs)), "", better, reading),
+        ("  expected", _number(inner.expected), "", better, "mean over resampled episodes"),
         (f"  {noise.title}", _number(noise.value), _ends((noise.low, noise.high)), "", noise.meaning),
         (
             "  chance",
@@ -87,22 +81,11 @@ def _prpv_rows(assessment: Assessment) -> list[Row]:
     ]
 
 
-def _ppv_row(assessment: Assessment) -> Row:
-    ends = assessment.intervals.ppv if assessment.intervals else None
-    return ("PPV", _number(assessment.ppv.value), _ends(ends), "lower", "weighted error of an agent's scores, from 0")
-
-
-def _metric_rows(assessment: Assessment) -> list[Row]:
-    inner = assessment.intervals
-    measured = (
-        ("SRCC", assessment.srcc.value, inner and inner.srcc, "higher", "Pearson, −1 to 1"),
-        ("Kendall τ", assessment.kendall_tau.value, inner and inner.kendall_tau, "higher", "−1 to 1"),
-        ("MMRV", assessment.mmrv.value, inner and inner.mmrv, "lower", "in the metric's unit, from 0"),
-    )
+def _rows(measure: Measure, assessment: Assessment) -> list[Row]:
+    """One row, or one per metric."""
     return [
-        (f"{title} {name}", _number(value), _ends(intervals[name] if intervals else None), better, meaning)
-        for title, values, intervals, better, meaning in measured
-        for name, value in values.items()
+        (measure.name_for(metric), _number(value), _ends(ends), measure.better, measure.meaning)
+        for metric, (value, ends) in measure.measured(assessment).items()
     ]
 
 

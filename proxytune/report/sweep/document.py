@@ -13,15 +13,19 @@ from proxytune.sweep.curves import Series, series_of
 from proxytune.sweep.discrepancy import METRICS
 from proxytune.sweep.sweep import Curve, PodMean, SweepPoint
 from proxytune.sweep.trend import shape_of, told
+from proxytune.usefulness import MEASURES
+from proxytune.usefulness.catalogue import PRPV
 
-MEASURES = (
-    "prpv", "prpv_interval", "prpv_normalised", "expected_prpv", "ppv", "srcc", "kendall_tau", "mmrv", "intervals",
-    "chance", "at_noise_floor",
-)  # fmt: skip
+OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")
+KEYS = (
+    *OF_PRPV,
+    *(measure.key for measure in MEASURES if measure is not PRPV),
+    "intervals",
+    "chance",
+    "at_noise_floor",
+)
 LEVELS = ("noise_floor", "noise_floor_interval", "noise_floor_kind")
 NO_POD = "POD was left out: give --target-model MODEL.toml, the model of the target"
-OTHERS = ("kendall_tau", "mmrv")
-SHOWN = {"prpv": ".0f", "ppv": ".3g", "srcc": ".2f", "kendall_tau": ".2f", "mmrv": ".3g", "pod": ".3g"}
 
 
 def curve_name(curve: Curve) -> str:
@@ -69,8 +73,8 @@ def curve_csv(curve: Curve) -> str:
 def curve_tables(curve: Curve) -> tuple[Table, Table]:
     """The curve for the terminal, the paper's measures first, then the others; intervals are in the files."""
     series = series_of(curve)
-    first = [one for one in series if not one.key.startswith(OTHERS)]
-    second = [one for one in series if one.key.startswith(OTHERS)]
+    first = [one for one in series if one.measure.in_paper]
+    second = [one for one in series if not one.measure.in_paper]
     title = " ".join([curve.parameter, *held(curve)])
     return _table(curve, first, title), _table(curve, second, None)
 
@@ -100,7 +104,7 @@ def _point(point: SweepPoint) -> dict[str, Any]:
     measures = document_of(point.assessment) if point.assessment else {}
     return {
         "value": point.value,
-        **{name: measures.get(name) for name in MEASURES},
+        **{name: measures.get(name) for name in KEYS},
         "pod": {name: _pod(name, found) for name, found in point.pod.items()} or None,
         "failed_episodes": len(point.evaluation.failures),
         "failure": point.evaluation.failure or None,
@@ -114,8 +118,7 @@ def _pod(name: str, found: PodMean) -> dict[str, Any]:
 
 def _shape(series: Series, curve: Curve) -> dict[str, Any]:
     shape = shape_of(series, curve.base.get(curve.parameter))
-    better = "higher" if series.higher_is_better else "lower"
-    return {"better": better, **asdict(shape), "worsens_on_both_sides": shape.monotone}
+    return {"better": series.measure.better, **asdict(shape), "worsens_on_both_sides": shape.monotone}
 
 
 def _table(curve: Curve, series: Sequence[Series], title: str | None) -> Table:
@@ -131,9 +134,11 @@ def _cell(series: Series, row: int) -> str:
     """The score, PRPV with its interval."""
     one = series.estimates[row]
     if one.score is None:
-        return "failed" if series.key == "prpv" else ""
-    text = format(one.score, next(shown for name, shown in SHOWN.items() if series.key.startswith(name)))
-    return f"{text} ({one.interval[0]:.0f} to {one.interval[1]:.0f})" if series.key == "prpv" and one.interval else text
+        return "failed" if series.measure is PRPV else ""
+    text = format(one.score, series.measure.digits)
+    if series.measure is not PRPV or one.interval is None:
+        return text
+    return f"{text} ({one.interval[0]:.0f} to {one.interval[1]:.0f})"
 
 
 def _broken(name: str) -> str:

@@ -7,10 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.report.style import BLUE, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress, floor_name
+from proxytune.report.style import BLUE, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress, floor_name, with_unit
 from proxytune.sweep.curves import Series, series_of
 from proxytune.sweep.sweep import Curve, SweepPoint
-from proxytune.usefulness import Assessment
+from proxytune.usefulness import Assessment, Measure
+from proxytune.usefulness.catalogue import POD_IMAGE, POD_POSE, PPV, PRPV, SRCC
 
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 MARKERS = "osD^v"
@@ -41,8 +42,8 @@ def sweep_figure(curves: Sequence[Curve]) -> Figure:
     # Only now: a limit set earlier would hide what later columns of the shared axis hold.
     for axes in panels[:, 0]:
         axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
-    panels[0, 0].set_ylabel("PRPV [ordered pairs]", fontsize=8)
-    panels[1, 0].set_ylabel("PPV", fontsize=8)
+    panels[0, 0].set_ylabel(_axis(PRPV), fontsize=8)
+    panels[1, 0].set_ylabel(_axis(PPV), fontsize=8)
     _explain(figure, panels[0, 0])
     return figure
 
@@ -61,8 +62,8 @@ def panels_figure(curve: Curve) -> Figure:
     _prpv(panels[0], points)
     _ppv(panels[1], points)
     _srcc(panels[2], series)
-    for axes, name in zip(panels, ("PRPV [ordered pairs]", "PPV", "SRCC"), strict=False):
-        axes.set_ylabel(name, fontsize=8)
+    for axes, measure in zip(panels, (PRPV, PPV, SRCC), strict=False):
+        axes.set_ylabel(_axis(measure), fontsize=8)
     if curve.has_pod:
         _pod(panels[3], series)
     for axes in panels:
@@ -102,7 +103,7 @@ def bars_figure(curves: Sequence[Curve]) -> Figure:
         _explain(figure, axes)
     axes.set_xticks([spot for spot, _ in ticks], [text for _, text in ticks])
     axes.set_xlabel(" \n ", fontsize=8)
-    axes.set_ylabel("PRPV [ordered pairs]", fontsize=8)
+    axes.set_ylabel(_axis(PRPV), fontsize=8)
     dress(axes)
     return figure
 
@@ -140,19 +141,19 @@ def _bars(axes: Axes, spots: Sequence[float], chosen: Sequence[SweepPoint], held
 
 
 def _srcc(axes: Axes, series: Sequence[Series]) -> None:
-    chosen = [one for one in series if one.key.startswith("srcc_")]
+    chosen = [one for one in series if one.measure is SRCC]
     for one, colour, marker in zip(chosen, cycle(COLOURS), cycle(MARKERS), strict=False):
-        _line(axes, one, colour, marker, one.key.removeprefix("srcc_").replace("_", " "))
+        _line(axes, one, colour, marker, one.metric.replace("_", " "))
     axes.legend(fontsize=6, frameon=False)
 
 
 def _pod(axes: Axes, series: Sequence[Series]) -> None:
     """Pose on the left axis, image on the right, each in the colour of its axis."""
-    by_key = {one.key: one for one in series}
+    by_measure = {one.measure: one for one in series}
     right = axes.twinx()
     for one, panel, colour, marker, name in (
-        (by_key["pod_pose"], axes, BLUE, "o", "POD, pose [m]"),
-        (by_key["pod_image"], right, VERMILLION, "s", "POD, image [of full scale]"),
+        (by_measure[POD_POSE], axes, BLUE, "o", "POD, pose [m]"),
+        (by_measure[POD_IMAGE], right, VERMILLION, "s", "POD, image [of full scale]"),
     ):
         _line(panel, one, colour, marker, name)
         panel.set_ylabel(name, fontsize=8, color=colour)
@@ -218,6 +219,10 @@ def _explain(figure: Figure, axes: Axes) -> None:
     figure.legend(
         list(by_label.values()), list(by_label), loc="outside lower center", ncols=columns, fontsize=7, frameon=False
     )
+
+
+def _axis(measure: Measure) -> str:
+    return with_unit(measure.name, measure.unit)
 
 
 def _label(curve: Curve) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.search.design import from_unit
+from proxytune.search.engines.engine import Engine, Library, Look
 from proxytune.search.engines.one_thread import on_one_thread
 from proxytune.search.proposer import Trial, Values
 from proxytune.search.surrogate import unit_array
@@ -73,3 +74,14 @@ def _fitted(known: Any, merits: Array) -> Any:
     model = SingleTaskGP(known, torch.tensor(merits, dtype=torch.double)[:, None], outcome_transform=None)
     fit_gpytorch_mll(ExactMarginalLogLikelihood(model.likelihood, model))
     return model
+
+
+ENGINE = Engine(
+    name="qlognei",
+    label="BoTorch's qLogNEI",
+    summary="BoTorch's noisy expected improvement over its SingleTaskGP, with their defaults",
+    make=BotorchNEI,
+    in_studies=False,
+    needs=Library(("botorch",), "BoTorch", "peers"),
+    look=Look("0.15", "dashdot"),
+)

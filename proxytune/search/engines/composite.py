@@ -7,6 +7,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from proxytune.search.design import from_unit
+from proxytune.search.engines.engine import Engine, Look
 from proxytune.search.engines.gaussian_process import highest
 from proxytune.search.goal import Goal
 from proxytune.search.knowledge.output_model import OutputModel, fit_outputs
@@ -120,3 +121,13 @@ def _every_output(model: OutputModel, goal: Goal, points: Array) -> tuple[Array,
     mean, variance = model.predict(points)
     known = np.where(np.isnan(model.constant), goal.values, model.constant)
     return np.where(np.isnan(mean), known, mean), np.nan_to_num(variance)
+
+
+ENGINE = Engine(
+    name="composite",
+    label="expected improvement of composed outputs",
+    summary="the θ whose PRPV, composed of Gaussian processes of all outputs, is expected to improve most",
+    make=Composite,
+    learns_from="outputs",
+    look=Look("#E69F00"),
+)

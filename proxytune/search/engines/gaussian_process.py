@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from skopt.acquisition import gaussian_ei
 from threadpoolctl import threadpool_limits
 
 from proxytune.search.design import from_unit, unit_points
+from proxytune.search.engines.engine import Engine, Look
 from proxytune.search.proposer import Trial, Values, with_failures_as_worst
 from proxytune.search.surrogate import Array, Surrogate, fit_surrogate, unit_array
 from proxytune.seeds import proposal_seed
@@ -68,6 +68,9 @@ def _believing(space: Space, trials: Sequence[Trial]) -> Surrogate:
 
 def _most_promising(surrogate: Surrogate, seed: int) -> tuple[Array, float]:
     """The point of the unit cube with the highest expected improvement, and that."""
+    # Takes a second to load, so only where a point is looked for.
+    from skopt.acquisition import gaussian_ei
+
     _, incumbent = surrogate.incumbent()
     visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
     return highest(lambda points: gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0), visited, seed)
@@ -98,3 +101,12 @@ def _new(points: Array, visited: Array) -> Array:
     """The points that are not the same as a visited one."""
     distances = np.abs(points[:, None, :] - visited[None, :, :]).max(axis=2)
     return np.asarray(points[distances.min(axis=1) > SAME / len(visited)])
+
+
+ENGINE = Engine(
+    name="gp",
+    label="Gaussian process of the score",
+    summary="the θ whose score is expected to improve most, by a Gaussian process of the score",
+    make=GaussianProcess,
+    look=Look("#0072B2"),
+)

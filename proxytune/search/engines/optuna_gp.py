@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from proxytune.search.engines.engine import Engine, Library, Look
 from proxytune.search.engines.one_thread import on_one_thread
 from proxytune.search.engines.tree_parzen import quiet, suggested
 from proxytune.search.proposer import Trial, Values
@@ -25,3 +26,14 @@ class OptunaGP:
         with quiet(optuna.logging), on_one_thread():
             sampler = optuna.samplers.GPSampler(seed=proposal_seed(seed, len(trials)), n_startup_trials=1)
             return suggested(optuna, sampler, space, trials)
+
+
+ENGINE = Engine(
+    name="gpsampler",
+    label="Optuna's GPSampler",
+    summary="Optuna's Gaussian-process sampler with its defaults",
+    make=OptunaGP,
+    in_studies=False,
+    needs=Library(("optuna", "torch"), "Optuna and PyTorch", "peers"),
+    look=Look("#56B4E9", "dashed"),
+)

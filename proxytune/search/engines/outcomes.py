@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from proxytune.search.design import from_unit
 from proxytune.search.engines.composite import most_improving
+from proxytune.search.engines.engine import Engine, Look
 from proxytune.search.goal import Goal
 from proxytune.search.knowledge.likelihood import Likelihood
 from proxytune.search.knowledge.output_model import fit_outputs
@@ -44,3 +45,13 @@ class Outcomes:
             likelihood = Likelihood(fit_outputs(space, trials), self.goal)
             posterior = posterior_of(likelihood.log, len(space.intervals))
             return from_unit(space, posterior.draw(drawn))
+
+
+ENGINE = Engine(
+    name="outcomes",
+    label="outcomes",
+    summary="in turn, a draw from what is known of θ and the θ whose PRPV is expected to improve most",
+    make=Outcomes,
+    learns_from="outputs",
+    look=Look("#D55E00"),
+)

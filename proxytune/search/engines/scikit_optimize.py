@@ -4,9 +4,9 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from skopt import Optimizer
 from threadpoolctl import threadpool_limits
 
+from proxytune.search.engines.engine import Engine, Look
 from proxytune.search.proposer import Trial, Values
 from proxytune.seeds import proposal_seed
 from proxytune.space import Space
@@ -23,6 +23,9 @@ class ScikitOptimize:
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point, a function of the seed and the trials in their order; those not pending need a score."""
+        # Takes a second to load, and only this engine needs it.
+        from skopt import Optimizer
+
         box = [(interval.low, interval.high) for interval in space.intervals]
         optimizer = Optimizer(
             box,
@@ -38,3 +41,13 @@ class ScikitOptimize:
             proposed = optimizer.ask()
         pairs = zip(space.intervals, proposed, strict=True)
         return tuple(min(max(float(value), i.low), i.high) for i, value in pairs)
+
+
+ENGINE = Engine(
+    name="skopt",
+    label="scikit-optimize",
+    summary="scikit-optimize's gp_minimize with its defaults",
+    make=ScikitOptimize,
+    in_studies=False,
+    look=Look("#CC79A7", "dashed"),
+)

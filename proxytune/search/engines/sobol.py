@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from proxytune.search.design import design_point
+from proxytune.search.engines.engine import Engine, Look
 from proxytune.search.proposer import Trial, Values
 from proxytune.space import Space
 
@@ -15,3 +16,12 @@ class Sobol:
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point, a function of the number of trials and the seed alone."""
         return design_point(space, len(trials), seed)
+
+
+ENGINE = Engine(
+    name="sobol",
+    label="Sobol sequence",
+    summary="the quasi-random design gone on with; learns nothing",
+    make=Sobol,
+    look=Look("0.55", "dashdot"),
+)

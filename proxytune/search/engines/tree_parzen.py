@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from proxytune.search.engines.engine import Engine, Library, Look
 from proxytune.search.proposer import Trial, Values
 from proxytune.seeds import proposal_seed
 from proxytune.space import Space
@@ -52,3 +53,13 @@ def quiet(logging: Any) -> Iterator[None]:
             yield
     finally:
         logging.set_verbosity(before)
+
+
+ENGINE = Engine(
+    name="tpe",
+    label="Optuna's TPE",
+    summary="Optuna's tree-structured Parzen estimator with its defaults",
+    make=TreeParzen,
+    needs=Library(("optuna",), "Optuna", "tpe"),
+    look=Look("#009E73", "dashed"),
+)

@@ -10,18 +10,20 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import Kernel
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from proxytune.errors import RunError
 from proxytune.search.proposer import Trial
 from proxytune.search.surrogate import Array, most_probable, prior_kernel, unit_array
 from proxytune.space import Space
+
+# Loading scikit-learn takes longer than all else that a figure needs, so it waits for the first fit.
+if TYPE_CHECKING:
+    from sklearn.gaussian_process.kernels import Kernel
 
 Rows = NDArray[np.intp]
 
@@ -81,7 +83,7 @@ class OutputModel:
     """
 
     space: Space
-    kernel: Kernel
+    kernel: "Kernel"
     groups: tuple[OutputGroup, ...]
     constant: Array
     visited: Array
@@ -137,7 +139,7 @@ class OutputModel:
         return found
 
 
-def fit_outputs(space: Space, trials: Sequence[Trial], kernel: Kernel | None = None) -> OutputModel:
+def fit_outputs(space: Space, trials: Sequence[Trial], kernel: "Kernel | None" = None) -> OutputModel:
     """Fit the model to the trials that have outputs: same trials in any order, same model to the last bit.
 
     Args:
@@ -167,8 +169,11 @@ def _libraries() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _fitted_kernel(visited: Array, outputs: Array) -> Kernel:
+def _fitted_kernel(visited: Array, outputs: Array) -> "Kernel":
     """The kernel of highest posterior density given the trials that have every output, or the most of them."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+
     columns = _worth_modelling(outputs)
     whole = ~np.isnan(outputs[:, columns]).any(axis=1)
     if whole.sum() < FEWEST or not columns.size:
@@ -198,7 +203,7 @@ def _worth_modelling(outputs: Array) -> Rows:
     return np.flatnonzero(often & (np.nan_to_num(changes) > 1e-9 * np.nan_to_num(largest)))
 
 
-def _groups(kernel: Kernel, visited: Array, outputs: Array) -> tuple[OutputGroup, ...]:
+def _groups(kernel: "Kernel", visited: Array, outputs: Array) -> tuple[OutputGroup, ...]:
     by_rows: dict[bytes, list[int]] = {}
     seen = ~np.isnan(outputs)
     for column in _worth_modelling(outputs):
@@ -206,7 +211,7 @@ def _groups(kernel: Kernel, visited: Array, outputs: Array) -> tuple[OutputGroup
     return tuple(_group(kernel, visited, outputs, np.array(columns)) for columns in by_rows.values())
 
 
-def _group(kernel: Kernel, visited: Array, outputs: Array, columns: Rows) -> OutputGroup:
+def _group(kernel: "Kernel", visited: Array, outputs: Array, columns: Rows) -> OutputGroup:
     rows = ~np.isnan(outputs[:, columns[0]])
     known = outputs[np.ix_(rows, columns)]
     middle, scale = known.mean(axis=0), known.std(axis=0)

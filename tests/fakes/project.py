@@ -1,0 +1,37 @@
+"""A copy of the project that a test may add to, and what is run in it."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def copy_project(folder: Path) -> Path:
+    """Copy everything that is needed to run commands and the tests of the documents."""
+    for part in ("proxytune", "robots", "studies", "tests"):
+        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.png", "study.db"))
+    for document in ("README.md", "pyproject.toml"):
+        shutil.copy(ROOT / document, folder)
+    return folder
+
+
+def insert(path: Path, before: str, line: str) -> None:
+    """Put a line before the only place where this text begins a line."""
+    text = path.read_text(encoding="utf-8")
+    assert text.count(f"\n{before}") == 1, f"{path}: {before}"
+    path.write_text(text.replace(f"\n{before}", f"\n{line}\n{before}"), encoding="utf-8")
+
+
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run Python in the copy."""
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )

@@ -2,7 +2,7 @@
 
 FLOORS = (
     {"errors"},
-    {"settings", "space", "shipped", "scores", "logs"},
+    {"settings", "extensions", "space", "shipped", "scores", "logs"},
     {"usefulness", "effects"},
     {"domain"},
     {"driving"},

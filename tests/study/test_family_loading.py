@@ -24,10 +24,16 @@ def test_modules_in_the_study_s_folder_can_be_imported(make_study):
 
 
 BAD = {
-    "no colon": ({"family": '"wobbly"'}, "family: must be 'module:factory', got 'wobbly'"),
-    "no such module": ({"family": '"wobbli:wobbly"'}, "family: no module 'wobbli' here"),
-    "no such factory": ({"family": '"wobbly:wobly"'}, "family: wobbly has no function 'wobly'; did you mean 'wobbly'?"),
-    "a factory with a bug": ({"family": '"wobbly:broken_factory"'}, "broken_factory raised KeyError: 'robot'; mend it"),
+    "no colon": ({"family": '"wobbly"'}, "family: family 'wobbly' is unknown (your own is written module:attribute)"),
+    "no such module": ({"family": '"wobbli:wobbly"'}, "family 'wobbli:wobbly': no module 'wobbli' in "),
+    "no such factory": (
+        {"family": '"wobbly:wobly"'},
+        "'wobbly:wobly': wobbly has no 'wobly'; did you mean 'wobbly'?",
+    ),
+    "a factory with a bug": (
+        {"family": '"wobbly:broken_factory"'},
+        "raised KeyError: 'robot'; correct it",
+    ),
     "something else": ({"family": '"wobbly:not_a_family"'}, "made no domain family: it lacks identity, metrics"),
     "a missing model": ({"proxy": '"nowhere.toml"'}, "proxy: no such file: "),
     "an unknown parameter": (

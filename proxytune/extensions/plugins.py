@@ -25,6 +25,8 @@ def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint
     found: dict[str, EntryPoint] = {}
     for point in _installed(kind, tuple(sys.path)):
         name = point.name.partition(".")[2]
+        if not name.replace("-", "_").isidentifier():
+            raise ExtensionError(f"plug-in '{point.name}' of {_package(point)} must be called {kind}.NAME, one word")
         if name in shipped:
             whose = f"plug-in '{point.name}' of {_package(point)}"
             raise ExtensionError(f"{whose} has the name of a shipped {kind}; rename it or uninstall it")

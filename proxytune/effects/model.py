@@ -96,7 +96,7 @@ def _parameters(section: Section, effect: str, catalogue: Catalogue) -> dict[str
     """The parameters of an effect by their names in θ."""
     if not catalogue.knows(effect):
         hint = nearest(effect, (*catalogue.names, Learnt.name))
-        raise section.error(effect, f"no such effect (your own is written module:Attribute); {hint}")
+        raise section.error(effect, f"no such effect; {hint} (your own is written module:Attribute)")
     try:
         return dict(zip(catalogue.theta_names(effect), catalogue.effect(effect).parameters, strict=True))
     except ExtensionError as problem:

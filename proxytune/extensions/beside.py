@@ -3,8 +3,8 @@
 Python knows every module of a process by its name alone, so that the `family.py` of a second study would be taken for
 that of the first. A folder's modules are therefore imported under a name that belongs to the folder
 (`beside_my_study_1a2b3c4d.family`), and so are those of the folder that they import in turn by plain `import helper`.
-The folder is also added to the end of sys.path, for what imports by text (an environment registered as "module:Class");
-only there could two folders' modules of one name still be mixed up.
+The folder is also added to the end of sys.path, for what imports by text (an environment registered as "module:Class"):
+what is found there, after all else, may be of any folder that this process has opened.
 """
 
 import builtins

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from proxytune.domain import DomainFamily
-from proxytune.errors import InputError, ProxytuneError
+from proxytune.errors import ExtensionError, InputError, ProxytuneError
 from proxytune.extensions import describe, load
 from proxytune.settings import nearest
 from proxytune.space import Parameter
@@ -105,9 +105,12 @@ def check_bounds(
     Raises:
         SettingsError: With the key and the remedy.
     """
-    if name not in family.parameters:
+    try:
+        known = family.parameters.get(name)
+    except ExtensionError as problem:
+        raise settings.error(key, str(problem)) from None
+    if known is None:
         raise settings.error(key, f"unknown parameter; {nearest(name, family.parameters)}")
-    known = family.parameters[name]
     if not isinstance(known, Parameter):
         kind = type(known).__name__
         raise settings.error("family", f"parameters['{name}'] of {settings.family} must be a Parameter, got {kind}")

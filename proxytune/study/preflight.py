@@ -49,15 +49,19 @@ class Preflight:
         base: The domain instance from which they were moved.
         movements: One per parameter, in the order of the box.
         episodes: How many episodes it took.
+        failure: Why the first of them failed, where all of them did; else empty.
     """
 
     base: Theta
     movements: tuple[Movement, ...]
     episodes: int
+    failure: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One line for each parameter that does nothing beyond noise."""
+        """One line for each parameter that does nothing beyond noise, or a single one if every episode failed."""
+        if self.failure:
+            return (f"pre-flight: every agent fails everywhere, first with: {self.failure}; correct it",)
         return tuple(movement.warning for movement in self.movements if not movement.moves)
 
 
@@ -88,17 +92,25 @@ def preflight_of(study: Study, store: Store) -> Preflight | None:
     if not study.settings.preflight:
         return None
     found: dict[str, Movement] = {}
-    driven: set[Episode] = set()
+    driven: dict[Episode, Outcome] = {}
     undecided = study.settings.space.intervals
     for look in range(LOOKS):
         planned = _plan(study.settings, _places(study.settings, look), undecided)
         known = known_outcomes(study, store, planned)
         if len(known) < len(planned):
             return None
-        driven |= set(planned)
+        driven |= {episode: known[episode] for episode in planned}
         found |= {i.name: _movement(study, look, i, known) for i in undecided}
         undecided = tuple(i for i in undecided if not found[i.name].moves)
-    return Preflight(_base(study.settings), tuple(found[name] for name in study.settings.space.names), len(driven))
+    return Preflight(
+        _base(study.settings), tuple(found[name] for name in study.settings.space.names), len(driven), _failure(driven)
+    )
+
+
+def _failure(driven: Mapping[Episode, Outcome]) -> str:
+    """What the first episode failed of, if none succeeded."""
+    failures = [outcome.failure for outcome in driven.values() if outcome.metrics is None]
+    return failures[0] if failures and len(failures) == len(driven) else ""
 
 
 def placement_pairs(study: Study, store: Store) -> Array:

@@ -61,6 +61,57 @@ def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
     assert "\n" not in str(told.value)
 
 
+FAULTY = """
+class Faulty:
+    identity, metrics, starts = "1", {{"distance": "m", "survival_time": "s"}}, 5
+    parameters = {{}}
+
+    def check_agent(self, name): ...
+    def run(self, episode): ...
+
+    {fault}
+
+
+def make(domain, *, model):
+    assert dict(domain) == {{**domain}} == dict(domain.items())
+    assert list(domain) == list(domain.keys()) and "nothing" not in domain
+    return Faulty()
+"""
+
+FAULTS = {
+    "parameters": (
+        "parameters = property(lambda self: 1 / 0)",
+        "parameters of faulty_{n}:make raised ZeroDivisionError",
+    ),
+    "identity": ("identity = property(lambda self: self.gone)", "identity of faulty_{n}:make raised AttributeError"),
+    "metrics": ("metrics = ['distance']", "metrics of faulty_{n}:make must be a Mapping, got list"),
+    "starts": ("starts = '5'", "starts of faulty_{n}:make must be a Integral, got str"),
+    "no Parameter": ("parameters = {'trim': 3, 'delay': 3}", "of faulty_{n}:make must be a Parameter, got int"),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_what_a_foreign_family_does_wrong_is_one_line_with_its_name(make_study, case):
+    fault, expected = FAULTS[case]
+    number = list(FAULTS).index(case)
+    folder = make_study(family=f'"faulty_{number}:make"')
+    (folder / f"faulty_{number}.py").write_text(FAULTY.format(fault=fault))
+    with pytest.raises(InputError) as told:
+        load(folder)
+    assert f"study.toml: family: {expected.format(n=number)}" in str(told.value).replace("parameters['delay'] ", "")
+    assert "\n" not in str(told.value)
+
+
+def test_an_agent_check_that_raises_is_told_with_the_family_s_name(make_study):
+    folder = make_study(family='"checks_badly:make"')
+    text = "from wobbly import Wobbly, wobbly\n\n\nclass Bad(Wobbly):\n    def check_agent(self, name): import not_there\n\n\n"
+    text += "def make(domain, *, model):\n    return Bad(**vars(wobbly(domain, model=model)))\n"
+    (folder / "checks_badly.py").write_text(text)
+    expected = r"check_agent\('agent0'\) of checks_badly:make raised ModuleNotFoundError: .*not_there.*; correct it"
+    with pytest.raises(InputError, match=expected):
+        load(folder)
+
+
 def test_a_module_that_cannot_be_imported_is_told(make_study):
     folder = make_study(family='"falls_over:make"')
     (folder / "falls_over.py").write_text("1 / 0\n")

@@ -62,7 +62,7 @@ class DomainFamily(Protocol):
             check as they read: `domain.only(("gain",))`, `domain.number("gain", 1.0, low=0.0)`. The study's folder is
             `domain.path.parent`.
         model: A model.toml that the instance is to follow: what `measure --model` and a study's `proxy` name. A family
-            that cannot follow one raises `domain.error("proxy", …)` where it is not None.
+            that cannot follow one raises an InputError where it is not None.
 
     Attributes:
         identity: A digest of all but the episode that determines a result: robot, plant, effects, code.

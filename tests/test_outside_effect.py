@@ -148,7 +148,5 @@ def test_list_shows_a_plugin_s_effect(installed, capsys):
 
 def test_an_unknown_effect_is_told_with_the_way_to_name_one_s_own(folder):
     (folder / "model.toml").write_text(TABLE.replace(f'"{NAME}"', "weak_revers"), encoding="utf-8")
-    with pytest.raises(
-        SettingsError, match="effects.weak_revers: no such effect; .*your own is written module:Attribute"
-    ):
+    with pytest.raises(SettingsError, match="weak_revers: no such effect; .*your own is written module:Attribute"):
         read_model(folder / "model.toml", Catalogue(folder))

@@ -1,5 +1,7 @@
 """Settings files are read strictly: each mistake is one line with file, key and remedy."""
 
+from pathlib import Path
+
 import pytest
 
 from proxytune.errors import SettingsError

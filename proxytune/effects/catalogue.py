@@ -184,9 +184,9 @@ def effects_from(theta: Theta, nominal: Mapping[str, float], catalogue: Catalogu
         if not is_learnt(name):
             _check(name, value, catalogue.parameters)
     outside = {effect_of(name) for name in theta if name not in PARAMETERS and not is_learnt(name)}
-    named = {catalogue.effect(name): catalogue.theta_names(name) for name in sorted(outside)}
+    named = [(catalogue.effect(name), catalogue.theta_names(name)) for name in sorted(outside)]
     chosen: list[Effect] = []
-    for effect, names in (*_NAMED.items(), *named.items()):
+    for effect, names in (*_NAMED.items(), *named):
         if not theta.keys().isdisjoint(names):
             pairs = zip(names, effect.parameters, strict=True)
             chosen.append(effect(*(float(theta.get(n, p.neutral_value(nominal))) for n, p in pairs)))

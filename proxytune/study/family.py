@@ -14,7 +14,12 @@ from proxytune.settings import nearest
 from proxytune.space import Parameter
 from proxytune.study.settings import StudySettings
 
-MEMBERS: Mapping[str, type] = {"identity": str, "metrics": Mapping, "parameters": Mapping, "starts": Integral}
+MEMBERS: Mapping[str, tuple[type, str]] = {
+    "identity": (str, "text"),
+    "metrics": (Mapping, "a mapping"),
+    "parameters": (Mapping, "a mapping"),
+    "starts": (Integral, "a whole number"),
+}
 """What a domain family tells of itself, and as what."""
 
 METHODS = ("check_agent", "run")
@@ -69,11 +74,11 @@ def _check_members(settings: StudySettings, family: Any) -> None:
     lacks = [member for member in (*MEMBERS, *METHODS) if not _has(family, member)]
     if lacks:
         raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
-    for member, kind in MEMBERS.items():
+    for member, (kind, word) in MEMBERS.items():
         value = _asked(settings, f"{member} of {settings.family}", functools.partial(getattr, family, member))
         if not isinstance(value, kind):
             name = type(value).__name__
-            raise settings.error("family", f"{member} of {settings.family} must be a {kind.__name__}, got {name}")
+            raise settings.error("family", f"{member} of {settings.family} must be {word}, got {name}")
 
 
 def _has(family: Any, member: str) -> bool:

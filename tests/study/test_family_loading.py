@@ -81,11 +81,11 @@ def make(domain, *, model):
 FAULTS = {
     "parameters": (
         "parameters = property(lambda self: 1 / 0)",
-        "parameters of faulty_{n}:make raised ZeroDivisionError",
+        "parameters of faulty_{n}:make raised ZeroDiv",
     ),
     "identity": ("identity = property(lambda self: self.gone)", "identity of faulty_{n}:make raised AttributeError"),
-    "metrics": ("metrics = ['distance']", "metrics of faulty_{n}:make must be a Mapping, got list"),
-    "starts": ("starts = '5'", "starts of faulty_{n}:make must be a Integral, got str"),
+    "metrics": ("metrics = ['distance']", "metrics of faulty_{n}:make must be a mapping, got list"),
+    "starts": ("starts = '5'", "starts of faulty_{n}:make must be a whole number, got str"),
     "no Parameter": ("parameters = {'trim': 3, 'delay': 3}", "of faulty_{n}:make must be a Parameter, got int"),
 }
 
@@ -104,7 +104,8 @@ def test_what_a_foreign_family_does_wrong_is_one_line_with_its_name(make_study, 
 
 def test_an_agent_check_that_raises_is_told_with_the_family_s_name(make_study):
     folder = make_study(family='"checks_badly:make"')
-    text = "from wobbly import Wobbly, wobbly\n\n\nclass Bad(Wobbly):\n    def check_agent(self, name): import not_there\n\n\n"
+    text = "from wobbly import Wobbly, wobbly\n\n\n"
+    text += "class Bad(Wobbly):\n    def check_agent(self, name): import not_there\n\n\n"
     text += "def make(domain, *, model):\n    return Bad(**vars(wobbly(domain, model=model)))\n"
     (folder / "checks_badly.py").write_text(text)
     expected = r"check_agent\('agent0'\) of checks_badly:make raised ModuleNotFoundError: .*not_there.*; correct it"

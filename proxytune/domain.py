@@ -53,6 +53,17 @@ class Outcome:
 class DomainFamily(Protocol):
     """A simulator with parameters: picklable, without global state, same episode, same result.
 
+    A study's key `family` names a factory, `module:factory`, that makes one:
+
+        def factory(domain: Section, *, model: Path | None) -> DomainFamily
+
+    Args of the factory:
+        domain: The study's [domain] table. It reads like a mapping, `domain["gain"]` or `dict(domain)`; its methods
+            check as they read: `domain.only(("gain",))`, `domain.number("gain", 1.0, low=0.0)`. The study's folder is
+            `domain.path.parent`.
+        model: A model.toml that the instance is to follow: what `measure --model` and a study's `proxy` name. A family
+            that cannot follow one raises an InputError where it is not None.
+
     Attributes:
         identity: A digest of all but the episode that determines a result: robot, plant, effects, code.
         metrics: Every metric that an episode yields, with its unit.

@@ -5,7 +5,8 @@
     │   ├── ScoresError      a table of scores
     │   ├── SettingsError    a study.toml, model.toml or robot.toml
     │   ├── LogError         a log of commands and poses
-    │   └── LearnerError     samples or weights that a learner cannot use
+    │   ├── LearnerError     samples or weights that a learner cannot use
+    │   └── ExtensionError   code named by the user, or a plug-in
     └── RunError             something failed on the way (exit status 1)
         ├── EpisodeError     an agent or a domain failed in one episode
         ├── StoreError       study.db cannot be read or written
@@ -17,6 +18,7 @@ The command line turns each into one line on standard error and the exit status 
 __all__ = [
     "BusyError",
     "EpisodeError",
+    "ExtensionError",
     "InputError",
     "LearnerError",
     "LogError",
@@ -50,6 +52,10 @@ class LogError(InputError):
 
 class LearnerError(InputError):
     """Samples or weights that a learner cannot use."""
+
+
+class ExtensionError(InputError):
+    """Code that a user names, or a plug-in, cannot be found, imported, or is not what it should be."""
 
 
 class RunError(ProxytuneError):

@@ -3,7 +3,7 @@
 import difflib
 import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,39 @@ def nearest(name: str, known: Iterable[str]) -> str:
 class Section:
     """One table of a settings file, which answers for its keys' types and names.
 
+    It reads like a mapping of plain values too: `section["key"]`, `"key" in section`, `section.get("key", 1.0)`,
+    `dict(section)`. `section.values` is that mapping itself.
+
     Every method raises SettingsError with file, key and remedy.
     """
 
     path: Path
     name: str
     values: Mapping[str, Any]
+
+    def __getitem__(self, key: str) -> Any:
+        return self._get(key, None)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.values)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self.values
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def keys(self) -> KeysView[str]:
+        """The keys of this table."""
+        return self.values.keys()
+
+    def items(self) -> ItemsView[str, Any]:
+        """The keys with their plain values."""
+        return self.values.items()
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """The plain value of a key, or the default where it is missing."""
+        return self.values.get(key, default)
 
     def error(self, key: str, problem: str) -> SettingsError:
         """The one-line complaint about a key of this section."""

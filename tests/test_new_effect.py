@@ -60,7 +60,7 @@ def folder(tmp_path_factory):
         shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.png", "study.db"))
     for document in ("README.md", "pyproject.toml"):
         shutil.copy(ROOT / document, folder)
-    motion = folder / "proxytune" / "effects" / "motion.py"
+    motion = folder / "proxytune" / "effects" / "body" / "motion.py"
     motion.write_text(motion.read_text(encoding="utf-8") + EFFECT, encoding="utf-8")
     catalogue = folder / "proxytune" / "effects" / "catalogue.py"
     text = catalogue.read_text(encoding="utf-8")

@@ -1,5 +1,7 @@
 """Settings files are read strictly: each mistake is one line with file, key and remedy."""
 
+from pathlib import Path
+
 import pytest
 
 from proxytune.errors import SettingsError
@@ -72,3 +74,12 @@ def test_a_folder_in_place_of_a_file_is_one_line(tmp_path):
 def test_the_nearest_name_is_suggested_and_otherwise_all():
     assert nearest("trimm", ["trim", "delay"]) == "did you mean 'trim'?"
     assert nearest("zzz", ["trim", "delay"]) == "known are: delay, trim"
+
+
+def test_a_section_reads_like_a_mapping_of_plain_values():
+    section = Section(Path("study.toml"), "domain.", {"gain": 2.0, "body": {"mass": 1.0}})
+    assert dict(section) == {**section} == dict(section.items()) == section.values
+    assert (list(section), len(section), "gain" in section, "mass" in section) == (["gain", "body"], 2, True, False)
+    assert (section["body"], section.get("gain"), section.get("mass", 3)) == ({"mass": 1.0}, 2.0, 3)
+    with pytest.raises(SettingsError, match=r"study.toml: domain.mass: is missing; add it"):
+        section["mass"]

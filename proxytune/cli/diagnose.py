@@ -13,6 +13,7 @@ from proxytune.cli.steps import Steps
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.measured.vehicle import robot_of
+from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.logs import read_log
 from proxytune.report.diagnosis.document import document, model_file, shown
@@ -41,6 +42,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--declared", metavar="NAMES", help="effects tuned in any case, as trim,delay [those of θ that the robot has]"
     )
+    parser.add_argument(
+        "--effects",
+        default="",
+        metavar="NAMES",
+        help="your own effects to try too, as module:Attribute of this folder; plug-ins take part by themselves",
+    )
     parser.add_argument("--robot", metavar="NAME", help="the robot, instead of the one that log.toml names")
     parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test on [a part of LOG]")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the null distributions [1]")
@@ -52,11 +59,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     if arguments.seed < 0:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
     log = read_log(arguments.log)
-    robot = robot_of(log, arguments.robot)
-    given = (
-        None if arguments.declared is None else [name.strip() for name in arguments.declared.split(",") if name.strip()]
-    )
-    declared = declared_effects(robot) if given is None else given
+    robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), _names(arguments.effects)))
+    declared = declared_effects(robot) if arguments.declared is None else _names(arguments.declared)
     test = read_log(arguments.test) if arguments.test else None
     with Steps(SHARES) as step:
         found = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=step)
@@ -65,6 +69,10 @@ def run(arguments: argparse.Namespace) -> Answer:
         told = document(found)
         files = _write(found, told, folder)
     return Answer(told | {"files": files}, Group(shown(found), Text("\n".join(files))))
+
+
+def _names(given: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in given.split(",") if name.strip())
 
 
 def _write(found: Diagnosis, told: dict[str, Any], folder: Path) -> list[str]:

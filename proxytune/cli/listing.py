@@ -2,14 +2,17 @@
 
 import argparse
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 from rich.table import Table
 
 from proxytune.cli.answer import Answer
 from proxytune.driving.agents import AGENTS
+from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.robot import read_robot, robot_names
 from proxytune.driving.task import METRICS
-from proxytune.effects import CATALOGUE, DECLARED, theta_names
+from proxytune.effects import DECLARED, SHIPPED
+from proxytune.extensions import plugins
 from proxytune.search.engines.registry import ENGINES, installed
 from proxytune.usefulness import MEASURES, PODS
 
@@ -46,8 +49,9 @@ def _robots() -> list[Row]:
 
 def _effects() -> list[Row]:
     rows: list[Row] = []
-    for name, effect in CATALOGUE.items():
-        for theta_name, parameter in zip(theta_names(effect), effect.parameters, strict=True):
+    for name in SHIPPED.names:
+        effect = SHIPPED.effect(name)
+        for theta_name, parameter in zip(SHIPPED.theta_names(name), effect.parameters, strict=True):
             row: Row = {"effect": name, "stage": effect.stage.value, "parameter": theta_name, "unit": parameter.unit}
             row |= {"low": parameter.low, "high": parameter.high, "neutral": parameter.neutral}
             rows.append(row | {"declared": "yes" if name in DECLARED else "", "source": parameter.source})
@@ -55,7 +59,8 @@ def _effects() -> list[Row]:
 
 
 def _agents() -> list[Row]:
-    return [{"name": name, "how_it_drives": str(agent)} for name, agent in AGENTS.items()]
+    own = {name: load_agent(name, Path.cwd()) for name in plugins("agent", AGENTS)}
+    return [{"name": name, "how_it_drives": str(agent)} for name, agent in {**AGENTS, **own}.items()]
 
 
 def _metrics() -> list[Row]:

@@ -1,6 +1,7 @@
 """`predict`: what a fitted model says of any log."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from proxytune.cli.answer import Answer
 from proxytune.diagnosis.horizon.prediction import agreement, predict
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.driving.robot import Robot, robot_from_geometry, robot_names
-from proxytune.effects import Model, read_model
+from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
 from proxytune.logs import Log, read_log
 from proxytune.report.writing import write_text
@@ -28,8 +29,9 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Predict every window, write the poses, and compare them with those measured."""
     if not (np.isfinite(arguments.horizon) and arguments.horizon > 0.0):
         raise InputError(f"--horizon must be a positive number of seconds, got {arguments.horizon}")
-    model, log = read_model(arguments.model), read_log(arguments.log)
-    table = predict(log, _robot(model, log), model.theta, arguments.horizon)
+    catalogue = Catalogue(Path.cwd())
+    model, log = read_model(arguments.model, catalogue), read_log(arguments.log)
+    table = predict(log, _robot(model, log, catalogue), model.theta, arguments.horizon)
     write_text(arguments.output, table.to_csv(index=False))
     found = agreement(table, log, arguments.horizon)
     document = {
@@ -55,7 +57,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     )
 
 
-def _robot(model: Model, log: Log) -> Robot:
-    if model.robot in robot_names():
-        return robot_of(log, model.robot)
-    return robot_from_geometry(model.robot, model.geometry or log.geometry, log.rate_hz)
+def _robot(model: Model, log: Log, catalogue: Catalogue) -> Robot:
+    if model.robot in robot_names(catalogue.folder):
+        return robot_of(log, model.robot, catalogue)
+    robot = robot_from_geometry(model.robot, model.geometry or log.geometry, log.rate_hz)
+    return replace(robot, catalogue=catalogue)

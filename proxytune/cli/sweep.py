@@ -11,7 +11,7 @@ from rich.text import Text
 
 from proxytune.cli.answer import Answer
 from proxytune.cli.study_folder import study_folder
-from proxytune.effects import read_model
+from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
 from proxytune.report.sweep.document import (
     NO_POD,
@@ -104,7 +104,7 @@ def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
     return written
 
 
-def read_base(text: str | None) -> Theta:
+def read_base(text: str | None, catalogue: Catalogue = SHIPPED) -> Theta:
     """What the other parameters are held at: NAME=VALUE pairs, or a model.toml.
 
     Raises:
@@ -113,7 +113,7 @@ def read_base(text: str | None) -> Theta:
     if text is None:
         return {}
     if text.endswith(".toml"):
-        return read_model(Path(text)).theta
+        return read_model(Path(text), catalogue).theta
     pairs = [pair.partition("=") for pair in text.split(",")]
     try:
         base = {name.strip(): float(value) for name, _, value in pairs}
@@ -127,7 +127,7 @@ def read_base(text: str | None) -> Theta:
 def _planned(study: Study, arguments: argparse.Namespace) -> list[SweepRecord]:
     if not 2 <= arguments.points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {arguments.points}")
-    base = read_base(arguments.at)
+    base = read_base(arguments.at, Catalogue(study.settings.folder.resolve()))
     check_base(study, base)
     names = study.settings.space.names if arguments.parameter == "all" else (arguments.parameter,)
     return [plan_sweep(sweep_interval(study, name), base, arguments.points) for name in names]

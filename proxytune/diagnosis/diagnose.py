@@ -16,7 +16,7 @@ from proxytune.diagnosis.measured.split import Parts, all_drives, split
 from proxytune.diagnosis.model.fitting import Fit
 from proxytune.diagnosis.model.intervals import intervals
 from proxytune.diagnosis.model.plausible import check_motion, check_units
-from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS
+from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, motion_effects
 from proxytune.diagnosis.naming.found import Adopted, Dropped, Found, Variant
 from proxytune.diagnosis.naming.likeness import two_robots
 from proxytune.diagnosis.naming.materiality import Worth, worth
@@ -26,7 +26,7 @@ from proxytune.diagnosis.naming.visibility import unseen
 from proxytune.diagnosis.remainder.learning import Learning, learn
 from proxytune.diagnosis.verdict import verdict
 from proxytune.driving.robot import Robot
-from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, effect_of, theta_names
+from proxytune.effects import DECLARED, SHIPPED, Catalogue, effect_of
 from proxytune.errors import LogError
 from proxytune.logs import Log
 from proxytune.settings import nearest
@@ -58,8 +58,8 @@ def diagnose(
         LogError: If the log cannot bear the question: too short, no motion, other units.
         SettingsError: If a declared effect is unknown or does not act on motion.
     """
-    names = declared_parameters(declared)
-    start = {name: robot.theta.get(name, PARAMETERS[name].neutral_value(robot.figures)) for name in names}
+    names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
+    start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}
     log, test = without_long_rests(log), without_long_rests(test) if test is not None else None
     own = read_clocks(log, robot)
     clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
@@ -109,7 +109,7 @@ def declared_effects(robot: Robot) -> tuple[str, ...]:
     return tuple(name for name in DECLARED if name in MOTION_EFFECTS and name in robot.theta)
 
 
-def declared_parameters(effects: Iterable[str]) -> tuple[str, ...]:
+def declared_parameters(effects: Iterable[str], catalogue: Catalogue = SHIPPED) -> tuple[str, ...]:
     """The names in θ of declared effects' parameters.
 
     Raises:
@@ -117,20 +117,22 @@ def declared_parameters(effects: Iterable[str]) -> tuple[str, ...]:
     """
     names: list[str] = []
     for effect in effects:
-        if effect not in MOTION_EFFECTS:
-            raise LogError(f"--declared {effect}: no effect on motion has this name; {nearest(effect, MOTION_EFFECTS)}")
-        names += [name for name in theta_names(CATALOGUE[effect]) if not name.endswith(".imbalance")]
+        known = motion_effects(catalogue)
+        if effect not in known:
+            raise LogError(f"--declared {effect}: no effect on motion has this name; {nearest(effect, known)}")
+        names += [name for name in catalogue.theta_names(effect) if not name.endswith(".imbalance")]
     return tuple(dict.fromkeys(names))
 
 
 def estimates(fitted: Fit, adopted: Iterable[Adopted], polish: Polish | None) -> dict[str, Estimate]:
     """Every value of a fitted model with its interval; fixed ones have none to speak of."""
+    parameters = fitted.drives.robot.catalogue.parameters
     known = intervals(fitted) | (dict(polish.intervals) if polish else {})
     for effect in adopted:
         if effect.interval is not None:
             known[effect.names[0]] = effect.interval
     return {
-        name: Estimate(value, known.get(name, (value, value)), PARAMETERS[name].unit)
+        name: Estimate(value, known.get(name, (value, value)), parameters[name].unit)
         for name, value in fitted.theta.items()
     }
 

@@ -15,7 +15,6 @@ from proxytune.diagnosis.naming.likeness import Unlike
 from proxytune.diagnosis.naming.materiality import Worth
 from proxytune.diagnosis.remainder.learning import Learning
 from proxytune.driving.robot import Robot
-from proxytune.effects import PARAMETERS
 
 MAIN_S = 2.0
 """The horizon of the one error that stands for all."""
@@ -82,7 +81,7 @@ class Diagnosis:
     def dropped_values(self) -> dict[str, Estimate]:
         """Values that effects had which do not matter, by name in θ; they are not in the model."""
         return {
-            name: Estimate(beside.theta[name], (beside.theta[name],) * 2, PARAMETERS[name].unit)
+            name: Estimate(beside.theta[name], (beside.theta[name],) * 2, self.robot.catalogue.parameters[name].unit)
             for effect, beside, _ in self.found.immaterial
             for name in effect.names
         }
@@ -94,7 +93,7 @@ class Diagnosis:
         """
         fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
         known = [name for name in effect.names if name in fitted and name in self.theta]
-        return tuple(name for name in known if at_edge(name, self.theta[name].value, self.robot.figures))
+        return tuple(name for name in known if at_edge(name, self.theta[name].value, self.robot))
 
     @property
     def noise(self) -> Noise:

@@ -27,7 +27,7 @@ def record(family: LaneFollowing, *, name: str, repeats: int, seconds: float, se
         seconds: Length of a drive [s].
         seed: Of sizes, starts and noise.
     """
-    rate = read_robot(family.robot).figures["control_rate"]
+    rate = read_robot(family.robot, family.folder).figures["control_rate"]
     times = np.arange(round(seconds * rate)) / rate
     episodes = []
     for number in range(repeats * len(LIBRARY)):

@@ -27,9 +27,9 @@ from proxytune.driving.plant import Plant
 from proxytune.driving.road.lane import off_map
 from proxytune.driving.road.maps import MAPS
 from proxytune.driving.road.texture import draw_floor
-from proxytune.driving.robot import Robot, read_robot, robot_names
+from proxytune.driving.robot import Robot, read_robot, robot_home, robot_names
 from proxytune.effects import (
-    PARAMETERS,
+    Catalogue,
     Effect,
     Setting,
     Signal,
@@ -73,7 +73,7 @@ class LaneFollowing:
         position_noise_m: Standard deviation of where the robot is put down [m].
         heading_noise_deg: Standard deviation of how it is turned [deg].
         effects: Values of effects besides the robot's nominal ones, sorted by name.
-        folder: Where a user's own agents lie.
+        folder: Where a user's own agents, effects and robots lie.
     """
 
     robot: str
@@ -90,14 +90,14 @@ class LaneFollowing:
     def identity(self) -> str:
         """A digest of settings, of what robot, code and the user's modules mean, and of versions."""
         settings = tuple(getattr(self, name) for name in self.__dataclass_fields__ if name != "folder")
-        return identity_of(settings, self.robot, self.folder, self.versions)
+        return identity_of(settings, robot_home(self.robot, self.folder), self.folder, self.versions)
 
     @property
     def earlier_identities(self) -> tuple[str, ...]:
         """Identities under which earlier code kept episodes that are the very same."""
         world = (self.robot, self.plant, self.camera, self.map, self.seconds)
         settings = (*world, self.position_noise_m, self.heading_noise_deg, self.effects)
-        return earlier_identities(settings, self.robot, self.folder)
+        return earlier_identities(settings, robot_home(self.robot, self.folder), self.folder)
 
     @property
     def versions(self) -> Mapping[str, str]:
@@ -112,8 +112,8 @@ class LaneFollowing:
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        """Every parameter of the catalogue of effects."""
-        return PARAMETERS
+        """Every parameter of the catalogue of effects, a user's own when asked for by name."""
+        return Catalogue(self.folder).parameters
 
     @property
     def starts(self) -> int:
@@ -157,7 +157,7 @@ class LaneFollowing:
         Raises:
             SettingsError: If the robot has no expert.
         """
-        robot = read_robot(self.robot)
+        robot = read_robot(self.robot, self.folder)
         expert = Expert(MAPS[self.map], *robot.expert_figures(), seed=episode.seed)
         shown = self._drive(episode, expert, self._course(episode, seconds), Sight).memory
         kept = np.array(shown.on_road)
@@ -171,7 +171,7 @@ class LaneFollowing:
             EpisodeError: If the policy raises or does not answer with two finite duties.
             SettingsError: If the robot does not state the distance between its wheels.
         """
-        wheel_distance = read_robot(self.robot).wheel_distance()
+        wheel_distance = read_robot(self.robot, self.folder).wheel_distance()
         driven = self._drive(episode, Pupil(policy), self._course(episode, self.seconds))
         return task.driving_score(
             MAPS[self.map],
@@ -190,7 +190,7 @@ class LaneFollowing:
 
         It goes on wherever it leads, so that two domains can be compared step by step.
         """
-        seconds = len(commands) / read_robot(self.robot).figures["control_rate"]
+        seconds = len(commands) / read_robot(self.robot, self.folder).figures["control_rate"]
         course = Course(self._start(episode), seconds, episode.seed, lambda x, y: False)
         driven = self._drive(episode, Playback(commands), course)
         return Observation(driven.poses, np.stack(driven.memory.pictures))
@@ -220,8 +220,8 @@ class LaneFollowing:
 
 @functools.lru_cache(maxsize=4)
 def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
-    robot = read_robot(family.robot)
-    effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures)
+    robot = read_robot(family.robot, family.folder)
+    effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
     camera = _camera(family, robot, effects)
     image, measurement = (stage_chain(effects, stage) for stage in (Stage.IMAGE, Stage.MEASUREMENT))
     return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
@@ -248,11 +248,12 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
         SettingsError: With file, key and remedy.
     """
     section.only(("robot", "plant", "camera", "map", "seconds", "position_noise_m", "heading_noise_deg", "effects"))
-    given = read_model(model) if model else None
-    robot = _agreed(section, "robot", given.robot if given else None, "duckiebot", robot_names())
+    folder = section.path.resolve().parent
+    given = read_model(model, Catalogue(folder)) if model else None
+    robot = _agreed(section, "robot", given.robot if given else None, "duckiebot", robot_names(folder))
     plant = _agreed(section, "plant", given.plant if given else None, "bullet", PLANTS)
-    _check_equipment(section, read_robot(robot), plant)
-    theta, _ = read_effects(section.section("effects"))
+    _check_equipment(section, read_robot(robot, folder), plant)
+    theta, _ = read_effects(section.section("effects"), Catalogue(folder))
     effects = {**(given.theta if given else {}), **theta}
     return LaneFollowing(
         robot=robot,
@@ -263,7 +264,7 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
         position_noise_m=section.number("position_noise_m", 0.01, low=0.0, high=0.1),
         heading_noise_deg=section.number("heading_noise_deg", 2.0, low=0.0, high=30.0),
         effects=tuple(sorted(effects.items())),
-        folder=section.path.resolve().parent,
+        folder=folder,
     )
 
 

@@ -8,17 +8,16 @@ from typing import Any
 
 from proxytune.driving import lineage
 from proxytune.meaning import meaning_of, modules_beside
-from proxytune.shipped import shipped
 
 PACKAGE = Path(__file__).resolve().parent.parent
 
 
-def identity_of(settings: tuple[Any, ...], robot: str, folder: Path, versions: Mapping[str, str]) -> str:
+def identity_of(settings: tuple[Any, ...], robot: Path, folder: Path, versions: Mapping[str, str]) -> str:
     """A digest of settings, of what our code, the robot's files and the user's modules mean, and of versions.
 
     Args:
         settings: Of the family, without the folder.
-        robot: Name of the robot.
+        robot: The robot's folder.
         folder: Where the user's modules lie.
         versions: Of the packages that simulate.
     """
@@ -27,15 +26,15 @@ def identity_of(settings: tuple[Any, ...], robot: str, folder: Path, versions: M
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
-def earlier_identities(settings: tuple[Any, ...], robot: str, folder: Path) -> tuple[str, ...]:
+def earlier_identities(settings: tuple[Any, ...], robot: Path, folder: Path) -> tuple[str, ...]:
     """The identities under which earlier code kept episodes that are those of today, to the last bit.
 
     Args:
         settings: Of the family, those that there were then.
-        robot: Name of the robot.
+        robot: The robot's folder.
         folder: Where the user's modules lie; they counted by their bytes, without those in packages.
     """
-    code = lineage.digest_of_54760ad(robot, robot_meaning(robot), code_meaning())
+    code = lineage.digest_of_54760ad(robot.name, robot_meaning(robot), code_meaning())
     if code is None:
         return ()
     own = b"".join(path.read_bytes() for path in sorted(folder.glob("*.py")))
@@ -50,7 +49,6 @@ def code_meaning() -> str:
 
 
 @functools.lru_cache
-def robot_meaning(robot: str) -> str:
-    """What a robot's files mean."""
-    home = shipped("robots") / robot
-    return meaning_of((path for path in home.iterdir() if path.is_file()), home)
+def robot_meaning(robot: Path) -> str:
+    """What the files of a robot's folder mean."""
+    return meaning_of((path for path in robot.iterdir() if path.is_file()), robot)

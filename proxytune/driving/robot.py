@@ -7,8 +7,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from proxytune.driving.cameras import CameraFigures
-from proxytune.effects import read_effects
-from proxytune.errors import SettingsError
+from proxytune.effects import SHIPPED, Catalogue, read_effects
+from proxytune.errors import ExtensionError, SettingsError
+from proxytune.extensions import load, plugins
 from proxytune.settings import Section, nearest, read_settings
 from proxytune.shipped import shipped
 
@@ -76,6 +77,7 @@ class Robot:
         figures: Those nominal figures that are known, by name, in the units of UNITS; REQUIRED are among them.
         theta: Values of the effects that every instance of it has.
         urdf: Its body for the bullet plant, or None.
+        catalogue: The effects that it may have.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Robot:
     figures: Mapping[str, float]
     theta: Mapping[str, float]
     urdf: Path | None
+    catalogue: Catalogue = SHIPPED
 
     def body(self) -> Path:
         """The URDF for the bullet plant.
@@ -142,27 +145,56 @@ class Robot:
             )
 
 
-def robot_names() -> tuple[str, ...]:
-    """The robots that travel with the package."""
-    return tuple(sorted(path.parent.name for path in shipped("robots").glob("*/robot.toml")))
+def robot_names(folder: Path | None = None) -> tuple[str, ...]:
+    """The robots of a user's folder, of plug-ins, and those shipped."""
+    homes = [shipped("robots"), *([folder] if folder else [])]
+    names = {path.parent.name for home in homes for path in home.glob("*/robot.toml")}
+    return tuple(sorted(names | set(plugins("robot"))))
+
+
+def robot_home(name: str, folder: Path | None = None) -> Path:
+    """The folder of a robot: beside the study first, then shipped, then what a plug-in names.
+
+    Args:
+        name: The folder's name, or that of a plug-in.
+        folder: The user's folder, that of a study.
+
+    Raises:
+        SettingsError: If there is no such robot.
+        ExtensionError: If its plug-in cannot be used.
+    """
+    if name not in robot_names(folder):
+        hint = nearest(name, robot_names(folder))
+        raise SettingsError(f"robot '{name}' is unknown (your own is a folder {name} with robot.toml); {hint}")
+    for home in ([folder] if folder else []) + [shipped("robots")]:
+        if (home / name / "robot.toml").is_file():
+            return home / name
+    found = load(name, kind="robot")
+    if not isinstance(found, str | Path):
+        raise ExtensionError(f"robot '{name}': its plug-in must be the path of its folder, got {type(found).__name__}")
+    return Path(found)
 
 
 @functools.lru_cache
-def read_robot(name: str) -> Robot:
+def read_robot(name: str, folder: Path | None = None) -> Robot:
     """Read a robot by name.
+
+    Args:
+        name: Of its folder.
+        folder: A user's folder, where robots and modules of effects come before those shipped.
 
     Raises:
         SettingsError: If there is no such robot or its robot.toml is not complete.
     """
-    if name not in robot_names():
-        raise SettingsError(f"robot '{name}' is unknown; {nearest(name, robot_names())}")
-    settings = read_settings(shipped("robots") / name / "robot.toml")
+    catalogue = Catalogue(folder)
+    settings = read_settings(robot_home(name, folder) / "robot.toml")
     settings.only(("format", "name", "description", "urdf", "figures", "effects"))
     settings.whole("format", low=1, high=1)
-    theta, _ = read_effects(settings.section("effects"))
+    settings.text("name", choices=(name,))
+    theta, _ = read_effects(settings.section("effects"), catalogue)
     figures = _read_figures(settings.section("figures"))
     description = settings.text("description")
-    return Robot(settings.text("name"), description, figures, MappingProxyType(theta), _urdf(settings))
+    return Robot(name, description, figures, MappingProxyType(theta), _urdf(settings), catalogue)
 
 
 def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: float) -> Robot:

@@ -1,6 +1,15 @@
 """Effects: what bends commands, motion and pictures on their way, as causal filters with a neutral value."""
 
-from proxytune.effects.catalogue import CATALOGUE, DECLARED, PARAMETERS, effect_of, effects_from, theta_names
+from proxytune.effects.catalogue import (
+    CATALOGUE,
+    DECLARED,
+    PARAMETERS,
+    SHIPPED,
+    Catalogue,
+    effect_of,
+    effects_from,
+    theta_names,
+)
 from proxytune.effects.chain import Chain, stage_chain
 from proxytune.effects.effect import CHANNELS, Effect, Setting, Signal, Stage
 from proxytune.effects.model import Model, model_text, read_effects, read_model
@@ -11,6 +20,8 @@ __all__ = [
     "CHANNELS",
     "DECLARED",
     "PARAMETERS",
+    "SHIPPED",
+    "Catalogue",
     "Chain",
     "Cue",
     "Effect",

@@ -5,11 +5,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, theta_names
+from proxytune.effects.catalogue import CATALOGUE, PARAMETERS, SHIPPED, Catalogue, effect_of
 from proxytune.effects.learnt.effect import Learnt
-from proxytune.effects.learnt.table import learnt_text, read_learnt
+from proxytune.effects.learnt.table import is_learnt, learnt_text, read_learnt
+from proxytune.errors import ExtensionError
 from proxytune.logs import GEOMETRY
 from proxytune.settings import Section, nearest, read_settings
+from proxytune.space import Parameter
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,12 @@ class Model:
     geometry: Mapping[str, float] = field(default_factory=dict)
 
 
-def read_model(path: Path) -> Model:
+def read_model(path: Path, catalogue: Catalogue = SHIPPED) -> Model:
     """Read a model.toml.
+
+    Args:
+        path: The file.
+        catalogue: The effects that it may name.
 
     Raises:
         SettingsError: With file, key and remedy.
@@ -41,7 +47,7 @@ def read_model(path: Path) -> Model:
     settings.only(("format", "robot", "plant", "geometry", "effects"))
     settings.whole("format", 1, low=1, high=1)
     plant = settings.text("plant") if "plant" in settings.values else None
-    theta, intervals = read_effects(settings.section("effects"))
+    theta, intervals = read_effects(settings.section("effects"), catalogue)
     return Model(settings.text("robot"), plant, theta, intervals, _read_geometry(settings.section("geometry")))
 
 
@@ -50,7 +56,7 @@ def _read_geometry(section: Section) -> dict[str, float]:
     return {figure: section.number(key, low=0.0) for key, figure in GEOMETRY.items() if key in section.values}
 
 
-def model_text(model: Model, comments: Iterable[str] = ()) -> str:
+def model_text(model: Model, comments: Iterable[str] = (), catalogue: Catalogue = SHIPPED) -> str:
     """A model.toml that reads back as this model."""
     lines = [f"# {comment}" for comment in comments]
     lines += ["format = 1", f'robot = "{model.robot}"']
@@ -58,32 +64,53 @@ def model_text(model: Model, comments: Iterable[str] = ()) -> str:
     keys = {figure: key for key, figure in GEOMETRY.items()}
     lines += ["\n[geometry]"] if model.geometry else []
     lines += [f"{keys[figure]} = {value!r}" for figure, value in model.geometry.items()]
-    return "\n".join(lines) + "\n" + effects_table(model.theta, model.intervals)
+    return "\n".join(lines) + "\n" + effects_table(model.theta, model.intervals, catalogue)
 
 
-def read_effects(section: Section) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
-    """Values and intervals from `[effects.NAME]` tables: a parameter is a number, or a table with `value`."""
+def read_effects(
+    section: Section, catalogue: Catalogue = SHIPPED
+) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Values and intervals from `[effects.NAME]` tables: a parameter is a number, or a table with `value`.
+
+    A user's own effect is a quoted key: `[effects."yaw_drift:YawDrift"]`.
+
+    Raises:
+        SettingsError: With file, key and remedy.
+    """
     theta: dict[str, float] = {}
     intervals: dict[str, tuple[float, float]] = {}
     for effect in section.values:
         if effect == Learnt.name:
             theta |= read_learnt(section.section(effect))
             continue
-        if effect not in CATALOGUE:
-            raise section.error(effect, f"no such effect; {nearest(effect, (*CATALOGUE, Learnt.name))}")
-        known = [parameter.name for parameter in CATALOGUE[effect].parameters]
+        known = _parameters(section, effect, catalogue)
         table = section.section(effect)
-        table.only(known)
-        for name, parameter in zip(theta_names(CATALOGUE[effect]), known, strict=True):
-            if parameter in table.values:
+        table.only([parameter.name for parameter in known.values()])
+        for name, parameter in known.items():
+            if parameter.name in table.values:
                 _read_parameter(table, parameter, name, theta, intervals)
     return theta, intervals
 
 
+def _parameters(section: Section, effect: str, catalogue: Catalogue) -> dict[str, Parameter]:
+    """The parameters of an effect by their names in θ."""
+    if not catalogue.knows(effect):
+        hint = nearest(effect, (*catalogue.names, Learnt.name))
+        raise section.error(effect, f"no such effect; {hint} (your own is written module:Attribute)")
+    try:
+        return dict(zip(catalogue.theta_names(effect), catalogue.effect(effect).parameters, strict=True))
+    except ExtensionError as problem:
+        raise section.error(effect, str(problem)) from None
+
+
 def _read_parameter(
-    table: Section, key: str, name: str, theta: dict[str, float], intervals: dict[str, tuple[float, float]]
+    table: Section,
+    parameter: Parameter,
+    name: str,
+    theta: dict[str, float],
+    intervals: dict[str, tuple[float, float]],
 ) -> None:
-    low, high = PARAMETERS[name].low, PARAMETERS[name].high
+    key, low, high = parameter.name, parameter.low, parameter.high
     if not isinstance(table.values[key], dict):
         theta[name] = table.number(key, low=low, high=high)
         return
@@ -92,21 +119,29 @@ def _read_parameter(
     theta[name] = detail.number("value", low=low, high=high)
     if "interval" in detail.values:
         intervals[name] = detail.bounds("interval")
-    unit = detail.text("unit", PARAMETERS[name].unit)
-    if unit != PARAMETERS[name].unit:
-        raise detail.error("unit", f"must be '{PARAMETERS[name].unit}', got '{unit}'")
+    unit = detail.text("unit", parameter.unit)
+    if unit != parameter.unit:
+        raise detail.error("unit", f"must be '{parameter.unit}', got '{unit}'")
 
 
-def effects_table(theta: Mapping[str, float], intervals: Mapping[str, tuple[float, float]]) -> str:
+def effects_table(
+    theta: Mapping[str, float], intervals: Mapping[str, tuple[float, float]], catalogue: Catalogue = SHIPPED
+) -> str:
     """The `[effects.NAME]` tables that read back as these values and intervals."""
     lines: list[str] = []
-    for effect, kind in CATALOGUE.items():
-        pairs = list(zip(theta_names(kind), kind.parameters, strict=True))
+    outside = {effect_of(name) for name in theta if name not in PARAMETERS and not is_learnt(name)}
+    for effect in (*CATALOGUE, *sorted(outside)):
+        pairs = list(zip(catalogue.theta_names(effect), catalogue.effect(effect).parameters, strict=True))
         named = [(name, parameter) for name, parameter in pairs if name in theta]
-        lines += [f"\n[effects.{effect}]"] if named else []
+        lines += [f"\n[effects.{_key(effect)}]"] if named else []
         for name, parameter in named:
             interval = intervals.get(name)
             finite = interval is not None and interval[0] < interval[1] and all(map(math.isfinite, interval))
             bounds = f", interval = [{interval[0]!r}, {interval[1]!r}]" if interval and finite else ""
             lines.append(f'{parameter.name} = {{ value = {theta[name]!r}{bounds}, unit = "{parameter.unit}" }}')
     return "\n".join(lines) + "\n" + learnt_text(theta)
+
+
+def _key(name: str) -> str:
+    """A name as a key of TOML, in quotes where it needs them."""
+    return name if name.replace("-", "_").isidentifier() and name.isascii() else f'"{name}"'

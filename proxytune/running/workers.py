@@ -17,6 +17,7 @@ from typing import Any, TypeVar, cast
 from joblib import Parallel, delayed
 
 from proxytune.errors import RunError
+from proxytune.extensions.beside import folders, open_folders
 
 WATCH_S = 0.5
 Piece = TypeVar("Piece")
@@ -58,7 +59,7 @@ def _here(work: Callable[[Piece], Result], pieces: Iterable[Piece]) -> Generator
 
 
 def _spread(work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int) -> Generator[Result, None, None]:
-    recipe = _Recipe(pickle.dumps(work), tuple(sys.path), os.getpid())
+    recipe = _Recipe(pickle.dumps(work), tuple(sys.path), folders(), os.getpid())
     # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
     parallel = Parallel(n_jobs=jobs, batch_size=1, pre_dispatch=jobs + 1, return_as="generator_unordered")
     return cast("Generator[Result, None, None]", parallel(delayed(_do_pickled)(recipe, piece) for piece in pieces))
@@ -69,7 +70,8 @@ class _Recipe:
     """Work pickled once, where its modules are found, and whose it is: a process unpickles it once."""
 
     pickled: bytes
-    folders: tuple[str, ...]
+    path: tuple[str, ...]
+    own: tuple[str, ...]
     owner: int
 
 
@@ -98,7 +100,8 @@ def _end_with(parent: int) -> None:
 
 @lru_cache(maxsize=1)
 def _unpickled(recipe: _Recipe) -> Callable[[Any], Any]:
-    sys.path.extend(folder for folder in recipe.folders if folder not in sys.path)
+    sys.path.extend(folder for folder in recipe.path if folder not in sys.path)
+    open_folders(recipe.own)
     return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
 
 

@@ -1,69 +1,62 @@
 """The domain family that a study names, loaded and checked."""
 
-import importlib
-import sys
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from numbers import Integral
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from proxytune.domain import DomainFamily
-from proxytune.errors import InputError, ProxytuneError
+from proxytune.errors import ExtensionError, InputError, ProxytuneError
+from proxytune.extensions import describe, load
 from proxytune.settings import nearest
+from proxytune.space import Parameter
 from proxytune.study.settings import StudySettings
 
-MEMBERS = ("identity", "metrics", "parameters", "starts", "check_agent", "run")
+MEMBERS: Mapping[str, tuple[type, str]] = {
+    "identity": (str, "text"),
+    "metrics": (Mapping, "a mapping"),
+    "parameters": (Mapping, "a mapping"),
+    "starts": (Integral, "a whole number"),
+}
+"""What a domain family tells of itself, and as what."""
+
+METHODS = ("check_agent", "run")
+Value = TypeVar("Value")
 
 
 def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
     """Call the factory that the study names, with its [domain] table and a model.
 
-    Modules in the study's folder can be imported, after those installed.
+    A module in the study's folder comes before an installed one.
 
     Raises:
         InputError: If there is no such factory, or what it makes is no domain family or cannot do what is asked.
     """
     if model is not None and not model.is_file():
         raise settings.error("proxy", f"no such file: {model}; check the path")
-    factory = _factory(settings)
     try:
-        family = factory(settings.domain, model=model)
-    except ProxytuneError:
-        raise
-    except Exception as problem:
-        raise settings.error("family", f"{settings.family} raised {_named(problem)}; mend it") from problem
+        factory = load(settings.family, kind="family", beside=settings.folder, needs=("__call__",))
+    except InputError as problem:
+        raise settings.error("family", str(problem)) from None
+    family = _asked(settings, settings.family, lambda: factory(settings.domain, model=model))
     _check(settings, family)
     return family  # type: ignore[no-any-return]
 
 
-def _factory(settings: StudySettings) -> Any:
-    module, colon, name = settings.family.partition(":")
-    if not (module and colon and name):
-        raise settings.error("family", f"must be 'module:factory', got '{settings.family}'")
+def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Value:
+    """What a user's code answers; one line of what it raises instead."""
     try:
-        found = import_beside(settings, module)
-    except ModuleNotFoundError as problem:
-        folder = settings.folder.absolute()
-        raise settings.error("family", f"no module '{problem.name}' here, in {folder} or installed") from None
+        return ask()
+    except ProxytuneError:
+        raise
     except Exception as problem:
-        raise settings.error("family", f"importing {module} raised {_named(problem)}; mend it") from problem
-    if not callable(getattr(found, name, None)):
-        names = [key for key, value in vars(found).items() if callable(value) and not key.startswith("_")]
-        raise settings.error("family", f"{module} has no function '{name}'; {nearest(name, names)}")
-    return getattr(found, name)
-
-
-def import_beside(settings: StudySettings, module: str) -> ModuleType:
-    """Import a module that is installed, or lies in the study's folder."""
-    folder = str(settings.folder.absolute())
-    if folder not in sys.path:
-        sys.path.append(folder)
-    return importlib.import_module(module)
+        raise settings.error("family", f"{what} raised {describe(problem)}; correct it") from problem
 
 
 def _check(settings: StudySettings, family: DomainFamily) -> None:
-    lacks = [member for member in MEMBERS if not hasattr(family, member)]
-    if lacks:
-        raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
+    _check_members(settings, family)
     for interval in settings.space.intervals:
         given = f"[{interval.low:g}, {interval.high:g}]"
         bounds = (interval.low, interval.high)
@@ -74,10 +67,31 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
         if metric.name not in family.metrics:
             raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
     for agent in settings.agents:
-        try:
-            family.check_agent(agent)
-        except InputError as problem:
-            raise settings.error("agents", str(problem)) from None
+        _check_agent(settings, family, agent)
+
+
+def _check_members(settings: StudySettings, family: Any) -> None:
+    lacks = [member for member in (*MEMBERS, *METHODS) if not _has(family, member)]
+    if lacks:
+        raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
+    for member, (kind, word) in MEMBERS.items():
+        value = _asked(settings, f"{member} of {settings.family}", functools.partial(getattr, family, member))
+        if not isinstance(value, kind):
+            name = type(value).__name__
+            raise settings.error("family", f"{member} of {settings.family} must be {word}, got {name}")
+
+
+def _has(family: Any, member: str) -> bool:
+    """Whether there is such a member, be it a property that raises."""
+    missing = object()
+    return inspect.getattr_static(family, member, missing) is not missing or hasattr(family, member)
+
+
+def _check_agent(settings: StudySettings, family: DomainFamily, agent: str) -> None:
+    try:
+        _asked(settings, f"check_agent('{agent}') of {settings.family}", lambda: family.check_agent(agent))
+    except InputError as problem:
+        raise settings.error("agents", str(problem)) from None
 
 
 def check_bounds(
@@ -96,12 +110,14 @@ def check_bounds(
     Raises:
         SettingsError: With the key and the remedy.
     """
-    if name not in family.parameters:
+    try:
+        known = family.parameters.get(name)
+    except ExtensionError as problem:
+        raise settings.error(key, str(problem)) from None
+    if known is None:
         raise settings.error(key, f"unknown parameter; {nearest(name, family.parameters)}")
-    known = family.parameters[name]
+    if not isinstance(known, Parameter):
+        kind = type(known).__name__
+        raise settings.error("family", f"parameters['{name}'] of {settings.family} must be a Parameter, got {kind}")
     if bounds[0] < known.low or bounds[1] > known.high:
         raise settings.error(key, f"must lie within [{known.low:g}, {known.high:g}], got {given}")
-
-
-def _named(problem: Exception) -> str:
-    return f"{type(problem).__name__}: {' '.join(str(problem).split())}"

@@ -46,15 +46,19 @@ class Preflight:
         base: The domain instance from which they were moved.
         movements: One per parameter, in the order of the box.
         episodes: How many episodes it took.
+        failure: Why the first of them failed, where all of them did; else empty.
     """
 
     base: Theta
     movements: tuple[Movement, ...]
     episodes: int
+    failure: str = ""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One line for each parameter that does nothing beyond noise."""
+        """One line for each parameter that does nothing beyond noise, or a single one if every episode failed."""
+        if self.failure:
+            return (f"pre-flight: every agent fails everywhere, first with: {self.failure}; correct it",)
         return tuple(movement.warning for movement in self.movements if not movement.moves)
 
 
@@ -86,7 +90,7 @@ def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]
     if not settings.preflight:
         return None
     movements: dict[str, Movement] = {}
-    driven: set[Episode] = set()
+    driven: dict[Episode, Outcome] = {}
     undecided = settings.space.intervals
     for look in range(LOOKS):
         before, now = (_plan(settings, _places(settings, n), undecided) for n in (look - 1, look))
@@ -94,10 +98,17 @@ def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]
         known = run.known(now)
         if len(known) < len(now):
             return None
-        driven |= set(now)
+        driven |= known
         movements |= {i.name: _movement(run.study, look, i, known) for i in undecided}
         undecided = tuple(i for i in undecided if not movements[i.name].moves)
-    return Preflight(_base(settings), tuple(movements[name] for name in settings.space.names), len(driven))
+    moved = tuple(movements[name] for name in settings.space.names)
+    return Preflight(_base(settings), moved, len(driven), _failure(driven))
+
+
+def _failure(driven: Mapping[Episode, Outcome]) -> str:
+    """What the first episode failed of, if none succeeded."""
+    failures = [outcome.failure for outcome in driven.values() if outcome.metrics is None]
+    return failures[0] if failures and len(failures) == len(driven) else ""
 
 
 def placement_pairs(run: StudyRun) -> Array:

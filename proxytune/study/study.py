@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.domain import DomainFamily
-from proxytune.effects import read_model
+from proxytune.effects import Catalogue, read_model
 from proxytune.errors import InputError, ScoresError
 from proxytune.scores import ScoreTable, read_scores
 from proxytune.search.engines.registry import WITH_OUTPUTS
@@ -85,7 +85,7 @@ def _truth(settings: StudySettings) -> Theta | None:
         return None
     if not settings.truth.is_file():
         raise settings.error("truth", f"no such file: {settings.truth}; check the path, or take it out")
-    known = read_model(settings.truth).theta
+    known = read_model(settings.truth, Catalogue(settings.folder.resolve())).theta
     return {name: known[name] for name in settings.space.names if name in known}
 
 

@@ -5,12 +5,13 @@ import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
 from proxytune.domain import Classroom
 from proxytune.errors import InputError
+from proxytune.extensions import make
 from proxytune.learning.cache import Cache
 from proxytune.learning.learner import Learner
 from proxytune.learning.lessons import Distribution
@@ -18,7 +19,7 @@ from proxytune.learning.plv import Convergence, Curve, Teaching, converged_level
 from proxytune.learning.settings import NONE, TeachingSettings
 from proxytune.meaning import meaning_of
 from proxytune.running.progress import Watcher
-from proxytune.study.family import check_bounds, import_beside, load_family
+from proxytune.study.family import check_bounds, load_family
 from proxytune.study.settings import StudySettings
 from proxytune.teaching.points import Point, School, examined, prepared
 
@@ -184,18 +185,10 @@ def _classroom(settings: StudySettings, model: Path | None) -> Classroom:
 
 def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
     """The learner and a digest of what its code means and of its settings."""
-    module, _, attribute = name.partition(":")
     try:
-        found: Any = getattr(import_beside(settings, module), attribute)
-        made = found() if inspect.isclass(found) or inspect.isfunction(found) else found
-    except Exception as problem:
-        raise _no_learner(settings, f"'{name}' cannot be loaded: {problem}; write module:attribute") from None
-    if not (hasattr(made, "train") and hasattr(made, "act")):
-        raise _no_learner(settings, f"'{name}' has no train and act; see proxytune.learning.learner.Learner")
+        made = make(name, kind="learner", beside=settings.folder, needs=("train", "act"))
+    except InputError as problem:
+        raise settings.error("teaching.learner", str(problem)) from None
     source = Path(inspect.getfile(type(made)))
     code = meaning_of([source], source.parent)
     return cast(Learner, made), hashlib.sha256(code.encode() + repr(made).encode()).hexdigest()[:16]
-
-
-def _no_learner(settings: StudySettings, problem: str) -> InputError:
-    return settings.error("teaching.learner", problem)

@@ -74,7 +74,11 @@ def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, capsys):
     [
         (("[0, 20,", "[20,"), 2, "teaching.target_samples: must begin with 0"),
         (("[teaching]", "[teachings]"), 2, "teachings: unknown key; did you mean 'teaching'?"),
-        (("schoolroom:Matrix", "schoolroom"), 2, "teaching.learner: 'schoolroom' cannot be loaded"),
+        (
+            ("schoolroom:Matrix", "schoolroom"),
+            2,
+            "teaching.learner: learner 'schoolroom' is unknown",
+        ),
     ],
 )
 def test_bad_input_is_one_line(make_study, capsys, edit, status, says):

@@ -57,7 +57,7 @@ def driven_log(theta: Theta, duties: Array, starts: Array, *, seed: int = 1, noi
 
 
 def _twists(theta: Theta, duties: Array, starts: Array) -> Array:
-    train = drivetrain(ROBOT, effects_from({**ROBOT.theta, **theta}, ROBOT.figures))
+    train = drivetrain(ROBOT, effects_from({**ROBOT.theta, **theta}, ROBOT.figures, ROBOT.catalogue))
     nominal = {**ROBOT.figures, "control_rate": float(RATE_HZ)}
     setting = Setting(TICK_HZ, np.zeros((len(duties), 2)), nominal, headings=starts[:, 2:], places=starts[:, None, :2])
     return train.apply(np.repeat(duties, TICKS, axis=1), train.begin(setting))[0]

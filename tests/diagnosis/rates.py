@@ -20,7 +20,7 @@ from proxytune.diagnosis.model.events import RandomEffect, random_effects
 from proxytune.diagnosis.model.fitting import Fit
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS
 from proxytune.diagnosis.naming.candidates import Candidate, candidates
-from proxytune.driving.robot import read_robot
+from proxytune.driving.robot import Robot, read_robot
 from proxytune.logs import Log
 from proxytune.space import Theta
 
@@ -154,8 +154,8 @@ def _log(job: Job, episodes: int, seconds: float, noiseless: bool = False) -> Lo
 def _without(effect: str) -> Iterator[None]:
     """Take an effect out of what the search may find, and leave out the confirmation on the bullet plant."""
 
-    def forms(nominal: Theta, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
-        return tuple(form for form in candidates(nominal, theta, taken) if form.effect != effect)
+    def forms(robot: Robot, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
+        return tuple(form for form in candidates(robot, theta, taken) if form.effect != effect)
 
     def chancy(model: Fit, seed: int) -> tuple[RandomEffect, ...]:
         return tuple(found for found in random_effects(model, seed) if found.effect != effect)

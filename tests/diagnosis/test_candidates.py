@@ -20,7 +20,7 @@ WHEELS = ("dead_band", "stiction", "backlash", "saturation")
 
 
 def forms(effect, theta=TRUTH, taken=()):
-    return {form.form: form for form in candidates(ROBOT.figures, theta, taken) if form.effect == effect}
+    return {form.form: form for form in candidates(ROBOT, theta, taken) if form.effect == effect}
 
 
 def test_motion_can_show_every_effect_but_those_of_the_camera_and_its_pictures():
@@ -30,13 +30,13 @@ def test_motion_can_show_every_effect_but_those_of_the_camera_and_its_pictures()
 
 
 def test_every_effect_of_motion_that_does_not_draw_has_a_form():
-    known = {form.effect for form in candidates(ROBOT.figures, {}, ())}
+    known = {form.effect for form in candidates(ROBOT, {}, ())}
     assert known == set(MOTION_EFFECTS) - set(RANDOM_EFFECTS)
 
 
 @pytest.mark.parametrize("taken", [("trim", "delay"), ("trim", "delay", "dead_band", "wheel_gain"), MOTION_EFFECTS])
 def test_what_is_declared_or_adopted_is_left_out(taken):
-    known = {form.effect for form in candidates(ROBOT.figures, TRUTH, taken)}
+    known = {form.effect for form in candidates(ROBOT, TRUTH, taken)}
     assert known == set(MOTION_EFFECTS) - set(RANDOM_EFFECTS) - set(taken)
 
 
@@ -77,11 +77,11 @@ def test_a_battery_sags_with_load_with_use_or_with_time():
 
 
 def test_labels_are_unique():
-    labels = [form.label for form in candidates(ROBOT.figures, TRUTH, ())]
+    labels = [form.label for form in candidates(ROBOT, TRUTH, ())]
     assert len(labels) == len(set(labels))
 
 
-@pytest.mark.parametrize("form", candidates(ROBOT.figures, TRUTH, ("trim", "delay")), ids=lambda form: form.label)
+@pytest.mark.parametrize("form", candidates(ROBOT, TRUTH, ("trim", "delay")), ids=lambda form: form.label)
 def test_every_probe_is_a_model_that_differs_from_neutral(form):
     assert form.probes
     assert len(form.free) == len(form.neutral)

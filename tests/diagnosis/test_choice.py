@@ -18,8 +18,8 @@ from proxytune.diagnosis.naming.round import Round
 from proxytune.diagnosis.naming.screening import Lead
 from proxytune.driving.robot import read_robot
 
-FIGURES = read_robot("duckiebot").figures
-FORMS = {one.label: one for one in reversed(candidates(FIGURES, TRUTH, ()))}
+ROBOT = read_robot("duckiebot")
+FORMS = {one.label: one for one in reversed(candidates(ROBOT, TRUTH, ()))}
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +71,6 @@ def test_an_effect_within_its_range_is_preferred_to_one_at_its_end(drives, gain,
 
 
 def test_only_an_end_that_is_not_neutral_is_an_edge():
-    assert at_edge("motor_lag.time_constant", 1.0, FIGURES)
-    assert not at_edge("dead_band.width", 0.0, FIGURES)
-    assert not at_edge("motor_lag.time_constant", 0.5, FIGURES)
+    assert at_edge("motor_lag.time_constant", 1.0, ROBOT)
+    assert not at_edge("dead_band.width", 0.0, ROBOT)
+    assert not at_edge("motor_lag.time_constant", 0.5, ROBOT)

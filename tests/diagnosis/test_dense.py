@@ -20,7 +20,7 @@ SHORT = {"episodes": 4, "seconds": 30.0}
 def added(effect, theta):
     """The probe that is added to an effect's own on drives of this truth."""
     base = fitted(planted_drives({**TRUTH, **theta}, **SHORT))
-    forms = [form for form in candidates(ROBOT.figures, base.theta, ()) if form.effect == effect]
+    forms = [form for form in candidates(ROBOT, base.theta, ()) if form.effect == effect]
     (form,), *_ = zip(with_dense_probes(base, forms), strict=False)
     assert form.probes[: len(forms[0].probes)] == forms[0].probes
     return form.probes[len(forms[0].probes) :]
@@ -39,7 +39,7 @@ def test_a_slippery_place_is_met_within_a_patch_width():
 
 def test_other_effects_keep_the_probes_that_they_have():
     base = fitted(planted_drives(TRUTH, **SHORT))
-    forms = [form for form in candidates(ROBOT.figures, base.theta, ()) if form.effect in ("trim", "understeer")]
+    forms = [form for form in candidates(ROBOT, base.theta, ()) if form.effect in ("trim", "understeer")]
     assert with_dense_probes(base, forms) == forms
 
 

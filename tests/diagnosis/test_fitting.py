@@ -9,7 +9,7 @@ import pytest
 
 sys.path.append(str(Path(__file__).parent))
 
-from planted import DECLARED, NOISE, TRUTH, fitted, planted_drives
+from planted import DECLARED, NOISE, ROBOT, TRUTH, fitted, planted_drives
 
 from proxytune.diagnosis.model import fitting
 from proxytune.diagnosis.model.coordinates import placed, span
@@ -98,7 +98,7 @@ def test_the_threshold_of_stiction_lies_in_its_interval():
 
 
 def test_values_stay_within_their_bounds():
-    low, high = span(("delay",))
+    low, high = span(("delay",), ROBOT)
     edge = planted_drives({"trim": 0.0, "delay": high, "motor_lag.time_constant": 0.3}, episodes=3)
     known = fit(edge, {"trim": 0.0, "delay": high - 0.02}, DECLARED).theta
     assert low <= known["delay"] <= high
@@ -106,7 +106,7 @@ def test_values_stay_within_their_bounds():
 
 
 def test_slopes_foretell_a_small_change(found):
-    low, high = span(("trim",))
+    low, high = span(("trim",), ROBOT)
     moved = placed(found.theta, (("trim",),), np.array([found.theta["trim"] + 1e-4 * (high - low)]))
     there = found.whiten.whiten(found.drives.measured - increments(found.drives, moved))
     change = found.slopes[:, 0] * 1e-4
@@ -115,7 +115,7 @@ def test_slopes_foretell_a_small_change(found):
 
 def test_slopes_at_the_highest_value_step_backwards(drives):
     whiten = whitener(drives, NOISE)
-    high = span(("delay",))[1]
+    high = span(("delay",), ROBOT)[1]
     edge = slopes(drives, {"trim": 0.0, "delay": high}, (("delay",),), whiten)
     inside = slopes(drives, {"trim": 0.0, "delay": high - 0.001}, (("delay",),), whiten)
     assert np.corrcoef(edge[:, 0], inside[:, 0])[0, 1] > 0.9

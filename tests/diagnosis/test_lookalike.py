@@ -16,7 +16,7 @@ from proxytune.diagnosis.horizon.windows import cut, strays
 from proxytune.diagnosis.naming.candidates import candidates
 from proxytune.diagnosis.remainder.lookalike import lookalike
 from proxytune.diagnosis.remainder.remainder import Remainder
-from proxytune.diagnosis.remainder.remainder import lookalike as reading
+from proxytune.driving.robot import read_robot
 
 TAKEN = ("trim", "delay")
 FEW = ("lateral_slip", "turn_slip", "yaw_scrub")
@@ -24,10 +24,8 @@ FEW = ("lateral_slip", "turn_slip", "yaw_scrub")
 
 @pytest.fixture(autouse=True)
 def _few_candidates(monkeypatch):
-    few = [
-        one for one in candidates({"effective_baseline": 0.16, "motor_time_constant": 0.2}, {}, ()) if one.effect in FEW
-    ]
-    monkeypatch.setattr(reading, "candidates", lambda nominal, theta, taken: few)
+    few = [one for one in candidates(read_robot("duckiebot"), {}, ()) if one.effect in FEW]
+    monkeypatch.setattr(sys.modules[lookalike.__module__], "candidates", lambda robot, theta, taken: few)
 
 
 def perfect(drives, theta):

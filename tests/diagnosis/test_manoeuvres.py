@@ -33,7 +33,7 @@ def drives():
 
 def found(drives, effect, *rivals):
     theta = {**TRUTH, **SIZES[effect]}
-    forms = {form.effect: form for form in candidates(ROBOT.figures, TRUTH, ()) if not form.form}
+    forms = {form.effect: form for form in candidates(ROBOT, TRUTH, ()) if not form.form}
     own = forms[effect]
     adopted = Adopted(effect, "", tuple(SIZES[effect]), own.free, 100.0, 0.002, tuple(forms[name] for name in rivals))
     declared = seen(drives, TRUTH, DECLARED, NOISE)

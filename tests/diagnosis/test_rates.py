@@ -94,7 +94,7 @@ def test_every_kind_has_a_share_of_any_beginning():
 
 def test_an_effect_taken_out_is_not_found():
     with rates._without("dead_band"):
-        forms = rates.looking.candidates(rates.read_robot("duckiebot").figures, {}, ())
+        forms = rates.looking.candidates(rates.read_robot("duckiebot"), {}, ())
     assert "stiction" in {form.effect for form in forms}
     assert "dead_band" not in {form.effect for form in forms}
     assert rates.looking.candidates is rates.candidates

@@ -20,7 +20,7 @@ TAKEN = ("trim", "delay")
 
 def leads_of(theta, *, base=None, **more):
     base = base or fitted(planted_drives({**TRUTH, **theta}, **{**SHORT, **more}))
-    return screen(base, candidates(ROBOT.figures, base.theta, TAKEN), 1)
+    return screen(base, candidates(ROBOT, base.theta, TAKEN), 1)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_chance_alone_is_told_as_chance(chance):
 
 def test_the_same_seed_gives_the_same_leads():
     base = fitted(planted_drives(TRUTH, **SHORT))
-    forms = candidates(ROBOT.figures, base.theta, TAKEN)
+    forms = candidates(ROBOT, base.theta, TAKEN)
     one, again, other = (screen(base, forms, seed) for seed in (1, 1, 2))
     assert [lead.p_value for lead in one] == [lead.p_value for lead in again]
     assert [lead.p_value for lead in one] != [lead.p_value for lead in other]

@@ -11,7 +11,7 @@ from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.road.maps import SMALL_LOOP
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import read_robot
-from proxytune.errors import SettingsError
+from proxytune.errors import ExtensionError
 
 ROBOT = read_robot("duckiebot")
 CAMERA = GroundPlaneCamera(ROBOT.camera_figures(), draw_floor(SMALL_LOOP))
@@ -129,7 +129,7 @@ def test_wary_slows_down_where_nothing_is_crisp():
 
 
 def test_an_unknown_agent_is_told_with_the_nearest(tmp_path):
-    with pytest.raises(SettingsError, match="agent 'stead' is unknown .*; did you mean 'steady'"):
+    with pytest.raises(ExtensionError, match="agent 'stead' is unknown .*; did you mean 'steady'"):
         load_agent("stead", tmp_path)
 
 
@@ -143,7 +143,7 @@ def test_a_users_agent_is_loaded_from_its_folder(tmp_path):
     assert load_agent("mine_agents:Mine", tmp_path).act(None, 0) == ((0.1, 0.1), 0)
     assert load_agent("mine_agents:ready", tmp_path).begin(ROBOT) == 0
     for name in ("mine_agents:gone", "no_such_module:x", "mine_agents:broken"):
-        with pytest.raises(SettingsError, match=f"agent '{name}'"):
+        with pytest.raises(ExtensionError, match=f"agent '{name}'"):
             load_agent(name, tmp_path)
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from proxytune.driving import identity, lineage
 from proxytune.driving.family import LaneFollowing
+from proxytune.driving.robot import robot_home
 from proxytune.shipped import shipped
 
 OF_THEN = {
@@ -44,10 +45,8 @@ def test_an_earlier_identity_is_what_the_code_of_then_said(tmp_path, plant, modu
 
 
 def test_earlier_episodes_count_only_while_code_and_robot_mean_what_they_did(tmp_path, monkeypatch, fresh):
-    robots = tmp_path / "robots"
-    shutil.copytree(shipped("robots"), robots)
-    monkeypatch.setattr(identity, "shipped", lambda kind: robots)
-    described = robots / "duckiebot" / "robot.toml"
+    shutil.copytree(shipped("robots") / "duckiebot", tmp_path / "duckiebot")
+    described = tmp_path / "duckiebot" / "robot.toml"
     text = described.read_text()
     described.write_text(f"# a comment\n{text}")
     assert len(family(tmp_path).earlier_identities) == 1
@@ -62,9 +61,8 @@ def test_earlier_episodes_count_only_while_code_and_robot_mean_what_they_did(tmp
 
 def test_every_robot_that_travels_has_an_earlier_identity(tmp_path):
     assert {path.parent.name for path in shipped("robots").glob("*/robot.toml")} >= set(lineage.OF_54760AD)
-    digests = [
-        lineage.digest_of_54760ad(r, identity.robot_meaning(r), identity.code_meaning()) for r in lineage.OF_54760AD
-    ]
+    code = identity.code_meaning()
+    digests = [lineage.digest_of_54760ad(r, identity.robot_meaning(robot_home(r)), code) for r in lineage.OF_54760AD]
     assert None not in digests
     assert lineage.digest_of_54760ad("another robot", "", identity.code_meaning()) is None
 

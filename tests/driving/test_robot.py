@@ -1,6 +1,7 @@
 """A robot's figures are sourced, enough to drive a log, and the same in robot.toml and URDF."""
 
 import math
+import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
@@ -14,7 +15,7 @@ from proxytune.driving.family import lane_following
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.robot import CAMERA, REQUIRED, UNITS, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import CATALOGUE, Setting, Stage, effects_from, theta_names
-from proxytune.errors import SettingsError
+from proxytune.errors import ExtensionError, SettingsError
 from proxytune.settings import Section, read_settings
 from proxytune.shipped import shipped
 
@@ -129,7 +130,7 @@ def test_a_robot_with_camera_but_without_body_may_be_studied_on_the_planar_plant
     folder = copy_duckiebot(tmp_path, 'urdf = "duckiebot.urdf"\n', "")
     monkeypatch.setattr(module, "shipped", lambda kind: tmp_path)
     bodiless = read_robot.__wrapped__(folder.name)
-    monkeypatch.setattr("proxytune.driving.family.read_robot", lambda name: bodiless)
+    monkeypatch.setattr("proxytune.driving.family.read_robot", lambda name, folder: bodiless)
     path = tmp_path / "study.toml"
     assert lane_following(Section(path, "domain.", {"plant": "planar"}), model=None).plant == "planar"
     with pytest.raises(SettingsError, match='domain.robot: robot .duckiebot. has no body: .* use plant = "planar"'):
@@ -200,7 +201,7 @@ def test_nominal_effects_agree_with_the_figures():
 
 
 def test_an_unknown_robot_is_told_with_the_nearest():
-    with pytest.raises(SettingsError, match="robot 'duckybot' is unknown; did you mean 'duckiebot'"):
+    with pytest.raises(SettingsError, match="robot 'duckybot' is unknown .*; did you mean 'duckiebot'"):
         read_robot("duckybot")
 
 
@@ -230,3 +231,39 @@ def test_a_robot_that_does_not_state_its_wheels_distance_cannot_be_examined():
     figures = {name: value for name, value in robot.figures.items() if name != "wheel_distance"}
     with pytest.raises(SettingsError, match="states no wheel_distance; add it"):
         replace(robot, figures=figures).wheel_distance()
+
+
+def test_a_robot_beside_the_study_comes_before_a_shipped_one(tmp_path):
+    for name in ("my_robot", "duckiebot"):
+        home = tmp_path / name
+        shutil.copytree(shipped("robots") / "duckiebot", home)
+        text = (home / "robot.toml").read_text(encoding="utf-8").replace('name = "duckiebot"', f'name = "{name}"')
+        (home / "robot.toml").write_text(text.replace("value = 0.0318", "value = 0.04"), encoding="utf-8")
+        section = Section(tmp_path / "study.toml", "domain.", {"robot": name, "plant": "planar", "seconds": 1.0})
+        family = lane_following(section, model=None)
+        assert family.instance({}).robot.figures["wheel_radius"] == 0.04
+        assert family.instance({}).robot.urdf == home / "duckiebot.urdf"
+    assert read_robot("duckiebot").figures["wheel_radius"] == 0.0318
+    assert robot_names(tmp_path) == ("duckiebot", "husky", "irobot_create", "my_robot")
+
+
+def test_a_robot_whose_toml_has_another_name_than_its_folder_is_refused(tmp_path):
+    shutil.copytree(shipped("robots") / "husky", tmp_path / "wolf")
+    with pytest.raises(SettingsError, match="name: unknown value 'husky'; known are: wolf"):
+        read_robot("wolf", tmp_path)
+
+
+def test_a_plugin_s_robot_is_read_from_the_folder_that_it_names(tmp_path, monkeypatch):
+    info = tmp_path / "wolves-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: wolves\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proxytune]\nrobot.wolf = wolves_of:HOME\nrobot.fox = wolves_of:FOX\n")
+    text = "from pathlib import Path\nHOME = Path(__file__).parent / 'wolf'\nFOX = 3\n"
+    (tmp_path / "wolves_of.py").write_text(text)
+    shutil.copytree(shipped("robots") / "husky", tmp_path / "wolf")
+    toml = tmp_path / "wolf" / "robot.toml"
+    toml.write_text(toml.read_text(encoding="utf-8").replace('name = "husky"', 'name = "wolf"'), encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert read_robot("wolf").figures == read_robot("husky").figures
+    with pytest.raises(ExtensionError, match="robot 'fox': its plug-in must be the path of its folder, got int"):
+        read_robot("fox")

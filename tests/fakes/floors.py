@@ -2,7 +2,7 @@
 
 FLOORS = (
     {"errors"},
-    {"settings", "seeds", "meaning", "versions", "space", "shipped", "scores", "logs"},
+    {"settings", "seeds", "meaning", "versions", "extensions", "space", "shipped", "scores", "logs"},
     {"usefulness", "effects"},
     {"domain"},
     {"driving"},

@@ -203,9 +203,7 @@ def test_the_ranking_holds_every_gain_best_first(diagnosis, figures):
 
 
 def test_rivals_are_marked_in_the_ranking(diagnosis):
-    rival = next(
-        c for c in candidates(diagnosis.robot.figures, diagnosis.found.declared.theta, ()) if c.effect == "stiction"
-    )
+    rival = next(c for c in candidates(diagnosis.robot, diagnosis.found.declared.theta, ()) if c.effect == "stiction")
     adopted = (replace(diagnosis.found.adopted[0], rivals=(rival,)),)
     figure = diagnosis_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
     upper = figure.axes[0]
@@ -285,7 +283,7 @@ def test_means_are_drawn_over_a_signal_that_has_a_figure_of_its_own():
     assert all(one.cue in GROUPS and one.panels for one in means)
 
 
-EVERY = candidates(read_robot("duckiebot").figures, {}, ("trim", "delay"))
+EVERY = candidates(read_robot("duckiebot"), {}, ("trim", "delay"))
 FORMS = [one for one in EVERY if one.form not in ("left wheel", "right wheel") or one.label == "dead_band (left wheel)"]
 
 

@@ -24,10 +24,16 @@ def test_modules_in_the_study_s_folder_can_be_imported(make_study):
 
 
 BAD = {
-    "no colon": ({"family": '"wobbly"'}, "family: must be 'module:factory', got 'wobbly'"),
-    "no such module": ({"family": '"wobbli:wobbly"'}, "family: no module 'wobbli' here"),
-    "no such factory": ({"family": '"wobbly:wobly"'}, "family: wobbly has no function 'wobly'; did you mean 'wobbly'?"),
-    "a factory with a bug": ({"family": '"wobbly:broken_factory"'}, "broken_factory raised KeyError: 'robot'; mend it"),
+    "no colon": ({"family": '"wobbly"'}, "family: family 'wobbly' is unknown (your own is written module:attribute)"),
+    "no such module": ({"family": '"wobbli:wobbly"'}, "family 'wobbli:wobbly': no module 'wobbli' in "),
+    "no such factory": (
+        {"family": '"wobbly:wobly"'},
+        "'wobbly:wobly': wobbly has no 'wobly'; did you mean 'wobbly'?",
+    ),
+    "a factory with a bug": (
+        {"family": '"wobbly:broken_factory"'},
+        "raised KeyError: 'robot'; correct it",
+    ),
     "something else": ({"family": '"wobbly:not_a_family"'}, "made no domain family: it lacks identity, metrics"),
     "a missing model": ({"proxy": '"nowhere.toml"'}, "proxy: no such file: "),
     "an unknown parameter": (
@@ -53,6 +59,58 @@ def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
     assert expected in str(told.value)
     assert "study.toml: " in str(told.value)
     assert "\n" not in str(told.value)
+
+
+FAULTY = """
+class Faulty:
+    identity, metrics, starts = "1", {{"distance": "m", "survival_time": "s"}}, 5
+    parameters = {{}}
+
+    def check_agent(self, name): ...
+    def run(self, episode): ...
+
+    {fault}
+
+
+def make(domain, *, model):
+    assert dict(domain) == {{**domain}} == dict(domain.items())
+    assert list(domain) == list(domain.keys()) and "nothing" not in domain
+    return Faulty()
+"""
+
+FAULTS = {
+    "parameters": (
+        "parameters = property(lambda self: 1 / 0)",
+        "parameters of faulty_{n}:make raised ZeroDiv",
+    ),
+    "identity": ("identity = property(lambda self: self.gone)", "identity of faulty_{n}:make raised AttributeError"),
+    "metrics": ("metrics = ['distance']", "metrics of faulty_{n}:make must be a mapping, got list"),
+    "starts": ("starts = '5'", "starts of faulty_{n}:make must be a whole number, got str"),
+    "no Parameter": ("parameters = {'trim': 3, 'delay': 3}", "of faulty_{n}:make must be a Parameter, got int"),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_what_a_foreign_family_does_wrong_is_one_line_with_its_name(make_study, case):
+    fault, expected = FAULTS[case]
+    number = list(FAULTS).index(case)
+    folder = make_study(family=f'"faulty_{number}:make"')
+    (folder / f"faulty_{number}.py").write_text(FAULTY.format(fault=fault))
+    with pytest.raises(InputError) as told:
+        load(folder)
+    assert f"study.toml: family: {expected.format(n=number)}" in str(told.value).replace("parameters['delay'] ", "")
+    assert "\n" not in str(told.value)
+
+
+def test_an_agent_check_that_raises_is_told_with_the_family_s_name(make_study):
+    folder = make_study(family='"checks_badly:make"')
+    text = "from wobbly import Wobbly, wobbly\n\n\n"
+    text += "class Bad(Wobbly):\n    def check_agent(self, name): import not_there\n\n\n"
+    text += "def make(domain, *, model):\n    return Bad(**vars(wobbly(domain, model=model)))\n"
+    (folder / "checks_badly.py").write_text(text)
+    expected = r"check_agent\('agent0'\) of checks_badly:make raised ModuleNotFoundError: .*not_there.*; correct it"
+    with pytest.raises(InputError, match=expected):
+        load(folder)
 
 
 def test_a_module_that_cannot_be_imported_is_told(make_study):

@@ -132,13 +132,13 @@ def test_failed_episodes_are_left_out_of_the_comparison(make_study):
     assert {movement.pairs for movement in found.values()} <= {PAIRS // LOOKS - 1, PAIRS - 2}
 
 
-def test_where_every_agent_fails_it_says_that_it_cannot_judge(make_study):
+def test_where_every_agent_fails_everywhere_it_says_so_once_and_of_what(make_study):
     faults = ", ".join(f'"agent{number}:*:raises"' for number in range(6))
     _, found = run(make_study(preflight="true", domain={"faults": f"[{faults}]"}))
-    assert found.warnings == (
-        "pre-flight: 'delay' cannot be judged: every agent fails somewhere in [0, 0.3]; narrow its box",
-        "pre-flight: 'trim' cannot be judged: every agent fails somewhere in [-0.3, 0.3]; narrow its box",
-    )
+    (warning,) = found.warnings
+    assert warning.startswith("pre-flight: every agent fails everywhere, first with: agent 'agent0'")
+    assert warning.endswith("; correct it")
+    assert all(not movement.pairs and "cannot be judged" in movement.warning for movement in found.movements)
 
 
 def test_where_failures_stop_the_study_they_stop_it_here(make_study):

@@ -78,7 +78,7 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
         free: What is fitted, except where it changes the motion by steps: single steps tell that far more sharply.
         windows: Windows over the drives; long logs are thinned to MOST_WINDOWS of them.
     """
-    fitted = smooth(free)
+    fitted = smooth(free, drives.robot)
     if not fitted or len(windows.begin) == 0:
         return dict(theta)
     problem = _problem(drives, theta, fitted, _thinned(windows))
@@ -106,7 +106,7 @@ class _Problem(NamedTuple):
 
     @property
     def start(self) -> Floats:
-        low, high = np.array([span(coordinate) for coordinate in self.free]).T
+        low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
         here = np.array([self.theta[coordinate[0]] for coordinate in self.free])
         return np.asarray(np.clip((here - low) / (high - low), 1e-6, 1.0 - 1e-6))
 
@@ -115,7 +115,7 @@ class _Problem(NamedTuple):
         return max(1e-6, ROBUST * float(np.median(np.abs(self.left(self.start)))))
 
     def at(self, fractions: Floats) -> dict[str, float]:
-        low, high = np.array([span(coordinate) for coordinate in self.free]).T
+        low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
         return placed(self.theta, self.free, low + fractions * (high - low))
 
     def left(self, fractions: Floats) -> Floats:
@@ -190,7 +190,7 @@ def polished(fitted: Fit) -> tuple[Fit, Polish | None]:
         return fitted, None
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
-    polish = Polish(best[1], best[2], _intervals(drives, theta, smooth(fitted.free), windows))
+    polish = Polish(best[1], best[2], _intervals(drives, theta, smooth(fitted.free, drives.robot), windows))
     return seen(drives, theta, fitted.free, fitted.noise), polish
 
 
@@ -209,7 +209,7 @@ def _intervals(
     spread = inverse @ (pulls.T @ pulls) @ inverse * len(pulls) / max(1, len(pulls) - len(free))
     found: dict[str, tuple[float, float]] = {}
     for coordinate, variance in zip(free, np.diag(spread), strict=True):
-        low, high = span(coordinate)
+        low, high = span(coordinate, drives.robot)
         half = 1.96 * float(np.sqrt(variance)) * (high - low)
         found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
     return found

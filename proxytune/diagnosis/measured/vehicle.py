@@ -1,9 +1,12 @@
 """The robot that drove a log: one of robots/, or what the log says of its own."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from proxytune.diagnosis.measured.drives import Floats
 from proxytune.driving.robot import Robot, read_robot, robot_from_geometry, robot_names
+from proxytune.effects import SHIPPED, Catalogue
 from proxytune.errors import LogError
 from proxytune.logs import GEOMETRY, Log
 from proxytune.settings import nearest
@@ -12,8 +15,8 @@ NEEDED = {figure: key for key, figure in GEOMETRY.items() if figure != "full_spe
 """Figures that a log must state of a robot without a folder, and their keys in log.toml."""
 
 
-def robot_of(log: Log, name: str | None = None) -> Robot:
-    """The robot of a log, or the named one in its stead.
+def robot_of(log: Log, name: str | None = None, catalogue: Catalogue = SHIPPED) -> Robot:
+    """The robot of a log, or the named one in its stead, with the effects that it may have.
 
     A robot without a folder needs wheel radius and baseline in log.toml; its full speed is stated there too, or taken
     from the fastest command, or from how fast it drove.
@@ -22,17 +25,18 @@ def robot_of(log: Log, name: str | None = None) -> Robot:
         LogError: If the robot is unknown and the log does not state its geometry.
         SettingsError: If the named robot is unknown.
     """
-    if name is not None or log.robot in robot_names():
-        return read_robot(name or log.robot)
+    names = robot_names(catalogue.folder)
+    if name is not None or log.robot in names:
+        return replace(read_robot(name or log.robot, catalogue.folder), catalogue=catalogue)
     missing = [key for figure, key in NEEDED.items() if figure not in log.geometry]
     if missing:
         raise LogError(
-            f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, robot_names())}) and log.toml does not "
+            f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, names)}) and log.toml does not "
             f"state {' and '.join(missing)}; state them, or name a robot with --robot"
         )
     geometry = {**log.geometry}
     geometry.setdefault("full_speed", _full_speed(log))
-    return robot_from_geometry(log.robot, geometry, log.rate_hz)
+    return replace(robot_from_geometry(log.robot, geometry, log.rate_hz), catalogue=catalogue)
 
 
 def _full_speed(log: Log) -> float:

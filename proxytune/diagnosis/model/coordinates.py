@@ -1,9 +1,10 @@
 """Coordinates of a fit: one or several parameters of θ that share a value, within their range."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from proxytune.diagnosis.measured.drives import Floats
-from proxytune.effects import CATALOGUE, PARAMETERS, effect_of
+from proxytune.driving.robot import Robot
+from proxytune.effects import effect_of
 from proxytune.space import Theta
 
 Coordinate = tuple[str, ...]
@@ -14,9 +15,10 @@ EDGE = 0.01
 """A value this near to an end of its range, as a share of the range, is at the end."""
 
 
-def span(coordinate: Coordinate) -> tuple[float, float]:
+def span(coordinate: Coordinate, robot: Robot) -> tuple[float, float]:
     """Lowest and highest value of a coordinate."""
-    return PARAMETERS[coordinate[0]].low, PARAMETERS[coordinate[0]].high
+    parameter = robot.catalogue.parameters[coordinate[0]]
+    return parameter.low, parameter.high
 
 
 def placed(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:
@@ -25,20 +27,20 @@ def placed(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str
     return {**theta, **given}
 
 
-def at_edge(name: str, value: float, figures: Mapping[str, float]) -> bool:
+def at_edge(name: str, value: float, robot: Robot) -> bool:
     """Whether a value lies at an end of its parameter's range that is not neutral."""
-    parameter = PARAMETERS[name]
+    parameter = robot.catalogue.parameters[name]
     reach = EDGE * (parameter.high - parameter.low)
-    ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(figures)]
+    ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(robot.figures)]
     return any(abs(value - end) <= reach for end in ends)
 
 
-def is_stepwise(coordinate: Coordinate) -> bool:
+def is_stepwise(coordinate: Coordinate, robot: Robot) -> bool:
     """Whether it changes the motion by steps: no slope leads to its best value, so that is scanned for."""
-    trace = CATALOGUE[effect_of(coordinate[0])].trace
+    trace = robot.catalogue.effect(effect_of(coordinate[0])).trace
     return trace is not None and trace.stepwise
 
 
-def smooth(free: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
+def smooth(free: Sequence[Coordinate], robot: Robot) -> tuple[Coordinate, ...]:
     """Those of the coordinates that do not."""
-    return tuple(coordinate for coordinate in free if not is_stepwise(coordinate))
+    return tuple(coordinate for coordinate in free if not is_stepwise(coordinate, robot))

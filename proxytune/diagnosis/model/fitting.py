@@ -62,10 +62,12 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
 
     Within a round the filter's gains are frozen: otherwise flat gains would pass for evidence.
     """
+    sloped = smooth(free, drives.robot)
+    rough = tuple(coordinate for coordinate in free if coordinate not in sloped)
     for number in range(ROUNDS):
         whiten = whitener(drives, noise)
-        theta = _scanned(drives, theta, tuple(filter(is_stepwise, free)), whiten, SCANS[min(number, len(SCANS) - 1)])
-        theta = _fit_theta(drives, theta, smooth(free), whiten)
+        theta = _scanned(drives, theta, rough, whiten, SCANS[min(number, len(SCANS) - 1)])
+        theta = _fit_theta(drives, theta, sloped, whiten)
         noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
     return seen(drives, theta, free, noise)
 
@@ -85,7 +87,7 @@ def renoised(fitted: Fit, noise: Noise) -> Fit:
 def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:
     if not free:
         return theta
-    low, high = np.array([span(coordinate) for coordinate in free]).T
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T
 
     def left(fractions: Floats) -> Floats:
         moved = placed(theta, free, low + fractions * (high - low))
@@ -108,7 +110,7 @@ def _scanned(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten
     goes the other way at a value a hair beside it.
     """
     for coordinate in rough:
-        low, high = span(coordinate)
+        low, high = span(coordinate, drives.robot)
         here = theta[coordinate[0]]
         values = np.clip(np.concatenate((_round(here), [here], here * multiples)), low, high)
         losses = [loss_of(drives, placed(theta, (coordinate,), np.array([value])), whiten) for value in values]
@@ -136,10 +138,10 @@ def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: W
     here = increments(drives, theta)
     columns = []
     for coordinate in free:
-        if is_stepwise(coordinate):
+        if is_stepwise(coordinate, drives.robot):
             columns.append(np.zeros_like(here))
             continue
-        low, high = span(coordinate)
+        low, high = span(coordinate, drives.robot)
         step = STEP if theta[coordinate[0]] + STEP * (high - low) <= high else -STEP
         there = placed(theta, (coordinate,), np.array([theta[coordinate[0]] + step * (high - low)]))
         columns.append((here - increments(drives, there)) / step)

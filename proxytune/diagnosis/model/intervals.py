@@ -19,7 +19,8 @@ LEAST = 0.003
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """95 % intervals of the fitted parameters, from what blocks say differently."""
     smooth = _smooth(fitted)
-    for coordinate in filter(is_stepwise, fitted.free):
+    rough = (coordinate for coordinate in fitted.free if is_stepwise(coordinate, fitted.drives.robot))
+    for coordinate in rough:
         ends = _of_steps(fitted, coordinate)
         smooth |= dict.fromkeys(coordinate, ends)
     return smooth
@@ -27,7 +28,7 @@ def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
 
 def _of_steps(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
     """From the best values without each block in turn (jackknife)."""
-    low, high = span(coordinate)
+    low, high = span(coordinate, fitted.drives.robot)
     here = fitted.theta[coordinate[0]]
     values = np.unique(np.clip(here * np.concatenate(([1.0], *LOOKS)), low, high))
     losses = np.stack([_losses(fitted, coordinate, value) for value in values], axis=1)
@@ -56,9 +57,9 @@ def _smooth(fitted: Fit) -> dict[str, tuple[float, float]]:
     spread = inverse @ (pull.T @ pull) @ inverse * blocks / max(1, blocks - count)
     found = {}
     for coordinate, variance in zip(fitted.free, np.diag(spread), strict=True):
-        if is_stepwise(coordinate):
+        if is_stepwise(coordinate, fitted.drives.robot):
             continue
-        low, high = span(coordinate)
+        low, high = span(coordinate, fitted.drives.robot)
         half = 1.96 * float(np.sqrt(variance)) * (high - low)
         for name in coordinate:
             value = fitted.theta[name]

@@ -159,14 +159,14 @@ def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
 def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
     """The same with random effects as one seed draws them, instead of as expected."""
     robot = drives.robot
-    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
+    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue))
     return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
 
 
 def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
     """The paths (E, T + 1, 3) with random effects as one seed draws them, instead of as expected."""
     robot = drives.robot
-    effects = effects_from({**robot.theta, **theta}, robot.figures)
+    effects = effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue)
     train = drivetrain(robot, effects)
     twists, _ = train.apply(drives.duties, train.begin(replace(_setting(drives), seed=seed)))
     return _seen(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
@@ -186,7 +186,7 @@ def arrived_commands(drives: Drives, theta: Theta) -> Floats:
 
 def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
     robot = drives.robot
-    effects = effects_from(expected({**robot.theta, **theta}, drives.rate_hz), robot.figures)
+    effects = effects_from(expected({**robot.theta, **theta}, drives.rate_hz), robot.figures, robot.catalogue)
     return drivetrain(robot, effects), stage_chain(effects, Stage.MEASUREMENT)
 
 

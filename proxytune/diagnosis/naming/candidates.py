@@ -1,4 +1,4 @@
-"""What might be missing: every motion effect of the catalogue, in the forms it can take."""
+"""What might be missing: every motion effect of a catalogue, in the forms it can take."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -7,11 +7,18 @@ from itertools import repeat
 
 from proxytune.diagnosis.model.coordinates import Coordinate
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS
-from proxytune.effects import CATALOGUE, Effect, Form, theta_names
+from proxytune.driving.robot import Robot
+from proxytune.effects import CATALOGUE, Catalogue, Effect, Form, theta_names
 from proxytune.space import Parameter, Theta
 
 MOTION_EFFECTS = tuple(name for name, effect in CATALOGUE.items() if effect.trace)
-"""The effects that measured motion can show."""
+"""The shipped effects that measured motion can show."""
+
+
+def motion_effects(catalogue: Catalogue) -> tuple[str, ...]:
+    """The effects of a catalogue that measured motion can show."""
+    outside = (name for name in catalogue.names if name not in CATALOGUE)
+    return (*MOTION_EFFECTS, *(name for name in outside if catalogue.effect(name).trace))
 
 
 @dataclass(frozen=True)
@@ -40,30 +47,30 @@ class Candidate:
         return f"{self.effect} ({self.form})" if self.form else self.effect
 
 
-def candidates(nominal: Mapping[str, float], theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
+def candidates(robot: Robot, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
     """Every form of every deterministic motion effect that is not taken.
 
     Args:
-        nominal: The robot's figures.
+        robot: The robot, whose catalogue says what there is.
         theta: Values of effects that the model has: a form starts from there.
         taken: Names of effects that are declared or adopted.
     """
     kept = set(taken)
     found: list[Candidate] = []
-    for name in MOTION_EFFECTS:
+    for name in motion_effects(robot.catalogue):
         if name not in kept and name not in RANDOM_EFFECTS:
-            found += _forms(name, nominal, theta)
+            found += _forms(name, robot, theta)
     return tuple(found)
 
 
-def _forms(effect: str, nominal: Mapping[str, float], theta: Theta) -> list[Candidate]:
-    kind = CATALOGUE[effect]
+def _forms(effect: str, robot: Robot, theta: Theta) -> list[Candidate]:
+    kind = robot.catalogue.effect(effect)
     known = {
-        parameter.name: theta.get(name, parameter.neutral_value(nominal))
-        for name, parameter in zip(theta_names(kind), kind.parameters, strict=True)
+        parameter.name: theta.get(name, parameter.neutral_value(robot.figures))
+        for name, parameter in zip(theta_names(kind, effect), kind.parameters, strict=True)
     }
     present = known[kind.parameters[0].name] != kind.parameters[0].neutral
-    return [_candidate(kind, form, known) for form in _forms_of(kind) if form.present in (None, present)]
+    return [_candidate(effect, kind, form, known) for form in _forms_of(kind) if form.present in (None, present)]
 
 
 def _forms_of(kind: type[Effect]) -> tuple[Form, ...]:
@@ -72,8 +79,8 @@ def _forms_of(kind: type[Effect]) -> tuple[Form, ...]:
     return stated or (Form(tuple((parameter.name,) for parameter in kind.parameters)),)
 
 
-def _candidate(kind: type[Effect], form: Form, known: Mapping[str, float]) -> Candidate:
-    names = {parameter.name: name for parameter, name in zip(kind.parameters, theta_names(kind), strict=True)}
+def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, float]) -> Candidate:
+    names = {parameter.name: name for parameter, name in zip(kind.parameters, theta_names(kind, effect), strict=True)}
     parameters = {parameter.name: parameter for parameter in kind.parameters}
     held = {name for coordinate in form.free for name in coordinate}
     tried = [
@@ -81,7 +88,7 @@ def _candidate(kind: type[Effect], form: Form, known: Mapping[str, float]) -> Ca
         for first, *_ in form.free
     ]
     return Candidate(
-        effect=kind.name,
+        effect=effect,
         form=form.name,
         free=tuple(tuple(names[name] for name in coordinate) for coordinate in form.free),
         fixed={names[name]: form.fixed.get(name, value) for name, value in known.items() if name not in held},

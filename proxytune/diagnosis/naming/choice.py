@@ -12,7 +12,6 @@ from proxytune.diagnosis.model.fitting import Fit, fit
 from proxytune.diagnosis.model.replay import lateness
 from proxytune.diagnosis.naming.round import Round
 from proxytune.diagnosis.naming.screening import Lead
-from proxytune.effects import CATALOGUE, theta_names
 
 CLEAR_GAIN = 30.0
 """Nats that a random effect must gain: its chance is drawn from shifted innovations, which is rough."""
@@ -80,10 +79,13 @@ def _within(model: Fit, best: Choice, ranked: Sequence[Choice | RandomEffect]) -
 
 def _is_everywhere(choice: Choice) -> bool:
     """Whether it acts in a part of the map that holds most of the drives: then it is no matter of place."""
-    effect = CATALOGUE[choice.lead.candidate.effect] if choice.lead else None
-    if effect is None or effect.trace is None or not effect.trace.placed:
+    if choice.lead is None:
         return False
-    _, x, y, radius = (choice.fitted.theta[name] for name in theta_names(effect))
+    name, catalogue = choice.lead.candidate.effect, choice.fitted.drives.robot.catalogue
+    trace = catalogue.effect(name).trace
+    if trace is None or not trace.placed:
+        return False
+    _, x, y, radius = (choice.fitted.theta[name] for name in catalogue.theta_names(name))
     places = choice.fitted.drives.poses[:, 0, :2]
     return float((np.hypot(*(places - (x, y)).T) < radius).mean()) > MOST_PLACES
 
@@ -91,8 +93,8 @@ def _is_everywhere(choice: Choice) -> bool:
 def _is_at_edge(choice: Choice) -> bool:
     """Whether a value of it was fitted to an end of its range: it then stands for something else."""
     free = choice.lead.candidate.free if choice.lead else ()
-    figures = choice.fitted.drives.robot.figures
-    return any(at_edge(name, choice.fitted.theta[name], figures) for names in free for name in names)
+    robot = choice.fitted.drives.robot
+    return any(at_edge(name, choice.fitted.theta[name], robot) for names in free for name in names)
 
 
 def _is_plain_form_of(choice: Choice, best: Choice) -> bool:

@@ -13,7 +13,7 @@ from proxytune.diagnosis.model.fitting import Fit, seen
 from proxytune.diagnosis.model.innovations import HUBER, clipped
 from proxytune.diagnosis.model.replay import increments
 from proxytune.diagnosis.naming.candidates import Candidate
-from proxytune.effects import CATALOGUE
+from proxytune.driving.robot import Robot
 
 SIZES = 240
 """So many sizes of a step are tried: the loss over a step of the command is a spike 2 % wide."""
@@ -38,7 +38,7 @@ Values = tuple[float, ...]
 
 def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     """The forms, those of stepwise effects and of effects of a place with the best of many more probes."""
-    dense = [form for form in forms if not form.form and _offers(form) is not None]
+    dense = [form for form in forms if not form.form and _offers(form, base.drives.robot) is not None]
     if not dense:
         return list(forms)
     part = part_of(base.drives)
@@ -47,9 +47,9 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     return [replace(form, probes=(*form.probes, *best.get(form.effect, ()))) for form in forms]
 
 
-def _offers(form: Candidate) -> str | None:
+def _offers(form: Candidate, robot: Robot) -> str | None:
     """Why an effect needs more probes: for its `steps`, or its `place`."""
-    trace = CATALOGUE[form.effect].trace
+    trace = robot.catalogue.effect(form.effect).trace
     if trace is None:
         return None
     return "steps" if trace.stepwise else "place" if trace.placed else None
@@ -73,14 +73,16 @@ def _left_by(model: Fit) -> _Left:
 
 def _best(left: _Left, form: Candidate) -> tuple[Values, ...]:
     """The probe that gains most, none where none gains anything."""
-    offers = list(_sizes(form) if _offers(form) == "steps" else _places(left.model.drives, form))
+    robot = left.model.drives.robot
+    steps = _offers(form, robot) == "steps"
+    offers = list(_sizes(form, robot) if steps else _places(left.model.drives, form))
     gains = [_gain(left, form, values) for values in offers]
     return (offers[int(np.argmax(gains))],) if gains and max(gains) > 0.0 else ()
 
 
-def _sizes(form: Candidate) -> Iterable[Values]:
+def _sizes(form: Candidate, robot: Robot) -> Iterable[Values]:
     """Sizes of a step, its other coordinates where the model has them."""
-    high = span(form.free[0])[1]
+    high = span(form.free[0], robot)[1]
     for size in np.geomspace(SMALLEST_SHARE * high, high, SIZES).tolist():
         yield (size, *form.neutral[1:])
 

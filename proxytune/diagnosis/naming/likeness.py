@@ -68,7 +68,7 @@ def _own_gains(whole: Fit, episodes: Floats) -> tuple[Floats, Floats]:
     loud = np.maximum(1.0, sum_by(label, clipped(z) ** 2, len(episodes)) / np.bincount(label))
     inverse = np.linalg.inv(curve)
     step = -np.einsum("eij,ej->ei", inverse, pull)
-    low, high = np.array([span(coordinate) for coordinate in GAINS]).T
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in GAINS]).T
     here = np.array([whole.theta[name] for (name,) in GAINS])
     variances = np.diagonal(inverse, axis1=1, axis2=2) * loud[:, None]
     return here + step * (high - low), np.sqrt(variances) * (high - low)

@@ -13,6 +13,7 @@ from proxytune.diagnosis.naming.candidates import candidates
 from proxytune.diagnosis.naming.flexible import Curve, curves
 from proxytune.diagnosis.naming.found import Tried
 from proxytune.diagnosis.naming.screening import Lead, screen
+from proxytune.effects import Catalogue, Cue
 from proxytune.space import Theta
 
 LEAST_GAIN = 15.0
@@ -40,16 +41,21 @@ class Round(NamedTuple):
 
 def look(model: Fit, taken: set[str], seed: int) -> Round:
     """Look at what a model leaves over, for effects that it does not have yet."""
-    nominal = model.drives.robot.figures
-    leads = screen(model, candidates(nominal, model.theta, taken), seed)
+    robot = model.drives.robot
+    leads = screen(model, candidates(robot, model.theta, taken), seed)
     fits = _refit(model, _worth_fitting(leads), {})
     random = () if taken & set(RANDOM_EFFECTS) else _random(model, seed)
     found = curves(model)
     best = max((gain for _, _, gain in fits.values()), default=0.0)
     if found and leads_over(found[0], best):
-        others = [lead for lead in leads if lead.candidate.effect in found[0].group.effects]
+        others = [lead for lead in leads if found[0].group.name in _cues(robot.catalogue, lead.candidate.effect)]
         fits |= _refit(model, others, fits)
     return Round(leads, fits, random, found)
+
+
+def _cues(catalogue: Catalogue, effect: str) -> tuple[Cue, ...]:
+    trace = catalogue.effect(effect).trace
+    return trace.cues if trace else ()
 
 
 def _worth_fitting(leads: Sequence[Lead]) -> list[Lead]:
@@ -85,7 +91,7 @@ def _refit(
 def _start(model: Fit, lead: Lead) -> Theta:
     """The better of the probe and where the step from it leads."""
     theta = {**model.theta, **lead.candidate.fixed}
-    low, high = np.array([span(coordinate) for coordinate in lead.candidate.free]).T
+    low, high = np.array([span(coordinate, model.drives.robot) for coordinate in lead.candidate.free]).T
     starts = [
         placed(theta, lead.candidate.free, np.clip(np.array(values), low, high)) for values in (lead.start, lead.probe)
     ]

@@ -1,6 +1,6 @@
 """Which effects could explain what is left: one step from every probe value, and what chance would make of it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from proxytune.diagnosis.model.innovations import HUBER, clipped
 from proxytune.diagnosis.model.replay import increments
 from proxytune.diagnosis.naming.candidates import Candidate
 from proxytune.diagnosis.naming.dense import with_dense_probes
-from proxytune.effects import PARAMETERS
+from proxytune.space import Parameter
 
 FLIPS = 499
 """How often the null distribution is drawn."""
@@ -98,7 +98,7 @@ def _probes(base: Fit, form: Candidate) -> list[_Probe]:
     here = increments(base.drives, base.theta)
     found = []
     for values in form.probes:
-        begin = _begin(form, values)
+        begin = _begin(form, values, base.drives.robot.catalogue.parameters)
         moved = [placed(start, form.free, np.array((*begin[:j], v, *begin[j + 1 :]))) for j, v in enumerate(values)]
         columns = np.stack([here - increments(base.drives, theta) for theta in moved], -1)
         if np.abs(columns).max() > 1e-9:
@@ -106,12 +106,12 @@ def _probes(base: Fit, form: Candidate) -> list[_Probe]:
     return found
 
 
-def _begin(form: Candidate, values: tuple[float, ...]) -> tuple[float, ...]:
+def _begin(form: Candidate, values: tuple[float, ...], parameters: Mapping[str, Parameter]) -> tuple[float, ...]:
     """Where the model has a form's coordinates; what shapes an effect that is still to come may be at its probe."""
     if values[0] == form.neutral[0]:
         return form.neutral
     pairs = zip(form.free, values, form.neutral, strict=True)
-    return tuple(value if PARAMETERS[first].shape else neutral for (first, *_), value, neutral in pairs)
+    return tuple(value if parameters[first].shape else neutral for (first, *_), value, neutral in pairs)
 
 
 def without(slopes: Floats, columns: Floats, weight: Floats) -> Floats:

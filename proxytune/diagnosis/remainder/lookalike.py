@@ -12,6 +12,7 @@ from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.coordinates import placed, span
 from proxytune.diagnosis.naming.candidates import Candidate, candidates
 from proxytune.diagnosis.remainder.remainder import Remainder
+from proxytune.driving.robot import Robot
 from proxytune.space import Theta
 
 KEPT = 0.9
@@ -52,7 +53,7 @@ def lookalike(drives: Drives, theta: Theta, beside: Remainder, taken: Iterable[s
     windows = cut(drives, FITTED_S)
 
     def loss(candidate: Candidate, values: Floats) -> float:
-        low, high = np.array([span(coordinate) for coordinate in candidate.free]).T
+        low, high = np.array([span(coordinate, drives.robot) for coordinate in candidate.free]).T
         moved = placed({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
         return float(np.mean(strays(drives, moved, windows)[:, 0] ** 2))
 
@@ -60,9 +61,11 @@ def lookalike(drives: Drives, theta: Theta, beside: Remainder, taken: Iterable[s
     gained = plain - float(beside.held_out.mean())
     if gained <= 0.0:
         return None
-    forms = candidates(drives.robot.figures, theta, taken)
+    forms = candidates(drives.robot, theta, taken)
     probed = [min((loss(one, np.array(p)), number, p) for p in one.probes) for number, one in enumerate(forms)]
-    tuned = [_tuned(forms[number], np.array(probe), loss) for _, number, probe in sorted(probed)[:PROMISING]]
+    tuned = [
+        _tuned(forms[number], np.array(probe), loss, drives.robot) for _, number, probe in sorted(probed)[:PROMISING]
+    ]
     least, form, values = min(tuned, key=lambda found: found[0])
     share = (plain - least) / gained
     found = placed(form.fixed, form.free, values)
@@ -70,10 +73,10 @@ def lookalike(drives: Drives, theta: Theta, beside: Remainder, taken: Iterable[s
 
 
 def _tuned(
-    form: Candidate, probe: Floats, loss: Callable[[Candidate, Floats], float]
+    form: Candidate, probe: Floats, loss: Callable[[Candidate, Floats], float], robot: Robot
 ) -> tuple[float, Candidate, Floats]:
     """The least loss of a form near a probe, and where it is."""
-    low, high = np.array([span(coordinate) for coordinate in form.free]).T
+    low, high = np.array([span(coordinate, robot) for coordinate in form.free]).T
     start = (probe - low) / (high - low)
     simplex = np.vstack((start, start + np.eye(len(start)) * np.where(start < 0.9, 0.1, -0.1)))
 

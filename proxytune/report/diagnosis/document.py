@@ -14,7 +14,7 @@ from proxytune.diagnosis.horizon_error import HorizonError
 from proxytune.diagnosis.naming.found import Adopted
 from proxytune.diagnosis.naming.materiality import Worth
 from proxytune.driving.robot import robot_names
-from proxytune.effects import CATALOGUE, Model, model_text, theta_names
+from proxytune.effects import Catalogue, Model, model_text
 from proxytune.logs import GEOMETRY
 from proxytune.report.diagnosis.clocks import clocks_document
 from proxytune.report.diagnosis.learnt import learnt_document, ratio_document, ratios_document
@@ -57,9 +57,9 @@ def _estimate(estimate: Estimate) -> dict[str, Any]:
     return {"value": estimate.value, "interval": list(estimate.interval), "unit": estimate.unit}
 
 
-def _effect(effect: Adopted, theta: Mapping[str, Estimate]) -> dict[str, Any]:
-    kind = CATALOGUE[effect.effect]
-    names = dict(zip(theta_names(kind), (parameter.name for parameter in kind.parameters), strict=True))
+def _effect(effect: Adopted, theta: Mapping[str, Estimate], catalogue: Catalogue) -> dict[str, Any]:
+    kind = catalogue.effect(effect.effect)
+    names = dict(zip(catalogue.theta_names(effect.effect), (one.name for one in kind.parameters), strict=True))
     return {
         "name": effect.effect,
         "form": effect.form,
@@ -72,7 +72,10 @@ def _effect(effect: Adopted, theta: Mapping[str, Estimate]) -> dict[str, Any]:
 
 def _added(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
     worth = _worth(diagnosis.worth.get(effect.effect, {}))
-    return _effect(effect, diagnosis.theta) | {"worth": worth, "at_edge": list(diagnosis.at_edge(effect))}
+    return _effect(effect, diagnosis.theta, diagnosis.robot.catalogue) | {
+        "worth": worth,
+        "at_edge": list(diagnosis.at_edge(effect)),
+    }
 
 
 def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -82,7 +85,7 @@ def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
     change = _percent(worth[horizon]) if horizon is not None else {"value": None, "interval": None, "unit": "%"}
     told = {"nats": effect.gain, "changes_error_by": change["value"], "interval": change["interval"], "unit": "%"}
     open_ = {"horizon_s": horizon, "may_matter": not worth or may_matter(worth), "worth": _worth(worth)}
-    return _effect(effect, diagnosis.dropped_values) | told | open_
+    return _effect(effect, diagnosis.dropped_values, diagnosis.robot.catalogue) | told | open_
 
 
 def _worth(worth: Worth) -> dict[str, Any]:
@@ -145,11 +148,12 @@ def model_file(diagnosis: Diagnosis) -> str:
     """The extended model as model.toml."""
     theta = {name: estimate.value for name, estimate in diagnosis.theta.items()} | dict(diagnosis.learning.theta)
     bounds = {name: estimate.interval for name, estimate in diagnosis.theta.items()}
-    known = diagnosis.robot.name in robot_names()
+    catalogue = diagnosis.robot.catalogue
+    known = diagnosis.robot.name in robot_names(catalogue.folder)
     geometry = {} if known else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
     added = ", ".join(effect.effect for effect in diagnosis.effects) or "nothing"
     comments = (f"{diagnosis.verdict}: fitted to {diagnosis.log}; added to what was declared: {added}",)
-    return model_text(Model(diagnosis.robot.name, None, theta, bounds, geometry), comments)
+    return model_text(Model(diagnosis.robot.name, None, theta, bounds, geometry), comments, catalogue)
 
 
 def shown(diagnosis: Diagnosis) -> Group:

@@ -12,7 +12,7 @@ from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, drawn_wheel_speeds, wheel_speeds
 from proxytune.diagnosis.naming.flexible import Curve
 from proxytune.diagnosis.naming.found import Adopted
-from proxytune.effects import CATALOGUE, Means, WheelCurve
+from proxytune.effects import Catalogue, Means, WheelCurve
 from proxytune.report.diagnosis.means import ANY, GROUPS, draw_means, means_figure, rates_of, retuned
 from proxytune.report.diagnosis.model_names import BEFORE, after
 from proxytune.report.style import BLUE, GREY, PURPLE, VERMILLION, dress, legend_below
@@ -41,14 +41,14 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
         best = next(iter(found.remainder), None)
         return None if best is None else means_figure(diagnosis, best, GROUPS[best.group.name])
     first = found.adopted[0]
-    shown = _shown(first)
+    shown = _shown(first, diagnosis.robot.catalogue)
     if isinstance(shown, Means):
         return means_figure(diagnosis, _curve(found.curves, shown.cue), shown.panels)
     return _wheels_figure(diagnosis) if shown is WheelCurve.STEADY else _steps_figure(diagnosis)
 
 
-def _shown(effect: Adopted) -> WheelCurve | Means:
-    trace = CATALOGUE[effect.effect].trace
+def _shown(effect: Adopted, catalogue: Catalogue) -> WheelCurve | Means:
+    trace = catalogue.effect(effect.effect).trace
     return trace.shown_in(effect.form) if trace else WheelCurve.STEP
 
 
@@ -124,7 +124,11 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     found, drives = diagnosis.found, diagnosis.found.declared.drives
     figure = Figure(figsize=(5.2, 2.8), layout="constrained")
     axes = figure.subplots()
-    lasts = STEPS_S if any(_shown(one) is WheelCurve.REVERSAL for one in found.adopted) else STEP_S
+    lasts = (
+        STEPS_S
+        if any(_shown(one, diagnosis.robot.catalogue) is WheelCurve.REVERSAL for one in found.adopted)
+        else STEP_S
+    )
     times = np.arange(round(lasts * drives.tick_hz)) / drives.tick_hz
     size = min(0.5, float(np.abs(drives.duties).max()))
     duties = np.repeat(np.where(times < STEP_S, size, -size)[None, :, None], 2, axis=2)

@@ -91,7 +91,7 @@ def retuned(declared: Fit, curve: Curve) -> Theta:
     left = declared.innovations - declared.whiten.whiten(moved)
     inner = np.abs(left) < HUBER
     step = -np.linalg.lstsq(declared.slopes[inner], left[inner], rcond=None)[0]
-    low, high = np.array([span(coordinate) for coordinate in declared.free]).T
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in declared.free]).T
     here = np.array([theta[coordinate[0]] for coordinate in declared.free])
     return placed(theta, declared.free, np.clip(here + step * (high - low), low, high))
 

@@ -1,0 +1,14 @@
+"""The one door for code that is not proxytune's own: modules beside a study, installed modules, and plug-ins.
+
+Whatever a user can add is named in one of two ways. `module:attribute` is looked for in the study's folder first, then
+among the installed modules. A plain name is one of those shipped, or that of an installed plug-in: an entry point of
+the group `proxytune` that is called `KIND.NAME`, as in
+
+    [project.entry-points.proxytune]
+    "effect.yaw_drift" = "my_package.effects:YawDrift"
+"""
+
+from proxytune.extensions.door import describe, load, make, require
+from proxytune.extensions.plugins import GROUP, plugins
+
+__all__ = ["GROUP", "describe", "load", "make", "plugins", "require"]

@@ -1,0 +1,109 @@
+"""Modules of a user's folder, each folder a world of its own.
+
+Python knows every module of a process by its name alone, so that the `family.py` of a second study would be taken for
+that of the first. A folder's modules are therefore imported under a name that belongs to the folder
+(`beside_my_study_1a2b3c4d.family`), and so are those of the folder that they import in turn by plain `import helper`.
+The folder is also added to the end of sys.path, for what imports by text (an environment registered as "module:Class"):
+what is found there, after all else, may be of any folder that this process has opened.
+"""
+
+import builtins
+import functools
+import hashlib
+import importlib
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.abc import Loader
+from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+PREFIX = "beside_"
+
+
+def import_beside(module: str, folder: Path) -> ModuleType:
+    """Import a module that lies in a folder, or else is installed.
+
+    Raises:
+        Exception: Whatever importing it raises; ModuleNotFoundError where there is none.
+    """
+    home = _home(str(folder.resolve()))
+    if str(folder.resolve()) not in sys.path:
+        sys.path.append(str(folder.resolve()))
+    name = f"{home}.{module}" if _lies_in(folder.resolve(), module) else module
+    if name not in sys.modules:
+        importlib.invalidate_caches()
+    return importlib.import_module(name)
+
+
+def folders() -> tuple[str, ...]:
+    """The folders whose modules this process has imported; another process needs them to unpickle what came of them."""
+    homes = [module for name, module in list(sys.modules.items()) if name.startswith(PREFIX) and "." not in name]
+    return tuple(folder for home in homes for folder in home.__path__)
+
+
+def open_folders(known: Sequence[str]) -> None:
+    """Let this process import the modules of these folders by the names that they had in another."""
+    for folder in known:
+        _home(folder)
+
+
+def _home(folder: str) -> str:
+    """The name under which a folder's modules are imported: that of an empty package."""
+    word = "".join(letter if letter.isalnum() else "_" for letter in Path(folder).name)
+    name = f"{PREFIX}{word}_{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
+    if name not in sys.modules:
+        home = ModuleType(name, f"The modules of {folder}.")
+        home.__path__ = [folder]
+        sys.modules[name] = home
+    if _Finder not in sys.meta_path:
+        sys.meta_path.insert(0, _Finder)
+    return name
+
+
+def _lies_in(folder: Path, module: str) -> bool:
+    top = folder / module.partition(".")[0]
+    return top.name != "proxytune" and (top.with_name(f"{top.name}.py").is_file() or (top / "__init__.py").is_file())
+
+
+class _Finder:
+    """Finds modules of folders by their names there."""
+
+    @staticmethod
+    def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
+        home = name.partition(".")[0]
+        spec = PathFinder.find_spec(name, path, target) if path and name.startswith(PREFIX) else None
+        if spec is not None and spec.loader is not None:
+            spec.loader = _Loader(spec.loader, home)
+        return spec
+
+
+class _Loader(Loader):
+    """Loads a module whose own imports look in its folder first."""
+
+    def __init__(self, loader: Any, home: str) -> None:
+        self._loader, self._home = loader, home
+
+    def create_module(self, spec: ModuleSpec) -> Any:
+        return self._loader.create_module(spec)
+
+    def exec_module(self, module: ModuleType) -> None:
+        own = functools.partial(_import, self._home)
+        vars(module)["__builtins__"] = {**vars(builtins), "__import__": own}
+        self._loader.exec_module(module)
+
+
+def _import(
+    home: str,
+    name: str,
+    globals: Mapping[str, object] | None = None,
+    locals: Mapping[str, object] | None = None,
+    fromlist: Sequence[str] | None = (),
+    level: int = 0,
+) -> ModuleType:
+    """What `import` does in a module of a folder."""
+    if level or not _lies_in(Path(sys.modules[home].__path__[0]), name):
+        return builtins.__import__(name, globals, locals, fromlist or (), level)
+    found = builtins.__import__(f"{home}.{name}", globals, locals, fromlist or (), 0)
+    return found if fromlist else sys.modules[f"{home}.{name.partition('.')[0]}"]

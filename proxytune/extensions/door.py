@@ -1,0 +1,125 @@
+"""Finding what a user's name stands for, and saying in one line why it cannot be used."""
+
+import importlib
+import inspect
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import Any
+
+from proxytune.errors import ExtensionError, ProxytuneError
+from proxytune.extensions.beside import import_beside
+from proxytune.extensions.plugins import plugins
+from proxytune.settings import nearest
+
+NONE: Mapping[str, Any] = MappingProxyType({})
+
+
+def load(
+    name: str,
+    *,
+    kind: str,
+    beside: Path | None = None,
+    needs: Iterable[str] = (),
+    shipped: Mapping[str, Any] = NONE,
+) -> Any:
+    """What a name stands for: something shipped, `module:attribute`, or an installed plug-in.
+
+    Args:
+        name: `module:attribute`, or a plain name.
+        kind: What it is to be, as people call it and as plug-ins are named: agent, effect, engine, family, learner.
+        beside: The folder whose modules come before the installed ones.
+        needs: Members that it must have.
+        shipped: What proxytune itself has of this kind, by name.
+
+    Raises:
+        ExtensionError: If there is no such thing, importing it fails, or it lacks a member.
+    """
+    if ":" in name:
+        found = _attribute(name, kind, beside)
+    else:
+        installed = plugins(kind, shipped)
+        found = shipped[name] if name in shipped else _plugin(name, kind, installed, shipped)
+    require(found, needs, name=name, kind=kind)
+    return found
+
+
+def make(
+    name: str,
+    *,
+    kind: str,
+    beside: Path | None = None,
+    needs: Iterable[str] = (),
+    shipped: Mapping[str, Any] = NONE,
+) -> Any:
+    """What a name stands for as `load` finds it; a class, or what lacks the members, is called without arguments.
+
+    Raises:
+        ExtensionError: If it cannot be loaded, calling it raises, or what it makes lacks a member.
+    """
+    found = load(name, kind=kind, beside=beside, shipped=shipped)
+    needs = tuple(needs)
+    if callable(found) and (inspect.isclass(found) or _lacks(found, needs)):
+        try:
+            found = found()
+        except ProxytuneError:
+            raise
+        except Exception as problem:
+            raise ExtensionError(f"{kind} '{name}' raised {describe(problem)}; correct it") from problem
+    require(found, needs, name=name, kind=kind)
+    return found
+
+
+def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:
+    """Refuse a thing that is not what its name claims.
+
+    Raises:
+        ExtensionError: If it lacks any of these members.
+    """
+    if lacks := _lacks(found, needs):
+        raise ExtensionError(f"{kind} '{name}' lacks {', '.join(lacks)}; add what every {kind} must have")
+
+
+def describe(problem: BaseException) -> str:
+    """An exception in one line."""
+    return f"{type(problem).__name__}: {' '.join(str(problem).split())}".rstrip(": ")
+
+
+def _lacks(found: Any, needs: Iterable[str]) -> list[str]:
+    return [member for member in needs if not hasattr(found, member)]
+
+
+def _attribute(name: str, kind: str, beside: Path | None) -> Any:
+    module, _, attribute = name.partition(":")
+    if not (module and attribute) or not all(module.split(".")):
+        raise ExtensionError(f"{kind} '{name}': must be written module:attribute")
+    found = _imported(name, kind, module, beside)
+    if not hasattr(found, attribute):
+        names = [key for key in vars(found) if not key.startswith("_")]
+        raise ExtensionError(f"{kind} '{name}': {module} has no '{attribute}'; {nearest(attribute, names)}")
+    return getattr(found, attribute)
+
+
+def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleType:
+    try:
+        return importlib.import_module(module) if beside is None else import_beside(module, beside)
+    except ProxytuneError:
+        raise
+    except (Exception, SystemExit) as problem:
+        if isinstance(problem, ModuleNotFoundError) and f"{module}.".startswith(f"{problem.name}."):
+            where = "installed" if beside is None else f"in {beside.absolute()} or installed"
+            raise ExtensionError(f"{kind} '{name}': no module '{problem.name}' {where}; check the name") from None
+        raise ExtensionError(f"{kind} '{name}': importing {module} raised {describe(problem)}; correct it") from problem
+
+
+def _plugin(name: str, kind: str, installed: Mapping[str, Any], shipped: Mapping[str, Any]) -> Any:
+    if name not in installed:
+        known = (*shipped, *installed)
+        hint = nearest(name, known) if known else "no plug-in of this kind is installed"
+        raise ExtensionError(f"{kind} '{name}' is unknown (your own is written module:attribute); {hint}")
+    try:
+        return installed[name].load()
+    except (Exception, SystemExit) as problem:
+        raise ExtensionError(
+            f"{kind} '{name}': its plug-in {installed[name].value} raised {describe(problem)}; correct or uninstall it"
+        ) from problem

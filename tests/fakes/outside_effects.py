@@ -1,0 +1,82 @@
+"""The text of an effect that a user writes beside a study, whole and with one thing wrong at a time."""
+
+WEAK_REVERSE = '''"""An effect of one's own."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from proxytune.effects import Cue, Means, Panel, Setting, Signal, Stage, Trace
+from proxytune.space import Parameter
+
+
+@dataclass(frozen=True)
+class WeakReverse:
+    """The robot is slower backwards than forwards."""
+
+    loss: float
+    name: ClassVar[str] = "weak_reverse"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="loss", unit="", low=0.0, high=0.9, neutral=0.0,
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), source="made up",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.DIRECTION,),
+        shown=Means(Cue.DIRECTION, (Panel("forward", "forward speed [m/s]", "forward"),)),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Slow down what is backwards."""
+        forward = signal[..., :1]
+        slowed = np.where(forward < 0.0, (1.0 - self.loss) * forward, forward)
+        return np.concatenate((slowed, signal[..., 1:]), axis=-1), None
+'''
+
+NAME = "weak_reverse:WeakReverse"
+
+WRONG = {
+    "no trace": (
+        "    trace: ClassVar[Trace | None] = ",
+        "    track = ",
+        "lacks trace; add",
+    ),
+    "a stage in words": (
+        "stage: ClassVar[Stage] = Stage.MOTION",
+        'stage = "motion"',
+        "has the stage 'motion'; take one of .*motion",
+    ),
+    "no parameters": (
+        "    def begin",
+        "    parameters = ()\n\n    def begin",
+        r"has the parameters \(\); give a tuple of at least one Parameter",
+    ),
+    "a neutral value out of its range": (
+        "neutral=0.0",
+        "neutral=1.5",
+        r"parameter 'loss' whose neutral value 1.5 is not within \[0, 0.9\]",
+    ),
+    "a range upside down": ("low=0.0", "low=2.0", "parameter 'loss' from 2.0 to 0.9; give a finite range"),
+    "no probes": ("probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),", "", "has a trace, but 'loss' has no probes"),
+    "another field": ("    loss: float", "    lost: float", "has the fields lost; its parameters are loss"),
+    "another shape": (
+        "return np.concatenate((slowed, signal[..., 1:]), axis=-1), None",
+        "return slowed, None",
+        "makes a signal",
+    ),
+    "no memory": (
+        "signal[..., 1:]), axis=-1), None",
+        "signal[..., 1:]), axis=-1)",
+        "answers with ndarray; apply must give",
+    ),
+    "a bug": ("self.loss)", "self.lost)", "raised AttributeError: .*lost.*; correct its begin and apply"),
+    "not neutral": ("(1.0 - self.loss)", "(0.9 - self.loss)", r"changes the signal at its neutral value \[0.0\]"),
+    "no class": ("class WeakReverse:", "class Other:", "weak_reverse has no 'WeakReverse'"),
+}
+"""What is replaced in it, by what, and what is said of that."""

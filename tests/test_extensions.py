@@ -1,0 +1,166 @@
+"""One door for a user's own code: found, kept apart by folder, usable in other processes, refused in one line."""
+
+import pickle
+import sys
+
+import pytest
+
+from proxytune.driving.agents import AGENTS
+from proxytune.driving.agents.loading import load_agent
+from proxytune.errors import ExtensionError
+from proxytune.extensions import load, make, plugins
+from proxytune.running.workers import working
+
+SHIPPED = {"steady": 1, "bold": 2}
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Writes modules, given as NAME=TEXT, into a folder of tmp_path and gives the folder."""
+
+    def written(folder, **modules):
+        home = tmp_path / folder
+        home.mkdir(exist_ok=True)
+        for name, text in modules.items():
+            (home / f"{name}.py").write_text(text, encoding="utf-8")
+        return home
+
+    return written
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Installs a package that is nothing but its entry points, as pip would leave it."""
+
+    def installed(package, *lines):
+        site = tmp_path / package
+        info = site / f"{package}-1.0.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text("[proxytune]\n" + "\n".join(lines) + "\n")
+        monkeypatch.syspath_prepend(str(site))
+        return site
+
+    return installed
+
+
+def test_an_attribute_is_found_in_the_folder_before_the_installed_modules(write):
+    folder = write("study", json="here = 7\n")
+    assert load("json:here", kind="agent", beside=folder) == 7
+    assert load("json:loads", kind="agent")("3") == 3
+    assert "here" not in vars(sys.modules["json"])
+
+
+def test_modules_of_one_name_in_two_folders_are_not_mixed_up(write):
+    family = (
+        "import helper\nfrom helper import size\n\n\ndef late():\n    import helper as again\n    return again.size\n"
+    )
+    one, two = (write(name, helper=f"size = {n}\n", family=family) for n, name in ((1, "one"), (2, "two")))
+    for folder, size in ((one, 1), (two, 2), (one, 1)):
+        module = {"beside": folder, "kind": "family"}
+        assert load("family:size", **module) == size
+        assert load("family:helper", **module).size == size
+        assert load("family:late", **module)() == size
+
+
+def test_packages_and_submodules_of_a_folder_import_one_another(write):
+    folder = write("study", top="import tools.sharp\nfrom tools import sharp\nsame = tools.sharp is sharp\n")
+    tools = write(
+        "study/tools",
+        __init__="",
+        sharp="from . import blunt\nimport tools.blunt as b\nedge = b.edge\n",
+        blunt="edge = 3\n",
+    )
+    assert tools.is_dir()
+    assert load("top:same", kind="agent", beside=folder) is True
+    assert load("tools.sharp:edge", kind="agent", beside=folder) == 3
+
+
+WORK = """
+from dataclasses import dataclass
+from helper import FACTOR
+
+@dataclass(frozen=True)
+class Work:
+    def __call__(self, piece):
+        import helper
+        return piece * helper.FACTOR
+"""
+
+
+def test_other_processes_unpickle_what_is_of_a_folder_with_its_own_neighbours(write):
+    for name, factor in (("left", 10), ("right", 100)):
+        folder = write(name, works=WORK, helper=f"FACTOR = {factor}\n")
+        work = load("works:Work", kind="work", beside=folder)()
+        assert pickle.loads(pickle.dumps(work)) == work
+        with working(work, [1, 2, 3], jobs=2) as results:
+            assert sorted(results) == [factor, 2 * factor, 3 * factor]
+
+
+MISTAKES = {
+    "no module": ("gone:x", r"agent 'gone:x': no module 'gone' in .*study or installed; check the name"),
+    "no attribute": ("mine:Mime", "agent 'mine:Mime': mine has no 'Mime'; did you mean 'Mine'?"),
+    "an import that raises": ("bad:x", "agent 'bad:x': importing bad raised ZeroDivisionError: division by zero"),
+    "an import that leaves": ("leaves:x", "agent 'leaves:x': importing leaves raised SystemExit: 3; correct it"),
+    "a missing neighbour": ("needy:x", "importing needy raised ModuleNotFoundError: No module named 'not_there'"),
+    "bad syntax": ("odd:x", "agent 'odd:x': importing odd raised SyntaxError"),
+    "no members": ("mine:Mine", "agent 'mine:Mine' lacks act, end; add what every agent must have"),
+    "no colon": ("stead", "agent 'stead' is unknown .*module:attribute.*; did you mean 'steady'?"),
+    "nothing after the colon": ("mine:", "agent 'mine:': must be written module:attribute"),
+    "nothing before it": (":Mine", "agent ':Mine': must be written module:attribute"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_what_cannot_be_used_is_told_in_one_line(write, case):
+    folder = write(
+        "study",
+        mine="class Mine:\n    def begin(self): ...\n",
+        bad="1 / 0\n",
+        leaves="import sys\nsys.exit(3)\n",
+        needy="import not_there\n",
+        odd="def (\n",
+    )
+    name, expected = MISTAKES[case]
+    with pytest.raises(ExtensionError, match=expected) as told:
+        load(name, kind="agent", beside=folder, needs=("begin", "act", "end"), shipped=dict.fromkeys(SHIPPED))
+    assert "\n" not in str(told.value)
+
+
+def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is(write):
+    mine = "class Mine:\n    size = 1\n    def __call__(self): return 5\n\n\nready = Mine()\n\n\n"
+    made = "def factory(): return Mine()\n\n\ndef broken(): return 1 / 0\n"
+    folder = write("study", mine=mine + made)
+    for name in ("mine:Mine", "mine:ready", "mine:factory"):
+        assert make(name, kind="agent", beside=folder, needs=("size",)).size == 1
+    with pytest.raises(ExtensionError, match="agent 'mine:broken' raised ZeroDivisionError: division by zero; correct"):
+        make("mine:broken", kind="agent", beside=folder, needs=("size",))
+
+
+def test_a_plugin_is_loaded_by_its_name_and_listed(install, write, tmp_path):
+    install("fast_agents", "agent.quick = fast_agents_code:Quick", "effect.other = fast_agents_code:Other")
+    write(
+        "fast_agents",
+        fast_agents_code="class Quick:\n    def begin(self, robot): return 4\n    def act(self, p, m): ...\n",
+    )
+    assert list(plugins("agent", AGENTS)) == ["quick"]
+    assert load_agent("quick", tmp_path).begin(None) == 4
+    with pytest.raises(ExtensionError, match="agent 'quik' is unknown .*; did you mean 'quick'"):
+        load_agent("quik", tmp_path)
+    with pytest.raises(
+        ExtensionError, match="effect 'other': its plug-in fast_agents_code:Other raised AttributeError"
+    ):
+        load("other", kind="effect")
+
+
+def test_two_plugins_of_one_name_are_refused_with_both_packages(install):
+    install("fast_agents", "agent.quick = a:b")
+    install("slow_agents", "agent.quick = c:d")
+    with pytest.raises(ExtensionError, match="'agent.quick' is in both fast_agents and slow_agents; uninstall one"):
+        plugins("agent")
+
+
+def test_a_plugin_with_the_name_of_something_shipped_is_refused(install):
+    install("fast_agents", "agent.steady = a:b")
+    with pytest.raises(ExtensionError, match="'agent.steady' of fast_agents has the name of a shipped agent; rename"):
+        load("steady", kind="agent", shipped=SHIPPED)

@@ -1,4 +1,4 @@
-"""`list`: the robots, effects, agents and metrics there are."""
+"""`list`: the known robots, effects, agents and metrics."""
 
 import argparse
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""`predict`: what a fitted model says of any log."""
+"""`predict`: the poses of a log, predicted by a fitted model."""
 
 import argparse
 from pathlib import Path
@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     error = (
         f"RMSE {1e3 * found.place:.1f} mm, {np.degrees(found.turn):.2f}° over {found.poses} poses"
         if found.poses
-        else "no measured pose lasts a window"
+        else "no drive has measured poses over a whole window"
     )
     return Answer(
         document, Text(f"{document['windows']} windows of {arguments.horizon:g} s: {error}\n{arguments.output}")

@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="CSV[:DOMAIN]",
-        help="scores in the proxy; repeat it, or give a file of several domains, to rank proxies",
+        help="scores in the proxy; repeat it, or give a file with several domains, to rank proxies",
     )
     parser.add_argument("--target", required=True, metavar="CSV[:DOMAIN]", help="scores on the target")
     parser.add_argument(
@@ -32,13 +32,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="NAME:max|min[:TOLERANCE]",
-        help="a column to compare agents by, its better direction, and what difference is still a tie (0.5 or 5%%)",
+        help="a column to compare agents by, whether higher or lower is better, and the largest tie (0.5 or 5%%)",
     )
     parser.add_argument(
-        "--beta", action="append", default=[], metavar="NAME:WEIGHT", help="weight of a metric in PPV [1/its spread]"
+        "--beta", action="append", default=[], metavar="NAME:WEIGHT", help="weight of a metric in PPV (proxy predictivity value) [1/its spread]"
     )
     parser.add_argument(
-        "--unpaired", action="store_true", help="episodes of the same label have nothing in common (default: the start)"
+        "--unpaired", action="store_true", help="treat episodes with equal labels as unrelated [as the same start]"
     )
     parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
     parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def split_source(source: str) -> tuple[Path, str | None]:
-    """Take FILE or FILE:DOMAIN apart."""
+    """Split FILE or FILE:DOMAIN into its parts."""
     path, colon, domain = source.rpartition(":")
     if not colon or Path(source).exists() or not path:
         return Path(source), None

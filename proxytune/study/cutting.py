@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 FEWEST = 3
 """Trials that must have been scored before one is cut off: fewer say nothing of noise."""
 SHARE = 1e-3
-"""What a pair counts besides its disagreements so far: no pair is certain never to disagree."""
+"""Added to every pair, so that a pair that has never disagreed keeps some weight."""
 
 
 @dataclass(frozen=True)

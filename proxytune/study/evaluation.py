@@ -114,7 +114,7 @@ def run_missing(
             watcher.episode()
             spent += Spent(1, outcome.seconds)
             if stop and outcome.failure:
-                raise EpisodeError(f"{told(outcome)}; mend it and run again, or set on_failure = 'continue'")
+                raise EpisodeError(f"{told(outcome)}; correct it and run again, or set on_failure = 'continue'")
             known[outcome.episode] = outcome
             instance = outcome.episode.theta
             if enough and instance not in over and enough(instance, known):

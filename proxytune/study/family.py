@@ -30,7 +30,7 @@ def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
     except ProxytuneError:
         raise
     except Exception as problem:
-        raise settings.error("family", f"{settings.family} raised {_named(problem)}; mend it") from problem
+        raise settings.error("family", f"{settings.family} raised {_named(problem)}; correct it") from problem
     _check(settings, family)
     return family  # type: ignore[no-any-return]
 
@@ -45,7 +45,7 @@ def _factory(settings: StudySettings) -> Any:
         folder = settings.folder.absolute()
         raise settings.error("family", f"no module '{problem.name}' here, in {folder} or installed") from None
     except Exception as problem:
-        raise settings.error("family", f"importing {module} raised {_named(problem)}; mend it") from problem
+        raise settings.error("family", f"importing {module} raised {_named(problem)}; correct it") from problem
     if not callable(getattr(found, name, None)):
         names = [key for key, value in vars(found).items() if callable(value) and not key.startswith("_")]
         raise settings.error("family", f"{module} has no function '{name}'; {nearest(name, names)}")

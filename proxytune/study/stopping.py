@@ -14,7 +14,7 @@ from proxytune.study.outputs import goal_of, trials_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
 
-FILE_REMEDY = "raise it or take it out to go on"
+FILE_REMEDY = "raise or remove it to continue"
 
 
 def stopped(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
@@ -41,7 +41,7 @@ def _out_of_time(settings: StudySettings, store: Store, done: Sequence[TrialReco
     seconds = store.seconds_of_trials(len(done), seeds) / settings.jobs
     if seconds < limit:
         return ""
-    return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {limit:g}; {FILE_REMEDY}"
+    return f"episodes took {seconds:.3g} s and stop.wall_time_s is {limit:g}; {FILE_REMEDY}"
 
 
 def _nothing_to_gain(study: Study, store: Store, done: Sequence[TrialRecord]) -> str:
@@ -53,8 +53,8 @@ def _nothing_to_gain(study: Study, store: Store, done: Sequence[TrialRecord]) ->
     if gain >= limit * noise:
         return ""
     return (
-        f"no θ is expected to improve PRPV by more than {gain:.2g}, where its noise is {noise:.2g} and"
-        f" stop.no_improvement is {limit:g}; lower it or take it out to go on"
+        f"no θ is expected to lower PRPV by more than {gain:.2g}; its noise is {noise:.2g} and"
+        f" stop.no_improvement is {limit:g}; lower or remove it to continue"
     )
 
 

@@ -43,7 +43,7 @@ def document(*words):
 def shown(*words):
     console = Console(width=160, record=True, file=None, quiet=False)
     with console.capture() as captured:
-        console.print(run(*words).shown)
+        console.print(run(*words).text)
     return captured.get()
 
 

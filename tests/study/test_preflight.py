@@ -130,8 +130,8 @@ def test_where_every_agent_fails_it_says_that_it_cannot_judge(make_study):
     faults = ", ".join(f'"agent{number}:*:raises"' for number in range(6))
     _, found = run(make_study(preflight="true", domain={"faults": f"[{faults}]"}))
     assert found.warnings == (
-        "pre-flight: 'delay' cannot be judged: every agent fails somewhere in [0, 0.3]; narrow its box",
-        "pre-flight: 'trim' cannot be judged: every agent fails somewhere in [-0.3, 0.3]; narrow its box",
+        "pre-flight: 'delay' cannot be tested: every agent fails somewhere in [0, 0.3]; narrow its box",
+        "pre-flight: 'trim' cannot be tested: every agent fails somewhere in [-0.3, 0.3]; narrow its box",
     )
 
 
@@ -143,8 +143,8 @@ def test_where_failures_stop_the_study_they_stop_it_here(make_study):
 def test_what_is_wrong_with_a_parameter_and_what_to_do_is_one_line(planted):
     _, found = run(planted())
     dead, noise_sized = found.warnings
-    assert dead.startswith("pre-flight: 'dead' changes nothing at all from end to end of [0, 1]; take it out of")
-    assert noise_sized.startswith("pre-flight: 'noise_sized' changes no metric beyond noise from end to end of [0, 1]")
+    assert dead.startswith("pre-flight: 'dead' changes nothing at all across [0, 1]; remove it from")
+    assert noise_sized.startswith("pre-flight: 'noise_sized' changes no metric beyond noise across [0, 1]")
 
 
 def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_at_most_one_case_in_twenty():

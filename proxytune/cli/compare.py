@@ -62,7 +62,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     output = arguments.output or Path(f"compare_{name}")
     engines = _engines(arguments)
     _check(arguments)
-    with locked(_make_folder(output)), objective_of(arguments, output, len(engines)) as (objective, budget, initial, jobs):
+    _make(output)
+    with locked(output), objective_of(arguments, output, len(engines)) as (objective, budget, initial, jobs):
         keys = _keys(objective, engines, arguments.seeds, budget, initial)
         runs = _finish_all(objective, keys, output / FILE_NAME, jobs)
     grouped = [[runs[key] for key in keys if key.engine == engine] for engine in engines]
@@ -153,9 +154,8 @@ def _append(path: Path, run: Run) -> None:
         raise StoreError(f"{path}: cannot be written ({problem.strerror}); choose another --output") from None
 
 
-def _make_folder(folder: Path) -> Path:
+def _make(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise StoreError(f"{folder}: cannot be created ({problem.strerror}); choose another --output") from None
-    return folder

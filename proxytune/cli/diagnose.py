@@ -39,7 +39,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the log, what is declared and where the findings go."""
     parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder: log.toml and samples.csv")
     parser.add_argument(
-        "--declared", metavar="NAMES", help="effects that are tuned in any case, as in trim,delay [the effects of θ that the robot has]"
+        "--declared",
+        metavar="NAMES",
+        help="effects tuned in any case, as in trim,delay [the robot's]",
     )
     parser.add_argument("--robot", metavar="NAME", help="the robot, if not the one in log.toml")
     parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test on [part of LOG]")

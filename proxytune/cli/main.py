@@ -38,7 +38,11 @@ COMMANDS: dict[str, Command] = {
     "study": Command("study", "run or resume a study: find the θ that makes the simulator most useful", resumes=True),
     "score": Command("score", "measure how useful a simulator is, from two tables of scores"),
     "sweep": Command("sweep", "measure usefulness along one parameter", resumes=True),
-    "teach": Command("teach", "measure learning curves and PLV (proxy learning value): how much a simulator saves in training", resumes=True),
+    "teach": Command(
+        "teach",
+        "measure PLV (proxy learning value): how much a simulator saves in training",
+        resumes=True,
+    ),
     "measure": Command("measure", "drive a study's agents in the domain of a model file and write their scores"),
     "record": Command("record", "drive the domain of a model file through manoeuvres and write the log"),
     "diagnose": Command("diagnose", "find the effect that the model lacks, from a log of measured drives"),

@@ -35,7 +35,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="a column to compare agents by, whether higher or lower is better, and the largest tie (0.5 or 5%%)",
     )
     parser.add_argument(
-        "--beta", action="append", default=[], metavar="NAME:WEIGHT", help="weight of a metric in PPV (proxy predictivity value) [1/its spread]"
+        "--beta",
+        action="append",
+        default=[],
+        metavar="NAME:WEIGHT",
+        help="its weight in PPV, the proxy predictivity value [1/spread]",
     )
     parser.add_argument(
         "--unpaired", action="store_true", help="treat episodes with equal labels as unrelated [as the same start]"

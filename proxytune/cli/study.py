@@ -32,7 +32,10 @@ from proxytune.study.study import Study, open_study
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study."""
     parser.add_argument(
-        "path", type=Path, metavar="PATH", help="a study's folder; if it does not exist, the study of that name that comes with proxytune is copied there"
+        "path",
+        type=Path,
+        metavar="PATH",
+        help="a study's folder, or where to copy one that comes with proxytune",
     )
 
 

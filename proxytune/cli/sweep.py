@@ -40,7 +40,9 @@ MOST_POINTS = 10_000
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study, the parameter, and the values of the others."""
     parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder")
-    parser.add_argument("--parameter", required=True, metavar="NAME", help="the parameter to sweep, or 'all' that the study searches")
+    parser.add_argument(
+        "--parameter", required=True, metavar="NAME", help="the parameter to sweep, or 'all' of the study"
+    )
     parser.add_argument("--points", type=int, default=13, metavar="N", help="number of values of the parameter [13]")
     parser.add_argument(
         "--at",

@@ -70,10 +70,10 @@ class PlvStudy:
     @property
     def best(self) -> PlvTrial:
         """The trial of highest PLV, the first of them; where none is known, the first."""
-        return max(self.trials, key=lambda trial: (known(trial), -trial.number))
+        return max(self.trials, key=lambda trial: (plv_or_worst(trial), -trial.number))
 
 
-def known(trial: PlvTrial) -> float:
+def plv_or_worst(trial: PlvTrial) -> float:
     """PLV, minus infinity where the learner did not converge."""
     value = trial.worth.plv.value
     return float("-inf") if value is None else value

@@ -27,7 +27,10 @@ BAD = {
     "no colon": ({"family": '"wobbly"'}, "family: must be 'module:factory', got 'wobbly'"),
     "no such module": ({"family": '"wobbli:wobbly"'}, "family: no module 'wobbli' here"),
     "no such factory": ({"family": '"wobbly:wobly"'}, "family: wobbly has no function 'wobly'; did you mean 'wobbly'?"),
-    "a factory with a bug": ({"family": '"wobbly:broken_factory"'}, "broken_factory raised KeyError: 'robot'; correct it"),
+    "a factory with a bug": (
+        {"family": '"wobbly:broken_factory"'},
+        "raised KeyError: 'robot'; correct it",
+    ),
     "something else": ({"family": '"wobbly:not_a_family"'}, "made no domain family: it lacks identity, metrics"),
     "a missing model": ({"proxy": '"nowhere.toml"'}, "proxy: no such file: "),
     "an unknown parameter": (

@@ -69,7 +69,7 @@ def _wheels_figure(diagnosis: Diagnosis) -> Figure:
         draw_means(panels[1, column], rates, place, GROUPS["wheel command"][column])
         panels[0, column].set_title(f"{side} wheel", fontsize=8)
         panels[1, column].set_xlabel("command [duty]", fontsize=8)
-    for row, label in enumerate(("steady speed [m/s]", "added speed [mm/s]")):
+    for row, label in enumerate(("steady speed [m/s]", "speed − declared [mm/s]")):
         panels[row, 0].set_ylabel(label, fontsize=8)
         panels[row, 1].set_ylabel("")
     legend_below(figure, *panels.ravel())

@@ -52,7 +52,7 @@ ADOPTED = _Role("adopted", BLUE, BLUE)
 RIVAL = _Role("rival of an adopted effect", LIGHT_BLUE, LIGHT_BLUE)
 OTHER = _Role("other named effect", GREY, GREY)
 CHANCE = _Role(f"named effect, p > {P_VALUE:g}", GREY, "white")
-SIGNAL = _Role("any curve over this signal", PURPLE, PURPLE)
+SIGNAL = _Role("free curve over this signal", PURPLE, PURPLE)
 
 
 def diagnosis_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:

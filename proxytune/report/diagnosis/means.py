@@ -21,7 +21,7 @@ from proxytune.space import Theta
 BINS = 20
 """Values of the signal, equally often driven, over which means are taken."""
 
-MEASURED, ANY = "measured", "any curve over the signal"
+MEASURED, ANY = "measured", "free curve"
 
 DEGREES = 180.0 / np.pi
 
@@ -151,5 +151,5 @@ def draw_means(axes: Axes, rates: Rates, signal: Floats, panel: Panel) -> None:
         places, values = _means(signal, added[panel.motion], rates.declared[panel.motion] if panel.share else None)
         style = {MEASURED: ("o", GREY, 3.0, 1), ANY: ("--", PURPLE, 0.0, 3)}.get(name, ("-", BLUE, 0.0, 2))
         axes.plot(places, factor * values, style[0], color=style[1], ms=style[2], lw=1.4, zorder=style[3], label=name)
-    axes.set_ylabel(f"added {NAMES[panel.motion]} [{unit}]", fontsize=8)
+    axes.set_ylabel(f"{NAMES[panel.motion]} − declared [{unit}]", fontsize=8)
     dress(axes)

@@ -87,7 +87,7 @@ def _meaning(result: StudyResult) -> str:
         "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
         f"{agents} agents proxy and target disagree which is the better. The best θ is the visited one of lowest "
         "expected PRPV, given all trials and fresh episodes. The 95 % interval holds the values that agree with every "
-        "agent's every metric on the target; “by PRPV alone” holds those whose PRPV is as low as the best, within noise."
+        "agent's every metric on the target; “by PRPV alone” those whose PRPV is as low as the best, within noise."
     )
 
 

@@ -41,16 +41,17 @@ def test_a_study_runs_and_prints_one_document_and_a_second_time_simulates_nothin
 def test_people_see_the_best_theta_and_where_the_figure_is(finished, capsys):
     assert main(["study", str(finished)]) == 0
     out, told = capsys.readouterr()
-    assert "wobbly: 7 of 7 trials" in out
+    assert "7 of 7; best: trial " in out
     assert "trim" in out
-    assert "0 episodes run, 126 reused" in out
-    assert "convergence.png" in out.replace("\n", "")
+    assert "0 run, 126 reused" in out
+    assert f"figures: {finished / 'figures'}" in out.replace("\n", "")
+    assert f"report: {finished / 'report.html'}" in out.replace("\n", "")
     assert told == ""
 
 
 def test_failed_episodes_are_said_at_the_end(make_study, capsys):
     assert main(["study", str(make_study(domain={"faults": '["agent3:1:raises"]'}))]) == 0
-    assert "7 of 126 episodes failed; the first:" in capsys.readouterr().out
+    assert "7 of 126 episodes; the first:" in capsys.readouterr().out
 
 
 def test_a_failure_that_stops_the_study_is_one_line_and_exit_1(make_study, capsys):
@@ -96,7 +97,7 @@ def test_why_a_study_has_ended_is_said(make_study, capsys):
     folder = make_study(stop="{ no_improvement = 1e9 }")
     assert main(["study", str(folder)]) == 0
     out = " ".join(capsys.readouterr().out.split())
-    assert "trials 5 of 7; the best is trial" in out
+    assert "trials 5 of 7; best: trial " in out
     assert "ended: no θ is expected to lower PRPV by more than" in out
     make_study()
     assert main(["study", str(folder)]) == 0

@@ -257,5 +257,5 @@ def test_a_lowered_budget_keeps_what_is_finished_and_says_so(finished, make_stud
     make_study("study", budget="3")
     assert main(["study", str(finished)]) == 0
     out = " ".join(capsys.readouterr().out.split())
-    assert "stopped: the budget of 3 trials is spent; all 7 that are finished count" in out
+    assert "ended: the budget of 3 trials is spent; all 7 that are finished count" in out
     assert (trials(finished), episodes(finished)) == before

@@ -212,12 +212,12 @@ def test_how_much_was_luck_is_in_the_row_of_the_search(finished):
     lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
     fresh, searched = prpv_rows(replace(found, confirmation=replace(found.confirmation, answer=lucky)))
     assert fresh[:2] == ("PRPV", str(answer.assessment.prpv.value))
-    assert "on fresh episodes" in fresh[3]
-    assert searched[:2] == ("  in the search", str(found.best.assessment.prpv.value))
-    assert searched[3] == "in the search's own episodes; lower by luck, by 4"
+    assert "; fresh episodes" in fresh[3]
+    assert searched[:2] == ("  in search", str(found.best.assessment.prpv.value))
+    assert searched[3].startswith("4 lower by luck")
     unlucky = replace(answer, scores=(int(answer.trial.prpv),))
     _, searched = prpv_rows(replace(found, confirmation=replace(found.confirmation, answer=unlucky)))
-    assert searched[3].endswith("no optimism")
+    assert searched[3].startswith("no optimism")
 
 
 def test_the_document_has_the_answer_and_every_candidate(finished):

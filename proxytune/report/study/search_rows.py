@@ -16,7 +16,7 @@ def trials_row(result: StudyResult) -> Row:
     count, budget = len(result.trials), result.study.settings.budget
     spent = f"{count} (budget {budget})" if count > budget else f"{count} of {budget}"
     ended = f"; ended: {result.stopped}" if result.stopped else ""
-    return ("trials", f"{spent}; the best is trial {result.best.trial.number}{ended}")
+    return ("trials", f"{spent}; best: trial {result.best.trial.number}{ended}")
 
 
 def cut_rows(result: StudyResult) -> list[Row]:
@@ -40,7 +40,7 @@ def importance_row(result: StudyResult) -> Row:
     """The total Sobol index of each parameter: its share in PRPV's variance over the box, with its 95 % interval."""
     ordered = sorted(result.importances, key=lambda one: -one.share)
     shares = [f"{one.name} {one.share:.2f} ({one.interval[0]:.2f} to {one.interval[1]:.2f})" for one in ordered]
-    return ("Sobol index", f"total, of PRPV: {', '.join(shares)}")
+    return ("Sobol index", f"total, of PRPV over the box: {', '.join(shares)}")
 
 
 def failure_rows(result: StudyResult) -> list[Row]:

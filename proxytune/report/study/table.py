@@ -18,7 +18,7 @@ from proxytune.study.result import StudyResult
 
 THETA, USEFULNESS, INFORMATION, SEARCH = (
     "Parameters",
-    "Usefulness at the best θ (lower is better)",
+    "Usefulness at the best θ (lower is better; 95 % intervals)",
     "What informs each parameter",
     "Search",
 )
@@ -28,13 +28,14 @@ def study_table(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Re
     """The result of a study as `study` shows it: one sentence, then one table per subject, a fact a row."""
     theta = _table(theta_columns(result), theta_rows(result))
     usefulness = _table(USEFULNESS_COLUMNS, usefulness_rows(result))
-    informed, ended = information_rows(result), [("episodes", spent), *((name, str(at)) for name, at in files.items())]
+    informed = information_rows(result)
     return Group(
         Text(sentence(finding_of(result))),
         *_group(THETA, theta, theta_notes(result)),
         *_group(USEFULNESS, usefulness, usefulness_notes(result)),
         *(_group(INFORMATION, _table(INFORMATION_COLUMNS, informed)) if informed else []),
-        *_group(SEARCH, _table((), [*search_rows(result), *ended])),
+        *_group(SEARCH, _table((), [*search_rows(result), ("episodes", spent)])),
+        *(Text(f"{name}: {path}") for name, path in files.items()),
     )
 
 

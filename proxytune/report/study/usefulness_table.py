@@ -8,9 +8,10 @@ from proxytune.usefulness.assessment import PAIRED, PERFECT
 
 Row = tuple[str, str, str, str]
 
-USEFULNESS_COLUMNS: Row = ("measure", "value", "95 % interval", "meaning")
-OF_THE_PROXY = "this proxy against itself from the same starts: what a perfect proxy scores"
-PPV_MEANING = "proxy predictivity value: weighted error of the agents' scores"
+IN_SEARCH, MISFIT = "  in search", "misfit (p)"
+USEFULNESS_COLUMNS: Row = ("measure", "value", "interval", "meaning")
+OF_THE_PROXY = "what a perfect proxy scores (this one re-run)"
+PPV_MEANING = "proxy predictivity value: error of the scores"
 
 
 def usefulness_rows(result: StudyResult) -> list[Row]:
@@ -24,16 +25,16 @@ def usefulness_rows(result: StudyResult) -> list[Row]:
 def prpv_rows(result: StudyResult) -> list[Row]:
     """PRPV of the best θ, first on fresh episodes where there are any, then on those that the search chose it by."""
     own, confirmation = result.best.assessment, result.confirmation
-    counts = f"disagreements on the order of agents, 0 to {own.prpv.range[1]}"
+    pairs = f"wrongly ordered pairs, 0 to {own.prpv.range[1]}"
     if confirmation is None:
-        return [("PRPV", *_prpv(own), f"{counts}; in the search's own episodes")]
+        return [("PRPV", *_prpv(own), f"{pairs}; the search's own episodes")]
     fresh = confirmation.answer.assessment
     if fresh is None:
         failed = "none on fresh episodes: an agent failed in all of them"
-        return [("PRPV", "–", "", failed), ("  in the search", *_prpv(own), counts)]
+        return [("PRPV", "–", "", failed), (IN_SEARCH, *_prpv(own), pairs)]
     return [
-        ("PRPV", *_prpv(fresh), f"{counts}; on fresh episodes{_rivals(confirmation)}"),
-        ("  in the search", *_prpv(own), _optimism(confirmation)),
+        ("PRPV", *_prpv(fresh), f"{pairs}; fresh episodes"),
+        (IN_SEARCH, *_prpv(own), f"{_optimism(confirmation)}{_rivals(confirmation)}"),
     ]
 
 
@@ -50,7 +51,7 @@ def _rivals(confirmation: Confirmation) -> str:
 
 def _optimism(confirmation: Confirmation) -> str:
     optimism = confirmation.answer.optimism or 0.0
-    return f"in the search's own episodes; {f'lower by luck, by {optimism:.3g}' if optimism > 0.0 else 'no optimism'}"
+    return f"{optimism:.3g} lower by luck" if optimism > 0.0 else "no optimism"
 
 
 def floor_rows(floor: NoiseFloor, meaning: str = "") -> list[Row]:
@@ -63,7 +64,7 @@ def floor_rows(floor: NoiseFloor, meaning: str = "") -> list[Row]:
 def chance_row(result: StudyResult) -> Row:
     """What a proxy that ranks at random would score, and how often it would score as low."""
     chance = result.judged.chance
-    as_low = f"a proxy that ranks at random; as low: {probability(chance.p_value)}"
+    as_low = f"a random ranking; as low: {probability(chance.p_value)}"
     return ("  chance", fixed(chance.mean, 1), f"± {fixed(chance.deviation, 1)}", as_low)
 
 
@@ -71,9 +72,9 @@ def misfit_row(result: StudyResult) -> Row:
     """Whether any θ explains the target."""
     misfit = result.knowledge.misfit
     if misfit.p_value is None:
-        return ("misfit test", "–", "", "too few complete trials to test whether any θ explains the target's scores")
+        return (MISFIT, "–", "", "too few complete trials to test whether any θ explains the target's scores")
     meaning = "some θ may explain the target's scores" if misfit.fits else "no θ explains the target's scores"
-    return ("misfit test", probability(misfit.p_value), "", meaning)
+    return (MISFIT, f"{misfit.p_value:.2g}", "", meaning)
 
 
 def usefulness_notes(result: StudyResult) -> list[str]:

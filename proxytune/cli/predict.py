@@ -31,23 +31,23 @@ def run(arguments: argparse.Namespace) -> Answer:
     model, log = read_model(arguments.model), read_log(arguments.log)
     table = predict(log, _robot(model, log), model.theta, arguments.horizon)
     write_text(arguments.output, table.to_csv(index=False))
-    found = agreement(table, log, arguments.horizon)
+    rmse = agreement(table, log, arguments.horizon)
     document = {
         "predictions": str(arguments.output),
         "rows": len(table),
-        "windows": found.windows,
+        "windows": rmse.windows,
         "horizon_s": arguments.horizon,
         "error": {
-            "value": found.place,
+            "value": rmse.place,
             "unit": "m",
-            "heading": found.turn,
+            "heading": rmse.turn,
             "heading_unit": "rad",
-            "poses": found.poses,
+            "poses": rmse.poses,
         },
     }
     error = (
-        f"RMSE {1e3 * found.place:.1f} mm, {np.degrees(found.turn):.2f}° over {found.poses} poses"
-        if found.poses
+        f"RMSE {1e3 * rmse.place:.1f} mm, {np.degrees(rmse.turn):.2f}° over {rmse.poses} poses"
+        if rmse.poses
         else "no drive has measured poses over a whole window"
     )
     return Answer(

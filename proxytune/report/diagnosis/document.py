@@ -145,8 +145,8 @@ def model_file(diagnosis: Diagnosis) -> str:
     """The extended model as model.toml."""
     theta = {name: estimate.value for name, estimate in diagnosis.theta.items()} | dict(diagnosis.learning.theta)
     bounds = {name: estimate.interval for name, estimate in diagnosis.theta.items()}
-    known = diagnosis.robot.name in robot_names()
-    geometry = {} if known else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
+    in_robots = diagnosis.robot.name in robot_names()
+    geometry = {} if in_robots else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
     added = ", ".join(effect.effect for effect in diagnosis.effects) or "nothing"
     comments = (f"{diagnosis.verdict}: fitted to {diagnosis.log}; added to what was declared: {added}",)
     return model_text(Model(diagnosis.robot.name, None, theta, bounds, geometry), comments)

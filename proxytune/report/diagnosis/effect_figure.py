@@ -40,13 +40,13 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
         best = next(iter(found.remainder), None)
         return None if best is None else means_figure(diagnosis, best, GROUPS[best.group.name])
     first = found.adopted[0]
-    shown = _shown(first)
-    if isinstance(shown, Means):
-        return means_figure(diagnosis, _curve(found.curves, shown.cue), shown.panels)
-    return _wheels_figure(diagnosis) if shown is WheelCurve.STEADY else _steps_figure(diagnosis)
+    kind = _curve_kind(first)
+    if isinstance(kind, Means):
+        return means_figure(diagnosis, _curve(found.curves, kind.cue), kind.panels)
+    return _wheels_figure(diagnosis) if kind is WheelCurve.STEADY else _steps_figure(diagnosis)
 
 
-def _shown(effect: Adopted) -> WheelCurve | Means:
+def _curve_kind(effect: Adopted) -> WheelCurve | Means:
     trace = CATALOGUE[effect.effect].trace
     return trace.shown_in(effect.form) if trace else WheelCurve.STEP
 
@@ -123,7 +123,7 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     found, drives = diagnosis.found, diagnosis.found.declared.drives
     figure = Figure(figsize=(5.2, 2.8), layout="constrained")
     axes = figure.subplots()
-    lasts = STEPS_S if any(_shown(one) is WheelCurve.REVERSAL for one in found.adopted) else STEP_S
+    lasts = STEPS_S if any(_curve_kind(one) is WheelCurve.REVERSAL for one in found.adopted) else STEP_S
     times = np.arange(round(lasts * drives.tick_hz)) / drives.tick_hz
     size = min(0.5, float(np.abs(drives.duties).max()))
     duties = np.repeat(np.where(times < STEP_S, size, -size)[None, :, None], 2, axis=2)

@@ -46,9 +46,9 @@ def ratio_document(one: Ratio) -> dict[str, Any]:
     return {"value": one.value, "interval": list(one.interval)}
 
 
-def ratios_document(found: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
+def ratios_document(ratios: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
     """Such ratios by horizon in seconds."""
-    return {f"{horizon_s:g}": ratio_document(one) for horizon_s, one in found.items()}
+    return {f"{horizon_s:g}": ratio_document(one) for horizon_s, one in ratios.items()}
 
 
 def learnt_notes(learning: Learning) -> list[str]:

@@ -81,8 +81,8 @@ def _say_immaterial(effect: Adopted, diagnosis: Diagnosis) -> str:
 
 def _values(effect: Adopted, diagnosis: Diagnosis) -> str:
     """The fitted values of an effect that is no longer in the model."""
-    known = {name: estimate for name, estimate in diagnosis.dropped_values.items() if name in effect.names}
-    return "".join(f" {estimate.value:.3g} {estimate.unit}".rstrip() for estimate in known.values())
+    estimates = {name: estimate for name, estimate in diagnosis.dropped_values.items() if name in effect.names}
+    return "".join(f" {estimate.value:.3g} {estimate.unit}".rstrip() for estimate in estimates.values())
 
 
 def _gain(effect: Adopted) -> str:

@@ -65,8 +65,8 @@ def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) 
 def _answer(axes: Axes, result: StudyResult) -> None:
     """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's."""
     pairs = zip(result.trials, result.answers, strict=True)
-    known = [(trial.number, answer.prpv) for trial, answer in pairs if answer is not None]
-    ends = [*known, (result.trials[-1].number + 1, result.best.trial.prpv)]
+    answers = [(trial.number, answer.prpv) for trial, answer in pairs if answer is not None]
+    ends = [*answers, (result.trials[-1].number + 1, result.best.trial.prpv)]
     axes.step(*zip(*ends, strict=True), where="post", color=ORANGE, linewidth=1.5, label="answer so far")
 
 

@@ -116,14 +116,14 @@ def _informs(information: Information) -> bool:
 def known_parameters(result: StudyResult) -> tuple[KnownParameter, ...]:
     """What is known of each parameter, in the order of the box."""
     units, learnt = result.study.family.parameters, result.knowledge
-    known = []
+    parameters = []
     for interval in result.study.settings.space.intervals:
         name, ends = interval.name, learnt.intervals[interval.name]
         share = (ends[1] - ends[0]) / (interval.high - interval.low)
         best = result.best.trial.theta[name]
         identified = name not in learnt.unidentified
-        known.append(KnownParameter(name, units[name].unit, best, ends, share, identified))
-    return tuple(known)
+        parameters.append(KnownParameter(name, units[name].unit, best, ends, share, identified))
+    return tuple(parameters)
 
 
 def declared_of(names: Sequence[str]) -> tuple[str, ...]:

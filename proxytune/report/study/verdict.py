@@ -21,15 +21,15 @@ def _say_theta(finding: Finding) -> str:
         return f"{so_far}The proxy lacks something: no θ explains the target's scores{_say_misfit(finding)}."
     if finding.perfect:
         return f"{so_far}θ found: {say_parameters(finding)}."
-    if not any(known.identified for known in finding.parameters):
+    if not any(one.identified for one in finding.parameters):
         return f"{so_far}θ is unknown: {say_parameters(finding)}."
     return f"{so_far}θ narrowed down to {percent(finding.region)} of the box: {say_parameters(finding)}."
 
 
 def say_parameters(finding: Finding) -> str:
     """The identified parameters with their intervals, then the others."""
-    sure = [known for known in finding.parameters if known.identified]
-    unsure = [plain(known.name) for known in finding.parameters if not known.identified]
+    sure = [one for one in finding.parameters if one.identified]
+    unsure = [plain(one.name) for one in finding.parameters if not one.identified]
     clauses = [", ".join(map(_say_value, sure[:MOST_NAMED]))] if sure else []
     if len(sure) > MOST_NAMED:
         clauses[0] += f" and {len(sure) - MOST_NAMED} more"
@@ -38,12 +38,12 @@ def say_parameters(finding: Finding) -> str:
     return "; ".join(clauses)
 
 
-def _say_value(known: KnownParameter) -> str:
-    low, high = known.interval
-    places = digits(known.interval)
-    inside = low <= known.best <= high
-    ends = span(known.interval, places) if inside else f"95 % region: {span(known.interval, places)}"
-    return f"{plain(known.name)} {fixed(known.best, places)}{known.unit and ' ' + known.unit} ({ends})"
+def _say_value(parameter: KnownParameter) -> str:
+    low, high = parameter.interval
+    places = digits(parameter.interval)
+    inside = low <= parameter.best <= high
+    ends = span(parameter.interval, places) if inside else f"95 % region: {span(parameter.interval, places)}"
+    return f"{plain(parameter.name)} {fixed(parameter.best, places)}{parameter.unit and ' ' + parameter.unit} ({ends})"
 
 
 def _say_misfit(finding: Finding) -> str:

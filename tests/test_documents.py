@@ -14,25 +14,32 @@ import pytest
 from floors import floor
 
 from proxytune.cli.compare_objective import STAND_INS
-from proxytune.cli.main import COMMANDS, main, parser
+from proxytune.cli.interruption import INTERRUPTED, TERMINATED
+from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
 from proxytune.driving.agents import AGENTS
 from proxytune.driving.robot import UNITS
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE
 from proxytune.effects.learnt.features import GROUPS
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
+from proxytune.report.diagnosis.notes import MEANINGS
 from proxytune.search.engines.registry import ENGINES
 from proxytune.study.settings import KEYS
 from proxytune.usefulness import MEASURES, PODS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS_PAGE = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
 STUDIES = (ROOT / "studies" / "README.md").read_text(encoding="utf-8")
 ROBOTS = (ROOT / "robots" / "README.md").read_text(encoding="utf-8")
+DOCS = {path: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("*.md"))}
+LONGEST_README = 120
+"""Lines: the README is read in one go; the rest is in docs/."""
 COMMAND_LINES = sorted(
     {
         line.removeprefix("$ ")
-        for block in re.findall(r"```(?:sh|console)\n(.*?)```", README, flags=re.DOTALL)
+        for text in (README, *DOCS.values())
+        for block in re.findall(r"```(?:sh|console)\n(.*?)```", text, flags=re.DOTALL)
         for line in block.splitlines()
         if line.removeprefix("$ ").startswith("python -m proxytune")
     }
@@ -47,15 +54,15 @@ def options():
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_is_in_the_readme(command):
-    assert f"python -m proxytune {command}" in README
+def test_every_command_is_documented(command):
+    assert f"python -m proxytune {command}" in COMMANDS_PAGE
 
 
 @pytest.mark.parametrize(("command", "option"), sorted(set(options())))
-def test_every_option_is_in_the_readme(command, option):
-    row = next(line for line in README.splitlines() if line.startswith(f"| `{command}"))
+def test_every_option_is_documented(command, option):
+    row = next(line for line in COMMANDS_PAGE.splitlines() if line.startswith(f"| `{command}"))
     assert f"`{option}" in row or option == "--json"
-    assert "`--json`" in README
+    assert "`--json`" in COMMANDS_PAGE
 
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
@@ -89,8 +96,8 @@ def test_every_measure_is_documented_with_its_name_spelt_out_and_its_direction(m
 
 
 @pytest.mark.parametrize("name", STAND_INS)
-def test_every_stand_in_is_in_the_readme_and_told_with_what_came_out(name):
-    row = next(line for line in README.splitlines() if line.startswith("| `compare"))
+def test_every_stand_in_is_documented_with_what_came_out(name):
+    row = next(line for line in COMMANDS_PAGE.splitlines() if line.startswith("| `compare"))
     assert f"`{name}`" in row
     assert f"compare {name} " in (ROOT / "studies" / "compare.md").read_text(encoding="utf-8")
 
@@ -145,15 +152,42 @@ def test_every_room_is_in_the_readme_in_reading_order():
     assert [floor(room) for room in named] == sorted(floor(room) for room in named), "a room stands before one it needs"
 
 
+def test_the_readme_is_short_and_leads_to_every_page_of_docs():
+    assert len(README.splitlines()) <= LONGEST_README
+    for path in DOCS:
+        others = "".join(text for other, text in DOCS.items() if other != path)
+        contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+        assert path.name in README + contributing + others, f"nothing leads to docs/{path.name}"
+
+
+@pytest.mark.parametrize("status", [INTERRUPTED, TERMINATED, DONE, FAILED, BAD_INPUT])
+def test_every_exit_status_is_documented(status):
+    rows = [line for line in COMMANDS_PAGE.splitlines() if re.match(r"\| \d", line)]
+    assert any(re.search(rf"\b{status}\b", row.split("|")[1]) for row in rows)
+
+
+@pytest.mark.parametrize("verdict", MEANINGS)
+def test_every_verdict_of_diagnose_is_documented(verdict):
+    assert re.search(rf"^\| {verdict} \|", (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8"), re.MULTILINE)
+
+
+@pytest.mark.parametrize("measure", ["PRPV", "PPV", "SRCC", "MMRV", "POD", "PLV"])
+def test_every_measure_is_spelt_out(measure):
+    rows = [line.split("|") for line in DOCS[ROOT / "docs" / "usefulness.md"].splitlines()]
+    words = next(row[2].replace("-", " ").split() for row in rows if len(row) > 2 and row[1].strip() == measure)
+    assert "".join(word[0] for word in words if word != "to").upper() in (measure, "SRCC")
+
+
 def test_every_link_of_the_documents_leads_somewhere():
-    for document in [ROOT / "README.md", *ROOT.glob("studies/**/README.md"), *ROOT.glob("robots/**/README.md")]:
+    below = (ROOT.glob(f"{folder}/**/*.md") for folder in ("docs", "studies", "robots"))
+    for document in [*ROOT.glob("*.md"), *(path for paths in below for path in paths)]:
         for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
             assert target.startswith("http") or (document.parent / target).exists(), f"{document}: {target}"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line", COMMAND_LINES)
-def test_the_commands_of_the_readme_run(line, tmp_path):
+def test_the_commands_of_the_documents_run(line, tmp_path):
     shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=shutil.ignore_patterns("study.db*", "figures"))
     words = shlex.split(line)
     here = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -56,7 +56,7 @@ sys.exit(main(["diagnose", str(log), "--json", "--output", "found"]))
 def folder(tmp_path_factory):
     """A copy of the project whose room of effects has one more class, and its name in the catalogue."""
     folder = tmp_path_factory.mktemp("project")
-    for part in ("proxytune", "robots", "studies", "tests"):
+    for part in ("proxytune", "robots", "studies", "docs", "tests"):
         shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.png", "study.db"))
     for document in ("README.md", "pyproject.toml"):
         shutil.copy(ROOT / document, folder)

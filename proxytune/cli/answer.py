@@ -1,4 +1,4 @@
-"""What every command gives back: one JSON document, and the same for people."""
+"""What every command returns: one JSON document, and the same for people."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,8 +12,8 @@ class Answer:
 
     Attributes:
         document: What `--json` prints: plain numbers, texts, lists and dicts, None where undefined.
-        shown: What a person sees on standard output.
+        text: What a person reads on standard output.
     """
 
     document: dict[str, Any]
-    shown: RenderableType
+    text: RenderableType

@@ -26,24 +26,24 @@ FILE_NAME = "runs.jsonl"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the objective, the engines and how much to spend."""
-    parser.add_argument("study", metavar="STUDY", help=f"a study's folder, or a stand-in: {' or '.join(STAND_INS)}")
+    """Add the objective, the engines and the budget."""
+    parser.add_argument("study", metavar="STUDY", help=f"a study's folder, or a test problem: {' or '.join(STAND_INS)}")
     parser.add_argument(
         "--engines",
         metavar="NAME,…",
-        help=f"of {', '.join(NAMES)}; the others are compared with the first [all of a study's that can be used]",
+        help=f"from {', '.join(NAMES)}; the others are compared with the first [all that a study can use]",
     )
     parser.add_argument(
-        "--seeds", type=int, default=30, metavar="N", help="runs per engine, the same seeds for all [30]"
+        "--seeds", type=int, default=30, metavar="N", help="runs per engine, with the same seeds for all [30]"
     )
     parser.add_argument("--budget", type=int, metavar="N", help=f"evaluations per run [the study's, or {BUDGET}]")
     parser.add_argument(
-        "--initial", type=int, metavar="N", help=f"of them the shared design [the study's, or {INITIAL}]"
+        "--initial", type=int, metavar="N", help=f"how many of these are the shared design [the study's, or {INITIAL}]"
     )
     parser.add_argument(
         "--truths",
         action="store_true",
-        help="of a study: each seed has a target of its own, simulated at a θ drawn by it",
+        help="with a study: simulate a new target for each seed, at a random θ",
     )
     parser.add_argument(
         "--lacks",
@@ -51,20 +51,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="with --truths: a model.toml whose effects the targets have and the proxy lacks; several by turns",
+        help="with --truths: a model.toml whose effects the targets have and the proxy lacks; repeat for several",
     )
-    parser.add_argument("--output", type=Path, metavar="DIR", help="where runs and figure go [./compare_STUDY]")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="folder for runs and figure [./compare_STUDY]")
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """Run what is not finished yet of every engine and seed, and sum all up."""
+    """Run what is missing of every engine and seed, and sum all up."""
     name = Path(arguments.study).absolute().name
     output = arguments.output or Path(f"compare_{name}")
     engines = _engines(arguments)
     _check(arguments)
-    with locked(_made(output)), objective_of(arguments, output, len(engines)) as (objective, budget, initial, jobs):
+    _make(output)
+    with locked(output), objective_of(arguments, output, len(engines)) as (objective, budget, initial, jobs):
         keys = _keys(objective, engines, arguments.seeds, budget, initial)
-        runs = _finished(objective, keys, output / FILE_NAME, jobs)
+        runs = _finish_all(objective, keys, output / FILE_NAME, jobs)
     grouped = [[runs[key] for key in keys if key.engine == engine] for engine in engines]
     summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
     return _answer(objective, summaries, grouped, output)
@@ -94,7 +95,7 @@ def _engines(arguments: argparse.Namespace) -> list[str]:
         if reason:
             raise InputError(f"--engines: {reason}")
     if not named:
-        raise InputError(f"--engines: names none; give some of {', '.join(NAMES)}")
+        raise InputError(f"--engines: names no engine; give some of {', '.join(NAMES)}")
     return list(dict.fromkeys(named))
 
 
@@ -114,18 +115,18 @@ def _keys(objective: Objective, engines: Sequence[str], seeds: int, budget: int,
     ]
 
 
-def _finished(objective: Objective, keys: Sequence[RunKey], path: Path, jobs: int) -> Mapping[RunKey, Run]:
+def _finish_all(objective: Objective, keys: Sequence[RunKey], path: Path, jobs: int) -> Mapping[RunKey, Run]:
     """All runs, each written as soon as it is finished.
 
-    Those that the file lacks are run now; those that other code has judged are judged again.
+    Runs that the file lacks are run now; runs that an older version judged are judged again.
     """
-    known = read_runs(path)
-    missing = [key for key in keys if key not in known or known[key].judgement.code != judging_code()]
+    runs = read_runs(path)
+    missing = [key for key in keys if key not in runs or runs[key].judgement.code != judging_code()]
     with Parallel(n_jobs=min(jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
-        for run in parallel(delayed(_finish)(objective, key, known.get(key)) for key in missing):
+        for run in parallel(delayed(_finish)(objective, key, runs.get(key)) for key in missing):
             _append(path, run)
-            known[run.key] = run
-    return known
+            runs[run.key] = run
+    return runs
 
 
 def _finish(objective: Objective, key: RunKey, run: Run | None) -> Run:
@@ -133,29 +134,28 @@ def _finish(objective: Objective, key: RunKey, run: Run | None) -> Run:
 
 
 def read_runs(path: Path) -> dict[RunKey, Run]:
-    """The finished runs in a file of JSON lines; a line that an interrupted write left unfinished is passed over."""
-    found = {}
+    """Read the finished runs from a file of JSON lines; a line left unfinished by an interruption is skipped."""
+    runs = {}
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
         try:
             run = run_from(json.loads(line))
         except (ValueError, KeyError, TypeError):
             continue
-        found[run.key] = run
-    return found
+        runs[run.key] = run
+    return runs
 
 
 def _append(path: Path, run: Run) -> None:
     try:
         with path.open("a", encoding="utf-8") as file:
-            # On a line of its own even after one that was left unfinished.
+            # On a separate line even after one that was left unfinished.
             file.write("\n" * (file.tell() > 0) + json.dumps(run_document(run)))
     except OSError as problem:
         raise StoreError(f"{path}: cannot be written ({problem.strerror}); choose another --output") from None
 
 
-def _made(folder: Path) -> Path:
+def _make(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise StoreError(f"{folder}: cannot be made ({problem.strerror}); choose another --output") from None
-    return folder
+        raise StoreError(f"{folder}: cannot be created ({problem.strerror}); choose another --output") from None

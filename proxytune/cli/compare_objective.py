@@ -1,4 +1,4 @@
-"""What `compare` compares engines on: a stand-in, a study, or a study with a truth of its own for every seed."""
+"""What `compare` compares engines on: a test problem, a study, or a study with a new target for every seed."""
 
 import argparse
 import sys
@@ -44,15 +44,15 @@ def objective_of(
 
 
 def check_truths(arguments: argparse.Namespace) -> None:
-    """Refuse truths of a stand-in, which has its own, and effects that no target is measured with.
+    """Refuse --truths for a test problem, which has its own, and --lacks without simulated targets.
 
     Raises:
         InputError: With the option and the remedy.
     """
     if arguments.lacks and not arguments.truths:
-        raise InputError("--lacks: a study's target is what was measured; add --truths to measure targets")
+        raise InputError("--lacks: needs simulated targets; add --truths")
     if arguments.truths and arguments.study in STAND_INS:
-        raise InputError(f"--truths: '{arguments.study}' has a truth for every seed; leave it out")
+        raise InputError(f"--truths: '{arguments.study}' has its own truth for every seed; leave the option out")
 
 
 def _on_study(arguments: argparse.Namespace, run: StudyRun) -> Objective:
@@ -70,5 +70,5 @@ def _episodes_per_run(arguments: argparse.Namespace, settings: StudySettings, bu
 def _spending(arguments: argparse.Namespace, budget: int, initial: int) -> tuple[int, int]:
     budget, initial = arguments.budget or budget, arguments.initial or initial
     if initial >= budget:
-        raise InputError(f"--budget {budget}: is spent on the design of {initial}; raise it, or lower --initial")
+        raise InputError(f"--budget {budget}: the design of {initial} uses it up; raise it, or lower --initial")
     return budget, initial

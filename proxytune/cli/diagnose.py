@@ -1,4 +1,4 @@
-"""`diagnose`: close the loop from a measured log to the effect that the model lacks."""
+"""`diagnose`: find the effect that the model lacks, from a log of measured drives."""
 
 import argparse
 import json
@@ -16,7 +16,7 @@ from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.logs import read_log
-from proxytune.report.diagnosis.document import document, model_file, shown
+from proxytune.report.diagnosis.document import document, model_file, tables_and_notes
 from proxytune.report.diagnosis.figures import diagnosis_figures
 from proxytune.report.writing import save, write_text
 
@@ -33,14 +33,16 @@ SHARES = {
     "confirming on the bullet plant": 0.88,
     "drawing": 0.96,
 }
-"""The share of a diagnosis' time that is usually over when each of its steps begins."""
+"""The share of a diagnosis' time that has usually passed when each of its steps begins."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the log, what is declared and where the findings go."""
     parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder: log.toml and samples.csv")
     parser.add_argument(
-        "--declared", metavar="NAMES", help="effects tuned in any case, as trim,delay [those of θ that the robot has]"
+        "--declared",
+        metavar="NAMES",
+        help="effects tuned in any case, as in trim,delay [the robot's]",
     )
     parser.add_argument(
         "--effects",
@@ -48,8 +50,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="NAMES",
         help="your own effects to try too, as module:Attribute of this folder; plug-ins take part by themselves",
     )
-    parser.add_argument("--robot", metavar="NAME", help="the robot, instead of the one that log.toml names")
-    parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test on [a part of LOG]")
+    parser.add_argument("--robot", metavar="NAME", help="the robot, if not the one in log.toml")
+    parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test on [part of LOG]")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the null distributions [1]")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the findings [diagnosis_LOG]")
 
@@ -63,23 +65,23 @@ def run(arguments: argparse.Namespace) -> Answer:
     declared = declared_effects(robot) if arguments.declared is None else _names(arguments.declared)
     test = read_log(arguments.test) if arguments.test else None
     with Steps(SHARES) as step:
-        found = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=step)
+        diagnosis = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=step)
         folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
         step("drawing")
-        told = document(found)
-        files = _write(found, told, folder)
-    return Answer(told | {"files": files}, Group(shown(found), Text("\n".join(files))))
+        findings = document(diagnosis)
+        files = _write(diagnosis, findings, folder)
+    return Answer(findings | {"files": files}, Group(tables_and_notes(diagnosis), Text("\n".join(files))))
 
 
 def _names(given: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in given.split(",") if name.strip())
 
 
-def _write(found: Diagnosis, told: dict[str, Any], folder: Path) -> list[str]:
-    write_text(folder / "diagnosis.json", json.dumps(told, indent=2, allow_nan=False, ensure_ascii=False))
-    write_text(folder / "model.toml", model_file(found))
-    drawn = []
-    for name, figure in diagnosis_figures(found).items():
+def _write(diagnosis: Diagnosis, findings: dict[str, Any], folder: Path) -> list[str]:
+    write_text(folder / "diagnosis.json", json.dumps(findings, indent=2, allow_nan=False, ensure_ascii=False))
+    write_text(folder / "model.toml", model_file(diagnosis))
+    figures = []
+    for name, figure in diagnosis_figures(diagnosis).items():
         save(figure, folder / f"{name}.png")
-        drawn.append(f"{name}.png")
-    return [str(folder / name) for name in ("diagnosis.json", "model.toml", *drawn)]
+        figures.append(f"{name}.png")
+    return [str(folder / name) for name in ("diagnosis.json", "model.toml", *figures)]

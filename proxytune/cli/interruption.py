@@ -1,4 +1,4 @@
-"""SIGTERM ends a command as Ctrl-C does: what is finished is kept, and its processes end with it."""
+"""SIGTERM ends a command as Ctrl-C does: everything finished is kept, and its processes end too."""
 
 import signal
 from collections.abc import Iterator
@@ -6,16 +6,16 @@ from contextlib import contextmanager
 from types import FrameType
 
 INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
-"""Exit status, as shells and schedulers expect them: 130 and 143."""
+"""Exit statuses that shells and schedulers expect: 130 and 143."""
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, raised where the main thread is."""
+    """SIGTERM was received; raised in the main thread."""
 
 
 @contextmanager
 def sigterm_as_interrupt() -> Iterator[None]:
-    """Let SIGTERM raise Terminated, once: more of them leave the cleaning up alone."""
+    """Raise Terminated at the first SIGTERM; ignore later ones, so that cleaning up is not interrupted."""
     before = signal.signal(signal.SIGTERM, _raise)
     try:
         yield

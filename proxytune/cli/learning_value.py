@@ -1,4 +1,4 @@
-"""`study` with objective = "plv": which proxy is worth most as a teacher."""
+"""`study` with objective = "plv": the proxy whose samples save most on the target."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,8 +16,8 @@ from proxytune.teaching.experiment import open_school, points_of
 from proxytune.teaching.search import PlvSearch, search_space
 
 
-def taught(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[float, float]]]) -> Answer:
-    """Run what is left of a study of learning value, narrowing its box by PRPV first where it asks for that."""
+def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[float, float]]]) -> Answer:
+    """Run what is left of a search by PLV; first narrow the box by PRPV where the study asks for it."""
     settings = study.settings
     school = open_school(settings)
     widths = school.settings.widths
@@ -26,7 +26,7 @@ def taught(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[
     points = points_of(school, school.settings.budget)
     with locked(folder), Store.open(folder) as store, Bars(points, "points of learning curves") as bars:
         search = PlvSearch(settings, school, store, space, bars)
-        found = search.run(make_proposer(settings.engine, settings.initial))
+        result = search.run(make_proposer(settings.engine, settings.initial))
     figure = folder / "figures" / "plv.png"
-    save(plv_figure(found), figure)
-    return Answer({**plv_document(found), "figure": str(figure)}, plv_table(found, {"figure": figure}))
+    save(plv_figure(result), figure)
+    return Answer({**plv_document(result), "figure": str(figure)}, plv_table(result, {"figure": figure}))

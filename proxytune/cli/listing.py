@@ -1,4 +1,4 @@
-"""`list`: the robots, effects, agents, metrics, engines and measures of usefulness there are."""
+"""`list`: the known robots, effects, agents, metrics, engines and measures of usefulness."""
 
 import argparse
 from collections.abc import Callable, Mapping

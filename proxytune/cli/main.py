@@ -17,12 +17,12 @@ from proxytune.errors import InputError, ProxytuneError, RunError
 
 
 class Command(NamedTuple):
-    """A command: the module that does it, loaded only when it is asked for, and what it is told of.
+    """A command: its module, loaded only when it is asked for, and its line in the help.
 
     Attributes:
         module: Its name in this room.
         summary: One line for people.
-        resumes: Whether it goes on where it was interrupted.
+        resumes: Whether it continues where it was interrupted.
     """
 
     module: str
@@ -35,24 +35,28 @@ class Command(NamedTuple):
 
 
 COMMANDS: dict[str, Command] = {
-    "study": Command("study", "run or resume a study; safe to repeat", resumes=True),
-    "score": Command("score", "usefulness of proxies from tables of scores"),
-    "sweep": Command("sweep", "usefulness along one parameter", resumes=True),
-    "teach": Command("teach", "learning curves and PLV: what a proxy is worth as a teacher", resumes=True),
-    "measure": Command("measure", "score a study's agents in the domain of a model file"),
-    "record": Command("record", "drive a model file through manoeuvres and write the log"),
-    "diagnose": Command("diagnose", "close the loop: from measured drives to the effect that the model lacks"),
-    "predict": Command("predict", "what a fitted model says of any log"),
-    "compare": Command("compare", "how fast each search engine finds a good theta", resumes=True),
-    "plot": Command("plot", "draw a study's figures again"),
-    "list": Command("listing", "robots, effects, agents, metrics, engines or measures"),
+    "study": Command("study", "run or resume a study: find the θ that makes the simulator most useful", resumes=True),
+    "score": Command("score", "measure how useful a simulator is, from two tables of scores"),
+    "sweep": Command("sweep", "measure usefulness along one parameter", resumes=True),
+    "teach": Command(
+        "teach",
+        "measure PLV (proxy learning value): how much a simulator saves in training",
+        resumes=True,
+    ),
+    "measure": Command("measure", "drive a study's agents in the domain of a model file and write their scores"),
+    "record": Command("record", "drive the domain of a model file through manoeuvres and write the log"),
+    "diagnose": Command("diagnose", "find the effect that the model lacks, from a log of measured drives"),
+    "predict": Command("predict", "predict the poses of a log with a fitted model"),
+    "compare": Command("compare", "compare how fast each search engine finds a good θ", resumes=True),
+    "plot": Command("plot", "draw a study's figures and report again, without simulating"),
+    "list": Command("listing", "list robots, effects, agents, metrics, engines or measures"),
 }
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 
 def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
-    """The command line's grammar, with the options of every command; of the first that these words name, if any."""
+    """The parser, with the options of every command; with words, only of the first command that they name."""
     top = argparse.ArgumentParser(
         prog="python -m proxytune",
         description="Find out how useful a robot simulator is, tune it to the robot, and learn what it still lacks.",
@@ -63,7 +67,7 @@ def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
         if words is None or name == asked:
             COMMANDS[name].load().configure(command)
-        command.add_argument("--json", action="store_true", help="print one JSON document on standard output")
+        command.add_argument("--json", action="store_true", help="print one JSON document instead of text")
     return top
 
 
@@ -71,8 +75,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        0 done, 1 failed, 2 bad input or usage; 130 interrupted (Ctrl-C) and 143 terminated (SIGTERM), with everything
-        finished kept by the commands that can go on.
+        0 done, 1 failed, 2 bad input or usage; 130 interrupted (Ctrl-C) and 143 terminated (SIGTERM): commands that
+        resume keep everything finished.
     """
     words = sys.argv[1:] if argv is None else argv
     arguments = parser(words).parse_args(words)
@@ -85,15 +89,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         return BAD_INPUT if isinstance(problem, InputError) else FAILED
     except KeyboardInterrupt as problem:
         word, status = ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
-        kept = "what was finished is kept, the same command goes on"
-        left = kept if command.resumes else "nothing was written, the same command begins anew"
+        kept = "everything finished is kept; run the same command to continue"
+        left = kept if command.resumes else "nothing was written; run the same command to start again"
         _complain(arguments.command, f"{word}; {left}")
         return status
     return DONE
 
 
 def _print(answer: Answer, as_json: bool) -> None:
-    """Print a command's answer on standard output, of which a reader may have seen enough.
+    """Print a command's answer; a closed pipe is not an error.
 
     Raises:
         RunError: If it cannot be written.
@@ -102,7 +106,7 @@ def _print(answer: Answer, as_json: bool) -> None:
         if as_json:
             print(json.dumps(answer.document, indent=2, allow_nan=False, ensure_ascii=False))
         else:
-            Console().print(answer.shown)
+            Console().print(answer.text)
         sys.stdout.flush()
     except BrokenPipeError:
         _discard_the_rest()
@@ -112,7 +116,7 @@ def _print(answer: Answer, as_json: bool) -> None:
 
 
 def _discard_the_rest() -> None:
-    """What is still in the buffer would raise once more when Python ends."""
+    """Drop what is still in the buffer, which would raise once more when Python ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -1,4 +1,4 @@
-"""`measure`: score a study's agents in the domain of a model file, as a target is measured."""
+"""`measure`: the scores of a study's agents in the domain of a model file, as a target is measured."""
 
 import argparse
 from pathlib import Path
@@ -18,7 +18,7 @@ from proxytune.study.settings import read_study_settings
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study, the model and the table to write."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder: its agents, starts and [domain]")
+    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder, for its agents, starts and [domain]")
     parser.add_argument("--model", type=Path, required=True, metavar="MODEL", help="the model.toml of the domain")
     parser.add_argument("--output", type=Path, required=True, metavar="CSV", help="the score table to write")
     parser.add_argument(
@@ -26,7 +26,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=1,
         metavar="N",
-        help="episodes from every start under other placement noise each, labelled START/REPEAT where N > 1 [1]",
+        help="episodes from every start, each with its own placement noise; labelled START/REPEAT where N > 1 [1]",
     )
     parser.add_argument(
         "--seed", type=int, metavar="N", help=f"seed of the episodes [the study's seed plus {TARGET_OFFSET}]"
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
     if not arguments.output.absolute().parent.is_dir():
-        raise InputError(f"{arguments.output}: its folder does not exist; make it first")
+        raise InputError(f"{arguments.output}: its folder does not exist; create it first")
     with Bars(len(settings.agents) * settings.starts * arguments.repeats) as bars:
         scores = measure(settings, arguments.model, seed, bars, arguments.repeats)
     write_scores(scores, arguments.output)

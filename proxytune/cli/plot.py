@@ -1,4 +1,4 @@
-"""`plot`: draw a study's figures again from study.db, also by other metrics; nothing is simulated."""
+"""`plot`: draw a study's figures again from study.db, also with other metrics; nothing is simulated."""
 
 import argparse
 import re
@@ -28,36 +28,36 @@ RESCORED = "rescored"
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study, and other metrics."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder, also while the study runs")
+    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder; the study may still be running")
     parser.add_argument(
         "--metric",
         action="append",
         default=[],
         metavar="NAME:max|min[:TOLERANCE]",
-        help="score every trial and sweep by this instead of the study's metrics; repeat it for several; figures and"
-        f" report go to PATH/{RESCORED}/METRICS, the study's own stay as they are",
+        help="score every trial and sweep with this instead of the study's metrics; repeat for several; figures and"
+        f" report go to PATH/{RESCORED}/METRICS and the study's own stay unchanged",
     )
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """Draw the study's figures, the report and every finished sweep; by other metrics into a folder of their own."""
+    """Draw the study's figures, the report and every finished sweep; with other metrics into a separate folder."""
     metrics = [Metric.parse(text) for text in arguments.metric]
     opened = open_study(arguments.path)
     with Store.read(opened.settings.folder) as store:
-        result, curves = _found(StudyRun(as_stored(opened, store), store), metrics)
+        result, curves = _read(StudyRun(as_stored(opened, store), store), metrics)
     folder = _folder(opened.settings.folder, metrics)
     figures = draw_curves(curves, folder / "figures")
     document: dict[str, Any] = {}
     if result:
-        drawn, report = draw(result, folder)
-        figures = [*drawn, *figures]
+        own_figures, report = draw(result, folder)
+        figures = [*own_figures, *figures]
         document = {**study_document(result), "report": str(report)}
     paths = [str(path) for path in figures]
     files = Text("\n".join([*paths, *([document["report"]] if result else [])]))
     return Answer({**document, "figures": paths}, _by_other_metrics(result, files) if result and metrics else files)
 
 
-def _found(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:
+def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:
     """The study's result, if it has any trial or no sweep either, and its curves."""
     curves = all_curves(run.of(with_metrics(run.study, metrics)) if metrics else run)
     if curves and not run.store.trials(run.study.objective.name):
@@ -66,12 +66,12 @@ def _found(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None
 
 
 def _folder(study: Path, metrics: Sequence[Metric]) -> Path:
-    """Where figures go: another folder for every other choice of metrics."""
+    """Where figures go: a folder for each choice of metrics."""
     names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
     return study / RESCORED / "+".join(names) if names else study
 
 
 def _by_other_metrics(result: StudyResult, files: Text) -> RenderableType:
     named = ", ".join(str(metric) for metric in result.study.settings.metrics)
-    note = f"scored by {named}; nothing simulated, and the trials are still those that the study's own metrics led to"
+    note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"
     return Group(study_table(result, note, {}), files)

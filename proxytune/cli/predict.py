@@ -1,4 +1,4 @@
-"""`predict`: what a fitted model says of any log."""
+"""`predict`: the poses of a log, predicted by a fitted model."""
 
 import argparse
 from dataclasses import replace
@@ -33,24 +33,24 @@ def run(arguments: argparse.Namespace) -> Answer:
     model, log = read_model(arguments.model, catalogue), read_log(arguments.log)
     table = predict(log, _robot(model, log, catalogue), model.theta, arguments.horizon)
     write_text(arguments.output, table.to_csv(index=False))
-    found = agreement(table, log, arguments.horizon)
+    rmse = agreement(table, log, arguments.horizon)
     document = {
         "predictions": str(arguments.output),
         "rows": len(table),
-        "windows": found.windows,
+        "windows": rmse.windows,
         "horizon_s": arguments.horizon,
         "error": {
-            "value": found.place,
+            "value": rmse.place,
             "unit": "m",
-            "heading": found.turn,
+            "heading": rmse.turn,
             "heading_unit": "rad",
-            "poses": found.poses,
+            "poses": rmse.poses,
         },
     }
     error = (
-        f"RMSE {1e3 * found.place:.1f} mm, {np.degrees(found.turn):.2f}° over {found.poses} poses"
-        if found.poses
-        else "no measured pose lasts a window"
+        f"RMSE {1e3 * rmse.place:.1f} mm, {np.degrees(rmse.turn):.2f}° over {rmse.poses} poses"
+        if rmse.poses
+        else "no drive has measured poses over a whole window"
     )
     return Answer(
         document, Text(f"{document['windows']} windows of {arguments.horizon:g} s: {error}\n{arguments.output}")

@@ -1,4 +1,4 @@
-"""`record`: logs of a domain instance, driven through manoeuvres and measured."""
+"""`record`: the log of a simulated domain that is driven through manoeuvres."""
 
 import argparse
 from pathlib import Path
@@ -17,12 +17,12 @@ from proxytune.study.settings import read_study_settings
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study, the model and the log to write."""
-    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder: its [domain]")
-    parser.add_argument("--model", type=Path, required=True, metavar="MODEL", help="the model.toml that drives")
+    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder, for its [domain]")
+    parser.add_argument("--model", type=Path, required=True, metavar="MODEL", help="the model.toml of the domain")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="the log's folder to write")
     parser.add_argument("--repeats", type=int, default=2, metavar="N", help="drives of each manoeuvre [2]")
     parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="length of a drive [60 s]")
-    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of sizes, starts and noise [1]")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of manoeuvres, starts and noise [1]")
 
 
 def run(arguments: argparse.Namespace) -> Answer:
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         raise InputError(f"--model {arguments.model}: no such file; check the path")
     family = load_family(settings, arguments.model)
     if not isinstance(family, LaneFollowing):
-        raise InputError(f"{settings.folder}: only the lane-following family can be recorded")
+        raise InputError(f"{settings.folder}: only the lane-following family can be recorded; give another study")
     sizes = {"repeats": arguments.repeats, "seconds": arguments.seconds, "seed": arguments.seed}
     with Console(stderr=True).status("driving"):
         log = record(family, name=arguments.output.name, **sizes)

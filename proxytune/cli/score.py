@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="CSV[:DOMAIN]",
-        help="scores in the proxy; repeat it, or give a file of several domains, to rank proxies",
+        help="scores in the proxy; repeat it, or give a file with several domains, to rank proxies",
     )
     parser.add_argument("--target", required=True, metavar="CSV[:DOMAIN]", help="scores on the target")
     parser.add_argument(
@@ -32,13 +32,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="NAME:max|min[:TOLERANCE]",
-        help="a column to compare agents by, its better direction, and what difference is still a tie (0.5 or 5%%)",
+        help="a column to compare agents by, whether higher or lower is better, and the largest tie (0.5 or 5%%)",
     )
     parser.add_argument(
-        "--beta", action="append", default=[], metavar="NAME:WEIGHT", help="weight of a metric in PPV [1/its spread]"
+        "--beta",
+        action="append",
+        default=[],
+        metavar="NAME:WEIGHT",
+        help="its weight in PPV, the proxy predictivity value [1/spread]",
     )
     parser.add_argument(
-        "--unpaired", action="store_true", help="episodes of the same label have nothing in common (default: the start)"
+        "--unpaired", action="store_true", help="treat episodes with equal labels as unrelated [as the same start]"
     )
     parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
     parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")
@@ -57,22 +61,24 @@ def run(arguments: argparse.Namespace) -> Answer:
         proxies = {name: table.unpaired() for name, table in proxies.items()}
     beta = _weights(arguments.beta)
     sampling = {"resamples": arguments.resamples, "seed": arguments.seed}
-    found = {
+    assessments = {
         name: assess(proxy=proxy, target=target, metrics=metrics, beta=beta, **sampling)
         for name, proxy in proxies.items()
     }
-    figures = _draw(found, arguments.output) if arguments.output else []
+    figures = _draw(assessments, arguments.output) if arguments.output else []
     head = {"target": target_name, "figures": figures}
-    if len(found) == 1:
-        name, assessment = next(iter(found.items()))
-        shown = measures(assessment, proxy=name, target=target_name)
-        return Answer({"proxy": name, **head, **document_of(assessment)}, shown)
+    if len(assessments) == 1:
+        name, assessment = next(iter(assessments.items()))
+        table = measures(assessment, proxy=name, target=target_name)
+        return Answer({"proxy": name, **head, **document_of(assessment)}, table)
     selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
-    return Answer(head | document_of_ranking(found, selection), ranking(found, selection, target=target_name))
+    return Answer(
+        head | document_of_ranking(assessments, selection), ranking(assessments, selection, target=target_name)
+    )
 
 
 def split_source(source: str) -> tuple[Path, str | None]:
-    """Take FILE or FILE:DOMAIN apart."""
+    """Split FILE or FILE:DOMAIN into its parts."""
     path, colon, domain = source.rpartition(":")
     if not colon or Path(source).exists() or not path:
         return Path(source), None
@@ -88,7 +94,7 @@ def _read_proxies(sources: Sequence[str], target: str, metrics: Sequence[Metric]
     """Every proxy by name: its domain, or its file's name, or what was typed where those are not unique."""
     names = [metric.name for metric in metrics]
     target_path, target_domain = split_source(target)
-    found: dict[str, ScoreTable] = {}
+    proxies: dict[str, ScoreTable] = {}
     for source in sources:
         path, domain = split_source(source)
         tables = {domain: read_scores(path, names, domain)} if domain else read_domains(path, names)
@@ -96,11 +102,11 @@ def _read_proxies(sources: Sequence[str], target: str, metrics: Sequence[Metric]
             tables.pop(target_domain, None)
         for label, table in tables.items():
             name = label or path.stem
-            name = name if name not in found else f"{path}:{label}" if label else str(path)
-            if name in found:
+            name = name if name not in proxies else f"{path}:{label}" if label else str(path)
+            if name in proxies:
                 raise InputError(f"--proxy {source}: is given twice; give each proxy once")
-            found[name] = table
-    return found
+            proxies[name] = table
+    return proxies
 
 
 def _weights(texts: Sequence[str]) -> dict[str, float] | None:
@@ -114,12 +120,12 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
     return weights or None
 
 
-def _draw(found: dict[str, Assessment], folder: Path) -> list[str]:
-    written = []
-    for name, assessment in found.items():
-        suffix = "" if len(found) == 1 else "_" + re.sub(r"[^\w.-]+", "_", name)
+def _draw(assessments: dict[str, Assessment], folder: Path) -> list[str]:
+    figures = []
+    for name, assessment in assessments.items():
+        suffix = "" if len(assessments) == 1 else "_" + re.sub(r"[^\w.-]+", "_", name)
         for kind, figure in (("scatter", scatter(assessment)), ("flipped_pairs", flipped_pairs(assessment.prpv))):
             path = folder / f"{kind}{suffix}.png"
             save(figure, path)
-            written.append(str(path))
-    return written
+            figures.append(str(path))
+    return figures

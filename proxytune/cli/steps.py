@@ -1,4 +1,4 @@
-"""What a command of several steps is doing: a bar with the time left on a terminal, elsewhere a line for each step."""
+"""Progress of a command in several steps: a bar with the time left on a terminal, elsewhere a line per step."""
 
 import time
 from collections.abc import Mapping
@@ -8,13 +8,13 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 
 class Steps:
-    """Takes a line about each step as it begins; use as a context."""
+    """Shows each step as it begins; use as a context."""
 
     def __init__(self, shares: Mapping[str, float]) -> None:
         """Begin with nothing done.
 
         Args:
-            shares: By the beginning of a step's line, the share of the whole time that is usually over when it begins.
+            shares: By how a step's line begins, the share of the whole time that has usually passed by then.
         """
         self._shares = shares
         self._began = time.monotonic()
@@ -40,7 +40,7 @@ class Steps:
         self._bar.stop()
 
     def __call__(self, step: str) -> None:
-        """Say what begins; the bar never goes back."""
+        """Show that a step begins; the bar never goes back."""
         if not self._console.is_terminal:
             self._console.print(f"{time.monotonic() - self._began:.0f} s: {step}", highlight=False, soft_wrap=True)
         share = max((over for begin, over in self._shares.items() if step.startswith(begin)), default=0.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.cli.answer import Answer
-from proxytune.cli.learning_value import taught
+from proxytune.cli.learning_value import search_by_plv
 from proxytune.cli.study_folder import study_folder
 from proxytune.report.study.convergence import convergence
 from proxytune.report.study.document import study_document
@@ -34,7 +34,10 @@ from proxytune.study.study_run import StudyRun
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study."""
     parser.add_argument(
-        "path", type=Path, metavar="PATH", help="a study's folder, or where to put one that travels with proxytune"
+        "path",
+        type=Path,
+        metavar="PATH",
+        help="a study's folder, or where to copy one that comes with proxytune",
     )
 
 
@@ -45,17 +48,17 @@ def run(arguments: argparse.Namespace) -> Answer:
     study = open_study(folder)
     _check_engine(study)
     if study.settings.objective == "plv":
-        return taught(study, folder, lambda: searched(study, folder)[0].knowledge.as_good[1])
-    result, spent = searched(study, folder)
+        return search_by_plv(study, folder, lambda: search_by_prpv(study, folder)[0].knowledge.as_good[1])
+    result, spent = search_by_prpv(study, folder)
     figures, report = draw(result, folder)
     costs = _costs(result, spent, time.perf_counter() - begun)
     document = {**study_document(result), **costs, "figures": [str(path) for path in figures], "report": str(report)}
-    files = {"figure": figures[0], "report": report}
-    return Answer(document, study_table(result, _told(costs), files))
+    files = {"figures": figures[0].parent, "report": report}
+    return Answer(document, study_table(result, _say_costs(costs), files))
 
 
-def searched(study: Study, folder: Path) -> tuple[StudyResult, Spent]:
-    """Search by PRPV from wherever it was left: pre-flight, trials, confirmation; what was found and what it cost."""
+def search_by_prpv(study: Study, folder: Path) -> tuple[StudyResult, Spent]:
+    """Run what is left of pre-flight, trials and confirmation; return the result and what this run cost."""
     settings = study.settings
     episodes = preflight.most_episodes(settings) + confirmation.most_episodes(settings)
     episodes += settings.budget * len(settings.agents) * settings.starts
@@ -63,20 +66,20 @@ def searched(study: Study, folder: Path) -> tuple[StudyResult, Spent]:
         with Bars(episodes) as bars:
             run = StudyRun(study, store, bars)
             _prepare(run)
-            # The pre-flight tells the noise that the proposer is to forgive.
+            # The proposer allows for the noise that the pre-flight measured.
             run_study(run, make_proposer(settings.engine, settings.initial, goal_of(run)))
             confirmation.run_confirmation(run)
         return result_of(run), run.spent
 
 
 def _prepare(run: StudyRun) -> None:
-    """Run the pre-flight and say at once which parameters do nothing: the study may be stopped for that."""
+    """Run the pre-flight and warn at once of parameters without effect, so that the user can stop the study."""
     check_facts(run)
     if line := note_search(run.study, run.store):
         print(f"proxytune study: {line}", file=sys.stderr)
     preflight.run_preflight(run)
-    learnt = preflight.preflight_of(run) if run.spent.episodes else None
-    for warning in learnt.warnings if learnt else ():
+    report = preflight.preflight_of(run) if run.spent.episodes else None
+    for warning in report.warnings if report else ():
         print(f"proxytune study: {warning}", file=sys.stderr)
 
 
@@ -88,23 +91,23 @@ def _check_engine(study: Study) -> None:
 
 
 def draw(result: StudyResult, folder: Path) -> tuple[list[Path], Path]:
-    """Draw the study's figures and the report; their paths."""
-    drawn = {
+    """Draw the study's figures and write its report; return their paths."""
+    figures_by_name = {
         "convergence": convergence,
         "profiles": profiles_figure,
         "evaluations": evaluations_figure,
         "importance": importance_figure,
     }
-    figures = [folder / "figures" / f"{name}.png" for name in drawn]
+    figures = [folder / "figures" / f"{name}.png" for name in figures_by_name]
     report = folder / "report.html"
-    for figure, draw_one in zip(figures, drawn.values(), strict=True):
+    for figure, draw_one in zip(figures, figures_by_name.values(), strict=True):
         save(draw_one(result), figure)
     write_text(report, page(result, figures))
     return figures, report
 
 
 def _costs(result: StudyResult, spent: Spent, total: float) -> dict[str, Any]:
-    """Episodes and seconds of this run; outside of episodes is what is not spent within them, waiting included."""
+    """Episodes and seconds of this run; what is spent outside episodes includes waiting."""
     jobs = result.study.settings.jobs
     return {
         "episodes": {
@@ -120,9 +123,9 @@ def _costs(result: StudyResult, spent: Spent, total: float) -> dict[str, Any]:
     }
 
 
-def _told(costs: dict[str, Any]) -> str:
+def _say_costs(costs: dict[str, Any]) -> str:
     episodes, seconds = costs["episodes"], costs["seconds"]
     return (
-        f"{episodes['run']} episodes run, {episodes['reused']} reused; "
-        f"{seconds['total']:.1f} s, of which {seconds['outside_episodes']:.1f} s outside of episodes"
+        f"{episodes['run']} run, {episodes['reused']} reused; "
+        f"{seconds['total']:.0f} s, of which {seconds['outside_episodes']:.0f} s outside episodes"
     )

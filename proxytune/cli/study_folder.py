@@ -1,4 +1,4 @@
-"""The folder that a PATH means: one that is there, or a copy of a study that travels with the package."""
+"""The folder that a PATH means: an existing one, or a copy of a study that comes with the package."""
 
 import contextlib
 import os
@@ -12,13 +12,13 @@ from proxytune.shipped import shipped
 from proxytune.study.settings import FILE_NAME
 
 MADE = ("study.db*", "study.lock", "figures", "rescored", "teaching", "report.html", "__pycache__")
-"""What running a study adds: not copied."""
+"""What running a study adds; not copied."""
 
 
 def study_folder(path: Path) -> Path:
     """The study's folder, given as itself or as its study.toml.
 
-    Where there is none and its last part names a study that travels with the package, that is copied there.
+    Where there is none and its last part names a study that comes with the package, that study is copied there.
 
     Raises:
         InputError: If there is no such study.
@@ -32,14 +32,14 @@ def study_folder(path: Path) -> Path:
     studies = {home.name: home for home in shipped("studies").iterdir() if (home / FILE_NAME).is_file()}
     if folder.name not in studies:
         hint = nearest(folder.name, studies)
-        raise InputError(f"{folder}: no such folder, and no such study travels with proxytune; {hint}")
+        raise InputError(f"{folder}: no such folder, and no study of that name comes with proxytune; {hint}")
     _copy(studies[folder.name], folder)
-    print(f"copied the study '{folder.name}' that travels with proxytune to {folder}", file=sys.stderr)
+    print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
     return folder
 
 
 def _copy(source: Path, folder: Path) -> None:
-    """Copy whole or not at all."""
+    """Copy the whole folder or nothing."""
     draft = folder.with_name(f".{folder.name}.{os.getpid()}")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

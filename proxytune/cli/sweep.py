@@ -40,29 +40,32 @@ MOST_POINTS = 10_000
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the study, the parameter, and where the others are held."""
+    """Add the study, the parameter, and the values of the others."""
     parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder")
-    parser.add_argument("--parameter", required=True, metavar="NAME", help="what to sweep, or 'all' the study searches")
-    parser.add_argument("--points", type=int, default=13, metavar="N", help="values of the parameter [13]")
+    parser.add_argument(
+        "--parameter", required=True, metavar="NAME", help="the parameter to sweep, or 'all' of the study"
+    )
+    parser.add_argument("--points", type=int, default=13, metavar="N", help="number of values of the parameter [13]")
     parser.add_argument(
         "--at",
         metavar="NAME=VALUE,…|MODEL",
-        help="what the other parameters are held at, or a model.toml that says so [nominal]",
+        help="values of the other parameters, or a model.toml with them [nominal]",
     )
     parser.add_argument(
         "--target-model",
         type=Path,
         metavar="MODEL",
-        help="the target's model.toml, where it is known; adds POD, which replays the same commands in both domains",
+        help="the target's model.toml, if there is one; adds POD (proxy observation discrepancy): the same commands are"
+        " replayed in both domains",
     )
-    parser.add_argument("--output", type=Path, metavar="DIR", help="where the curves go [the study's figures]")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the curves [the study's figures]")
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Simulate what is missing of the sweeps, and draw them."""
     folder = study_folder(arguments.path)
     study = open_study(folder)
-    sweeps, discrepancy = _planned(study, arguments), None
+    sweeps, discrepancy = _plan(study, arguments), None
     if arguments.target_model:
         discrepancy = discrepancy_study(study, arguments.target_model)
         sweeps = [with_target(sweep, arguments.target_model, discrepancy) for sweep in sweeps]
@@ -80,7 +83,7 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
-    """Draw one figure per curve, and two of all that hold the parameters at the same values; their paths."""
+    """Draw one figure per curve, and two of all curves with the same values of the others; return their paths."""
     figures = {curve_name(curve): panels_figure(curve) for curve in curves}
     for base, members in groupby(sorted(curves, key=_base), key=_base):
         together = list({curve.parameter: curve for curve in members}.values())
@@ -94,7 +97,7 @@ def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
 
 
 def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
-    """Write each curve as CSV and as JSON; the paths."""
+    """Write each curve as CSV and as JSON; return the paths."""
     written = []
     for curve in curves:
         texts = {"csv": curve_csv(curve), "json": json.dumps(curve_document(curve), indent=2, allow_nan=False) + "\n"}
@@ -105,7 +108,7 @@ def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
 
 
 def read_base(text: str | None, catalogue: Catalogue = SHIPPED) -> Theta:
-    """What the other parameters are held at: NAME=VALUE pairs, or a model.toml.
+    """The values of the other parameters, from NAME=VALUE pairs or a model.toml.
 
     Raises:
         InputError: If it is neither.
@@ -120,11 +123,11 @@ def read_base(text: str | None, catalogue: Catalogue = SHIPPED) -> Theta:
     except ValueError:
         raise InputError(f"--at {text}: write NAME=VALUE,NAME=VALUE or the path of a model.toml") from None
     if len(base) < len(pairs):
-        raise InputError(f"--at {text}: names a parameter twice")
+        raise InputError(f"--at {text}: names a parameter twice; give each once")
     return base
 
 
-def _planned(study: Study, arguments: argparse.Namespace) -> list[SweepRecord]:
+def _plan(study: Study, arguments: argparse.Namespace) -> list[SweepRecord]:
     if not 2 <= arguments.points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {arguments.points}")
     base = read_base(arguments.at, Catalogue(study.settings.folder.resolve()))

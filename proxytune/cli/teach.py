@@ -1,4 +1,4 @@
-"""`teach`: what a proxy is worth as a teacher: learning curves and PLV."""
+"""`teach`: learning curves and PLV, how many target samples each proxy saves."""
 
 import argparse
 from pathlib import Path
@@ -22,7 +22,7 @@ from proxytune.teaching.predictivity import predictivity
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study."""
     parser.add_argument(
-        "path", type=Path, metavar="PATH", help="a study's folder whose study.toml has a [teaching] table"
+        "path", type=Path, metavar="PATH", help="a study's folder; its study.toml needs a [teaching] table"
     )
 
 
@@ -35,11 +35,11 @@ def run(arguments: argparse.Namespace) -> Answer:
     with locked(folder), Store.open(folder) as store:
         adopt(study, store)
         with Bars(points_of(school, len(proxies)), "points of learning curves") as bars:
-            found = run_experiment(study.settings, school, bars)
+            experiment = run_experiment(study.settings, school, bars)
         agents = len(study.settings.agents) * study.settings.starts
         with Bars(agents * sum(proxy.fixed for proxy in proxies.values())) as bars:
             prpv = predictivity(StudyRun(study, store, bars), proxies)
     figure = folder / "figures" / "teach.png"
-    save(teach_figure(found), figure)
-    document = {**teach_document(found, prpv), "figure": str(figure)}
-    return Answer(document, teach_table(found, prpv, {"figure": figure}))
+    save(teach_figure(experiment), figure)
+    document = {**teach_document(experiment, prpv), "figure": str(figure)}
+    return Answer(document, teach_table(experiment, prpv, {"figure": figure}))

@@ -136,5 +136,5 @@ def lacking_families(study: Study, models: Sequence[Path]) -> tuple[DomainFamily
         InputError: If a model cannot be used, or the proxy has a model already.
     """
     if models and study.settings.proxy:
-        raise study.settings.error("proxy", "is given, and a target cannot have two models; take it out to use --lacks")
+        raise study.settings.error("proxy", "is given, and a target cannot have two models; remove it to use --lacks")
     return tuple(load_family(study.settings, model) for model in models)

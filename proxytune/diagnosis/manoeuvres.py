@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats
-from proxytune.diagnosis.model.fitting import Fit, seen
+from proxytune.diagnosis.model.fitting import Fit, evaluate
 from proxytune.diagnosis.naming.adoption import NATS_APART
 from proxytune.diagnosis.naming.candidates import Candidate
 from proxytune.diagnosis.naming.found import Adopted, Found
@@ -132,7 +132,7 @@ def _clear(model: Fit, shape: Callable[[Floats], Floats], effect: Adopted, rival
     """How clearly a minute of a manoeuvre tells an effect from its rival [nats]."""
     plain = {key: value for key, value in model.theta.items() if key not in effect.names}
     free = tuple(coordinate for coordinate in model.free if coordinate not in effect.free)
-    driven = seen(imagined(model.drives, _driven(shape, model.drives)), plain, free, model.noise)
+    driven = evaluate(imagined(model.drives, _driven(shape, model.drives)), plain, free, model.noise)
     size = np.array([model.theta[coordinate[0]] for coordinate in effect.free])
     own = Candidate(effect.effect, effect.form, effect.free, {n: model.theta[n] for n in effect.names}, (), ())
     one, other = trace_of(driven, own, tuple(size)), trace_of(driven, rival, rival.probes[len(rival.probes) // 2])

@@ -74,7 +74,7 @@ def _write(path: Path, arrays: Arrays) -> None:
             np.savez_compressed(file, allow_pickle=False, **arrays)
         draft.replace(path)
     except OSError as problem:
-        raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room, and run again to go on") from None
+        raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
     finally:
         for left in path.parent.glob(f"{draft.stem}.*"):
             if left == draft or not _is_alive(int(left.suffix[1:])):

@@ -39,4 +39,4 @@ def _whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
             draft.unlink()
         if not isinstance(problem, OSError):
             raise
-        raise RunError(f"{path}: {what}cannot be written ({problem.strerror}); mend that and run again") from None
+        raise RunError(f"{path}: {what}cannot be written ({problem.strerror}); fix that and run again") from None

@@ -45,7 +45,7 @@ def run_episode(family: DomainFamily, episode: Episode) -> Outcome:
         failure = str(problem)
     except Exception as problem:
         if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:
-            raise RunError(f"the machine failed ({type(problem).__name__}: {problem}); run again to go on") from None
+            raise RunError(f"the machine failed ({type(problem).__name__}: {problem}); run again to continue") from None
         failure = f"the domain family raised {type(problem).__name__}: {' '.join(str(problem).split())}"
     return Outcome(episode, metrics, failure, time.perf_counter() - start)
 

@@ -110,5 +110,5 @@ def _told(results: Iterator[Result]) -> Iterator[Result]:
         yield from results
     except BrokenExecutor:
         raise RunError(
-            "a process that ran episodes was killed (out of memory?); run again to go on, perhaps with jobs = 1"
+            "a process that ran episodes was killed (out of memory?); run again to continue, perhaps with jobs = 1"
         ) from None

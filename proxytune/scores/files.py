@@ -108,9 +108,8 @@ def _rows(path: Path, metrics: Sequence[str]) -> list[tuple[int, dict[str, str]]
 
 def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> None:
     if "agent" not in header:
-        raise ScoresError(
-            f"{path}: no column 'agent'; the first line reads '{','.join(header)[:60]}', not columns,by,comma"
-        )
+        remedy = "rename the one that names the agents" if len(header) > 1 else "separate columns by commas"
+        raise ScoresError(f"{path}: no column 'agent'; columns found: {', '.join(header)[:60]}; {remedy}")
     for name in metrics:
         if name not in header:
             others = [column for column in header if column not in LABELS]

@@ -111,7 +111,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
     if path.is_dir():
         raise StoreError(f"{path}: is a folder, not a study's database; move it away")
     uri = f"{path.absolute().as_uri()}?mode={'rwc' if writable else 'ro'}"
-    with told(path):
+    with sqlite_errors_as_store_errors(path):
         connection = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None)
         try:
             _check(connection, path, writable)
@@ -182,8 +182,8 @@ def _cut_off(connection: sqlite3.Connection, path: Path) -> bool:
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
-    """Turn what SQLite complains of into one line with a remedy.
+def sqlite_errors_as_store_errors(path: Path) -> Iterator[None]:
+    """Raise every error of SQLite as one line with a remedy.
 
     Raises:
         StoreError: In place of any sqlite3.Error.
@@ -198,10 +198,10 @@ def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
     code = getattr(problem, "sqlite_errorcode", None) or 0
     match code & 0xFF:
         case sqlite3.SQLITE_FULL:
-            return StoreError(f"{path}: the disk is full; make room and run again, what had been finished is kept")
+            return StoreError(f"{path}: the disk is full; make room and run again, everything finished is kept")
         case sqlite3.SQLITE_IOERR:
             return StoreError(
-                f"{path}: cannot be read or written ({problem}); is the disk full? What is finished is kept"
+                f"{path}: cannot be read or written ({problem}); is the disk full? Everything finished is kept"
             )
         case sqlite3.SQLITE_READONLY | sqlite3.SQLITE_CANTOPEN | sqlite3.SQLITE_PERM:
             return StoreError(

@@ -10,7 +10,7 @@ from typing import Any
 from proxytune.domain import Episode, Outcome
 from proxytune.errors import InputError
 from proxytune.space import Theta
-from proxytune.storage.database import connect, disconnect, told
+from proxytune.storage.database import connect, disconnect, sqlite_errors_as_store_errors
 from proxytune.storage.records import SweepRecord, TrialRecord
 
 FILE_NAME = "study.db"
@@ -218,12 +218,12 @@ class Store:
         return int(connection.execute(query, (identity, theta)).fetchone()[0])
 
     def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-        with told(self.path):
+        with sqlite_errors_as_store_errors(self.path):
             return self._connection.execute(query, values).fetchall()
 
     @contextmanager
     def _transaction(self) -> Iterator[sqlite3.Connection]:
-        with told(self.path):
+        with sqlite_errors_as_store_errors(self.path):
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield self._connection

@@ -51,10 +51,10 @@ class Movement:
             return ""
         name, box = self.interval.name, f"[{self.interval.low:g}, {self.interval.high:g}]"
         if not self.pairs:
-            return f"pre-flight: '{name}' cannot be judged: every agent fails somewhere in {box}; narrow its box"
+            return f"pre-flight: '{name}' cannot be tested: every agent fails somewhere in {box}; narrow its box"
         what = "nothing at all" if self.dead else "no metric beyond noise"
-        remedy = "take it out of [parameters], add agents that depend on it, or widen its box"
-        return f"pre-flight: '{name}' changes {what} from end to end of {box}; {remedy}"
+        remedy = "remove it from [parameters], add agents that depend on it, or widen its box"
+        return f"pre-flight: '{name}' changes {what} across {box}; {remedy}"
 
 
 def judge(interval: Interval, names: Sequence[str], values: Array) -> Movement:

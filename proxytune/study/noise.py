@@ -45,13 +45,13 @@ def noise_of(run: StudyRun) -> Noise:
     pairs = placement_pairs(run)
     if shares_starts(study) and pairs.size:
         return Noise(_shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0 * (1.0 / driven + 1.0 / measured))
-    remedy = "measure the target from the study's own starts, and leave the pre-flight on, to know θ better"
+    remedy = "to know θ better, measure the target from the study's own starts and leave the pre-flight on"
     if study.target.counts.min() >= 2:
         between = _shrunk(np.moveaxis(_apart(study.target.values), 1, 0))
-        caution = f"noise is taken from the spread between the target's episodes, which overstates it; {remedy}"
+        caution = f"noise is estimated from the spread between the target's episodes, which is too large; {remedy}"
         return Noise(between * (1.0 / driven + 1.0 / measured), caution)
     spread = np.ptp(study.target.means, axis=0) * UNKNOWN
-    caution = f"noise is not known, and taken for {UNKNOWN:.0%} of the spread over agents; {remedy}"
+    caution = f"noise is unknown and assumed to be {UNKNOWN:.0%} of the spread between agents; {remedy}"
     return Noise(np.broadcast_to(spread**2, study.target.means.shape), caution)
 
 

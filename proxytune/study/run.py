@@ -140,7 +140,7 @@ def as_stored(study: Study, store: Store) -> Study:
 
 
 def _facts_before(study: Study, store: Store) -> dict[str, Any]:
-    """What the trials in the store were made by; before there was cutting off, nothing was said of it."""
+    """The facts stored with the trials; databases older than cut_off lack that key."""
     before = {key: value for key, value in store.facts().items() if key not in OTHERS}
     return {"cut_off": study.settings.cut_off, **before} if before else {}
 

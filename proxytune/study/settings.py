@@ -177,7 +177,7 @@ def _positive(rules: Section, key: str) -> float | None:
         return None
     value = rules.number(key)
     if value <= 0.0:
-        raise rules.error(key, f"must be above 0, got {value:g}; take it out to have no such rule")
+        raise rules.error(key, f"must be above 0, got {value:g}; remove it to have no such rule")
     return value
 
 

@@ -13,7 +13,7 @@ from proxytune.study.outputs import score_trials
 from proxytune.study.settings import StopRules
 from proxytune.study.study_run import StudyRun
 
-FILE_REMEDY = "raise it or take it out to go on"
+FILE_REMEDY = "raise or remove it to continue"
 
 
 def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
@@ -36,7 +36,7 @@ def out_of_time(seconds: float, rules: StopRules) -> str:
     """What to say where so many seconds are more than the rules allow; empty where they are not."""
     if rules.wall_time_s is None or seconds < rules.wall_time_s:
         return ""
-    return f"episodes have taken {seconds:.3g} s, stop.wall_time_s is {rules.wall_time_s:g}; {FILE_REMEDY}"
+    return f"episodes took {seconds:.3g} s and stop.wall_time_s is {rules.wall_time_s:g}; {FILE_REMEDY}"
 
 
 def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: StopRules) -> str:
@@ -45,8 +45,8 @@ def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: Stop
     if rules.no_improvement is None or gain >= rules.no_improvement * noise:
         return ""
     return (
-        f"no θ is expected to improve {label} by more than {gain:.2g}, where its noise is {noise:.2g} and"
-        f" stop.no_improvement is {rules.no_improvement:g}; lower it or take it out to go on"
+        f"no θ is expected to improve {label} by more than {gain:.2g}; its noise is {noise:.2g} and"
+        f" stop.no_improvement is {rules.no_improvement:g}; lower or remove it to continue"
     )
 
 

@@ -84,7 +84,7 @@ def _truth(settings: StudySettings) -> Theta | None:
     if settings.truth is None:
         return None
     if not settings.truth.is_file():
-        raise settings.error("truth", f"no such file: {settings.truth}; check the path, or take it out")
+        raise settings.error("truth", f"no such file: {settings.truth}; check the path, or remove it")
     known = read_model(settings.truth, Catalogue(settings.folder.resolve())).theta
     return {name: known[name] for name in settings.space.names if name in known}
 

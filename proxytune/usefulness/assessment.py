@@ -15,13 +15,17 @@ from proxytune.usefulness.prpv import Prpv, prpv
 from proxytune.usefulness.resampling import PrpvInterval, bootstrap_prpv
 
 FEW_EPISODES = 5
-PAIRED = "the same label counts as the same start, which leaves few resamples; treat them as unpaired if it is not"
-ONE_START = "an agent has all its episodes from one start: intervals do not say what other starts would give"
-PERFECT = "PRPV is within the noise floor, by the same starts: by PRPV this proxy cannot be told from a perfect one"
+ENOUGH_EPISODES = 10
+PAIRED = "episodes with equal labels are resampled as pairs; use --unpaired if they are not the same starts"
+ONE_START = "all episodes are from one start: the intervals do not say what other starts would give"
+PERFECT = (
+    "PRPV is within the noise floor from the same starts: these episodes show no difference between proxy and target; "
+    "take more starts to see one"
+)
 HALVES = (
-    "PRPV is no higher than what halves of the target's episodes score against each other, but these are other starts "
-    "and half the episodes: that does not show that the proxy is perfect; measure the target at least twice from each "
-    "start (episodes START/REPEAT) to know"
+    "PRPV is no higher than two halves of the target's episodes score against each other; halves hold other starts, "
+    "so this does not show that the proxy is perfect; to know, measure the target at least twice from each start "
+    "(episodes START/REPEAT)"
 )
 
 
@@ -39,7 +43,7 @@ class Assessment:
         mmrv: Mean maximum rank violation per metric.
         intervals: Their bootstrap intervals; None where episodes are not repeated.
         noise_floor: PRPV of the target, or of a domain like it, against itself.
-        chance: PRPV of a proxy that knows nothing.
+        chance: PRPV of a proxy that ranks at random.
         seed: Seed of the resampling.
     """
 
@@ -68,7 +72,7 @@ class Assessment:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is undefined or to be taken with care, in one line each."""
+        """What is undefined or uncertain, in one line each."""
         lines = [*self.ppv.notes, *self.srcc.notes, *self.kendall_tau.notes]
         if self.prpv_interval.reason:
             lines.append(f"no interval: {self.prpv_interval.reason}")
@@ -125,25 +129,23 @@ def _caution(assessment: Assessment) -> list[str]:
 
 
 def _few(assessment: Assessment) -> list[str]:
-    """That starts are few, or else episodes, where there are intervals."""
+    """Warn of few starts or episodes, where there are intervals, and say that equal labels were paired."""
     inputs = assessment.inputs
     episodes, starts = min(inputs.proxy_episodes[0], inputs.target_episodes[0]), inputs.fewest_starts
     if assessment.intervals is None or starts >= FEW_EPISODES:
         return []
     if starts == 1:
         return [ONE_START]
-    pairing = f", the more so as {PAIRED}" if inputs.paired else ""
     what = f"{episodes} episodes" if starts >= episodes else f"{starts} starts"
-    return [f"{what} per agent are few: intervals come out too narrow{pairing}"]
+    few = f"only {what} per agent: the intervals are too narrow; take {ENOUGH_EPISODES} or more"
+    return [few, PAIRED] if inputs.paired else [few]
 
 
 def _level(assessment: Assessment) -> list[str]:
     """Where PRPV lies between chance and the noise floor, as far as anything is shown."""
     lines, floor, random = [], assessment.noise_floor, assessment.chance
     if random.explains:
-        lines.append(
-            f"chance explains as much: a proxy that knows nothing has so low a PRPV with p = {random.p_value:.2g}"
-        )
+        lines.append(f"PRPV is no better than chance: a random ranking scores as low with p = {random.p_value:.2g}")
     if assessment.at_noise_floor:
         lines.append(PERFECT)
     if floor.kind == "halves" and floor.high is not None and assessment.prpv.value <= floor.high:

@@ -1,4 +1,4 @@
-"""Chance: the PRPV of a proxy that knows nothing about which agent is which."""
+"""Chance: the PRPV of a proxy that ranks the agents at random."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Chance:
 
     @property
     def explains(self) -> bool:
-        """Whether a proxy that knows nothing would do as well too often to be ruled out."""
+        """Whether a random ranking does as well too often to be ruled out."""
         return self.p_value >= LEVEL
 
 

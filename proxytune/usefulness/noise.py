@@ -15,8 +15,8 @@ from proxytune.usefulness.resampling import counted_means, draw_counts, in_block
 
 FloorKind = Literal["same starts", "halves", "none"]
 MEANINGS: dict[FloorKind, str] = {
-    "same starts": "target against itself, same starts",
-    "halves": "target against itself, other starts and half the episodes: an upper bound of the noise floor",
+    "same starts": "target against itself from the same starts: what a perfect proxy scores",
+    "halves": "two halves of the target's episodes against each other: an upper bound of the noise floor",
     "none": "target against itself",
 }
 
@@ -51,12 +51,12 @@ class NoiseFloor:
 
     @property
     def title(self) -> str:
-        """What a row or a line of a figure that shows it is to be called."""
+        """Its name in a table or a figure."""
         return "halves" if self.kind == "halves" else "noise floor"
 
     @property
     def meaning(self) -> str:
-        """What it is, in one phrase."""
+        """What it means, in one phrase."""
         return MEANINGS[self.kind]
 
 

@@ -285,7 +285,7 @@ def test_two_clocks_are_told_and_taken_out(tmp_path, capsys):
     assert main(["diagnose", str(folder), "--output", str(tmp_path / "out")]) == 0
     words = " ".join(capsys.readouterr().out.split())
     assert "s after its command; poses are stamped 2.9" in words
-    assert "that was taken out" in words
+    assert "this was corrected" in words
     told = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert told["clocks"]["offset_s"] == pytest.approx(3.0 + TRUTH["delay"] - 0.15, abs=0.02)
     assert [effect["name"] for effect in told["effects"]] == ["yaw_scrub"]

@@ -22,7 +22,10 @@ from planted import planted_log, write_log
 SLOWLY = {"sleep": "0.03"}
 
 
-KEPT, LOST = "what was finished is kept, the same command goes on", "nothing was written, the same command begins anew"
+KEPT, LOST = (
+    "everything finished is kept; run the same command to continue",
+    "nothing was written; run the same command to start again",
+)
 
 
 def ended(process, number, left=KEPT):

@@ -61,10 +61,10 @@ def test_a_mistake_is_one_line_on_standard_error(failing, capsys, problem, statu
 def test_an_interruption_says_whether_the_same_command_goes_on(failing, capsys, monkeypatch):
     failing(KeyboardInterrupt())
     assert main(["list", "robots"]) == 130
-    assert "nothing was written, the same command begins anew" in capsys.readouterr().err
+    assert "nothing was written; run the same command to start again" in capsys.readouterr().err
     monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(resumes=True))
     assert main(["list", "robots"]) == 130
-    assert "what was finished is kept, the same command goes on" in capsys.readouterr().err
+    assert "everything finished is kept; run the same command to continue" in capsys.readouterr().err
 
 
 def test_help_loads_no_library_that_only_commands_need(tmp_path):

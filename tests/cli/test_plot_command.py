@@ -132,8 +132,8 @@ def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own
 def test_people_see_the_best_by_other_metrics_and_where_it_is_drawn(finished, capsys):
     assert main(["plot", str(finished), "--metric", "survival_time:max"]) == 0
     out = " ".join(capsys.readouterr().out.split())
-    assert "wobbly: 7 of 7 trials; best is trial" in out
-    assert "scored by survival_time:max; nothing simulated" in out
+    assert "trials 7 of 7; best: trial" in out
+    assert "none run; scored with survival_time:max" in out
     assert "rescored/survival_time_max/report.html" in out.replace(" ", "")
 
 

@@ -43,7 +43,7 @@ def document(*words):
 def shown(*words):
     console = Console(width=160, record=True, file=None, quiet=False)
     with console.capture() as captured:
-        console.print(run(*words).shown)
+        console.print(run(*words).text)
     return captured.get()
 
 
@@ -106,7 +106,7 @@ def test_the_table_shows_each_measure_its_interval_and_the_notes(tables):
         "1 reversed",
     ):
         assert part in text
-    assert "note: 3 episodes per agent are few" in text
+    assert "note: only 3 episodes per agent" in text
     assert "sim as a proxy of real: 4 agents, 3 proxy episodes and 3 target episodes each" in text
 
 
@@ -139,7 +139,7 @@ def test_halves_are_called_halves_and_repeats_of_the_starts_a_noise_floor(tables
     assert found["at_noise_floor"] is False
     assert found["prpv_interval"] == halves["prpv_interval"]
     text = shown(*base, "twice.csv", *METRIC)
-    assert "target against itself, same starts" in text
+    assert "target against itself from the same" in text
     assert "halves" not in text
     loose = document(*base, "twice.csv", *METRIC, "--unpaired")
     assert (loose["noise_floor_kind"], loose["at_noise_floor"]) == ("halves", None)
@@ -221,4 +221,4 @@ def test_the_pilots_real_duckiebot_is_scored_from_its_episodes():
         "base", "synthetic_tiles", "trim_plus_0.2", "delay_doubled", "blur_0.1", "trim_minus_0.2",
     }  # fmt: skip
     assert all(one["prpv_interval"][0] <= one["prpv"] <= one["prpv_interval"][1] for one in found["proxies"])
-    assert any("2 episodes per agent are few" in note for note in found["proxies"][0]["notes"])
+    assert any("only 2 episodes per agent" in note for note in found["proxies"][0]["notes"])

@@ -31,7 +31,7 @@ def test_people_see_table_1_and_when_a_learner_counts_as_converged(make_study, c
     folder = make_taught(make_study)
     assert main(["teach", str(folder)]) == 0
     said = capsys.readouterr().out
-    for words in ("zero-shot", "target samples", "PLV", "reduction", "none", "right", "converged: a mean score"):
+    for words in ("zero-shot", "PLV (proxy learning value)", "reduction", "none", "right", "converged: the mean score"):
         assert words in said
 
 

@@ -157,7 +157,7 @@ def limited(limit):
     return {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))}
 
 
-FULL = r"cannot be read or written \(disk I/O error\); is the disk full\? What is finished is kept"
+FULL = r"cannot be read or written \(disk I/O error\); is the disk full\? Everything finished is kept"
 
 
 @pytest.mark.parametrize("limit", [pytest.param(64, marks=slow), pytest.param(40_000, marks=slow), 120_000])
@@ -184,7 +184,7 @@ def test_figures_and_report_on_a_full_disk_are_told_and_the_old_ones_stay(finish
     for command in ("study", "plot"):
         told = run(command, finished, status=1, **limited(limit))
         what = "the figure " if name.endswith("png") else ""
-        place = f"{finished / name}: {what}cannot be written (File too large); mend that and run again"
+        place = f"{finished / name}: {what}cannot be written (File too large); fix that and run again"
         assert told == f"proxytune {command}: {place}\n"
         assert (trials(finished), episodes(finished)) == known
         assert drawn(finished) == before
@@ -224,7 +224,7 @@ def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_writte
     assert refused(capsys, 1, "study", folder / "study.toml") == f"proxytune study: {line}"
     told = refused(capsys, 1, "sweep", folder, "--parameter", "trim", "--points", "2")
     assert told == f"proxytune sweep: {line}"
-    figure = f"{folder / 'figures' / 'convergence.png'}: the figure cannot be written ({why}); mend that and run again"
+    figure = f"{folder / 'figures' / 'convergence.png'}: the figure cannot be written ({why}); fix that and run again"
     assert refused(capsys, 1, "plot", folder) == f"proxytune plot: {figure}\n"
     assert (folder / "study.db").read_bytes() == before
     elsewhere = shutil.copytree(folder, folder.parent / "elsewhere")
@@ -261,5 +261,5 @@ def test_a_lowered_budget_keeps_what_is_finished_and_says_so(finished, make_stud
     make_study("study", budget="3")
     assert main(["study", str(finished)]) == 0
     out = " ".join(capsys.readouterr().out.split())
-    assert "stopped: the budget of 3 trials is spent; all 7 that are finished count" in out
+    assert "ended: the budget of 3 trials is spent; all 7 that are finished count" in out
     assert (trials(finished), episodes(finished)) == before

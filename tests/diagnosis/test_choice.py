@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.model.coordinates import at_edge
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.naming.candidates import candidates
 from proxytune.diagnosis.naming.choice import best_of
 from proxytune.diagnosis.naming.round import Round
@@ -29,12 +29,12 @@ def drives():
 
 def chosen(drives, *tried):
     """What is chosen of effects, each with its values and its gain."""
-    model = seen(drives, TRUTH, DECLARED, NOISE)
+    model = evaluate(drives, TRUTH, DECLARED, NOISE)
     fits = {}
     for label, values, gain in tried:
         form = FORMS[label]
         lead = Lead(form, form.probes[0], form.probes[0], gain, gain, 0.002, np.ones(3))
-        fits[label] = (lead, seen(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
+        fits[label] = (lead, evaluate(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
     best = best_of(model, Round([], fits, (), []), 15.0)
     return best and best.lead.candidate.label
 

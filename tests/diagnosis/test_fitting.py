@@ -13,7 +13,7 @@ from planted import DECLARED, NOISE, ROBOT, TRUTH, fitted, planted_drives
 
 from proxytune.diagnosis.model import fitting
 from proxytune.diagnosis.model.coordinates import placed, span
-from proxytune.diagnosis.model.fitting import Fit, by_block, fit, loss_of, predictive, renoised, seen, slopes
+from proxytune.diagnosis.model.fitting import Fit, by_block, evaluate, fit, loss_of, predictive, renoised, slopes
 from proxytune.diagnosis.model.innovations import Whitener, whitener
 from proxytune.diagnosis.model.intervals import intervals
 from proxytune.diagnosis.model.replay import increments
@@ -132,7 +132,7 @@ def test_the_fitted_model_loses_least(found):
 def test_the_same_model_with_other_noise_keeps_its_parameters(found):
     louder = renoised(found, NOISE)
     assert (louder.theta, louder.free, louder.noise) == (found.theta, found.free, NOISE)
-    assert seen(found.drives, found.theta, found.free, NOISE).innovations == pytest.approx(louder.innovations)
+    assert evaluate(found.drives, found.theta, found.free, NOISE).innovations == pytest.approx(louder.innovations)
 
 
 def linear(drives, columns=2, seed=4):

@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import TURNING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.model.innovations import FIRST_GUESS
 from proxytune.diagnosis.naming.found import Adopted, Found
 from proxytune.diagnosis.remainder.learning import Learning, learn
@@ -20,7 +20,7 @@ WRONG = Adopted("saturation", "", ("saturation.limit",), (), 100.0, 0.001, ())
 
 
 def found(drives, names, adopted=()):
-    declared, model = (seen(drives, theta, (), FIRST_GUESS) for theta in (TRUTH, {**TRUTH, **names}))
+    declared, model = (evaluate(drives, theta, (), FIRST_GUESS) for theta in (TRUTH, {**TRUTH, **names}))
     return Found(declared, model, adopted, (), (), ())
 
 

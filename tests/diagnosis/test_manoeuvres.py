@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import DECLARED, NOISE, ROBOT, TRUTH, driven_log, drives_of
 
 from proxytune.diagnosis.manoeuvres import LIBRARY, imagined, next_manoeuvre
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.model.replay import increments
 from proxytune.diagnosis.naming.adoption import NATS_APART
 from proxytune.diagnosis.naming.candidates import candidates
@@ -36,8 +36,8 @@ def found(drives, effect, *rivals):
     forms = {form.effect: form for form in candidates(ROBOT, TRUTH, ()) if not form.form}
     own = forms[effect]
     adopted = Adopted(effect, "", tuple(SIZES[effect]), own.free, 100.0, 0.002, tuple(forms[name] for name in rivals))
-    declared = seen(drives, TRUTH, DECLARED, NOISE)
-    model = seen(drives, theta, (*DECLARED, *own.free), NOISE)
+    declared = evaluate(drives, TRUTH, DECLARED, NOISE)
+    model = evaluate(drives, theta, (*DECLARED, *own.free), NOISE)
     return Found(declared, model, (adopted,), (), (), ())
 
 

@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.horizon.windows import Ratio
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.naming.found import Adopted, Found, Variant, lacking
 from proxytune.diagnosis.naming.materiality import MATERIAL, Weighed, without_immaterial, worth
 
@@ -24,8 +24,8 @@ def adopted(effect, free=(), names=()):
 
 def found(drives, theta, *effects):
     free = DECLARED + tuple(coordinate for effect in effects for coordinate in effect.free)
-    declared = seen(drives, TRUTH, DECLARED, NOISE)
-    return Found(declared, seen(drives, theta, free, NOISE), effects, (), (), ())
+    declared = evaluate(drives, TRUTH, DECLARED, NOISE)
+    return Found(declared, evaluate(drives, theta, free, NOISE), effects, (), (), ())
 
 
 @pytest.fixture(scope="module")

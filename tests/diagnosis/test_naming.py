@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.naming.found import Adopted, Found
 from proxytune.diagnosis.naming.names import names as naming
 
@@ -20,7 +20,7 @@ SLIP, SCRUB = (Adopted(name, "", (name,), ((name,),), 60.0, 0.002, ()) for name 
 
 @pytest.fixture(scope="module")
 def base():
-    return seen(planted_drives(MIXED, episodes=6, seconds=20.0), TRUTH, DECLARED, NOISE)
+    return evaluate(planted_drives(MIXED, episodes=6, seconds=20.0), TRUTH, DECLARED, NOISE)
 
 
 def searching(answers, asked):
@@ -31,7 +31,7 @@ def searching(answers, asked):
         effects = tuple(effect for effect in answers if effect.effect not in without)
         theta = {**TRUTH, **{effect.effect: MIXED[effect.effect] for effect in effects}}
         free = DECLARED + tuple(coordinate for effect in effects for coordinate in effect.free)
-        return Found(base, seen(base.drives, theta, free, NOISE), effects, (), (), ())
+        return Found(base, evaluate(base.drives, theta, free, NOISE), effects, (), (), ())
 
     return search
 

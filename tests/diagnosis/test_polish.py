@@ -13,7 +13,7 @@ from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.horizon.polish import HARMS, HELPS, fit_windows, held_out, horizons, polished
 from proxytune.diagnosis.horizon.windows import cut, strays
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.fitting import evaluate
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def drives():
 
 
 def model(drives, **values):
-    return seen(drives, {**TRUTH, **values}, DECLARED, NOISE)
+    return evaluate(drives, {**TRUTH, **values}, DECLARED, NOISE)
 
 
 def squares(drives, theta, horizon_s=2.0):

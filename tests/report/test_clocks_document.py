@@ -51,4 +51,4 @@ def test_what_is_wrong_is_one_sentence_with_what_to_do(found, says):
     assert note.startswith("clocks of yard: ")
     assert says in note
     assert "\n" not in note
-    assert any(word in note for word in ("Stamp both", "Look at", "Keep clocks"))
+    assert any(word in note for word in ("Stamp both", "Check how", "Keep clocks"))

@@ -128,7 +128,11 @@ def test_every_engine_is_in_the_tables_and_in_the_document():
 
 def test_a_verdict_needs_an_interval_clear_of_zero():
     found = summarise(SOBOL, GP, 1.0)
-    cases = {(0.5, 3.0): "in fewer", (-3.0, -0.5): "in more", (-0.5, 3.0): "no fewer"}
+    cases = {
+        (0.5, 3.0): "needs significantly fewer",
+        (-3.0, -0.5): "significantly more",
+        (-0.5, 3.0): "no significantly",
+    }
     for (low, high), expected in cases.items():
         vars_ = {**vars(found), "saved": Estimate(1.0, low, high)}
         assert expected in verdict(type(found)(**vars_))
@@ -139,8 +143,10 @@ def test_the_document_names_the_default_and_gives_every_engine_a_verdict():
     document = compare_document("analytic", summaries, 3, 1.0)
     assert document["default"] == "gp"
     assert [row["verdict"] for row in document["engines"]] == [
-        "is the one that the others are compared with",
-        "reaches the noise floor in fewer evaluations",
+        "is the engine that the others are compared with",
+        "needs significantly fewer evaluations",
     ]
     assert document["engines"][1]["saved"] == {"value": 1.0, "low": 1.0, "high": 1.0}
-    assert compare_lines(summaries)[0] == "gp reaches the noise floor in fewer evaluations than sobol"
+    assert compare_lines(summaries)[0] == (
+        "gp needs significantly fewer evaluations than sobol to reach the noise floor (paired 95 % interval)"
+    )

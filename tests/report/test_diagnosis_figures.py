@@ -101,7 +101,7 @@ def test_axes_say_what_they_show_in_which_unit(figures):
     assert "[nats]" in labels["ranking"][1][0]
     assert [y for _, y in labels["error"]] == ["error of position, RMS [mm]", "error of heading, RMS [deg]"]
     assert all(x == "length of the prediction [s]" for x, _ in labels["error"])
-    assert [y for _, y in labels["effect_curve"]][::2] == ["steady speed [m/s]", "added speed [mm/s]"]
+    assert [y for _, y in labels["effect_curve"]][::2] == ["steady speed [m/s]", "speed − declared [mm/s]"]
     assert [x for x, _ in labels["effect_curve"]][2:] == ["command [duty]"] * 2
 
 

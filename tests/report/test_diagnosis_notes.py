@@ -51,26 +51,28 @@ def test_every_verdict_is_told_with_its_meaning(verdict):
 def test_an_effect_that_was_added_says_what_the_error_is_without_it():
     (note,) = notes(diagnosis(effects=(BAND,), worth={"dead_band": MUCH}))
     assert note == (
-        "added dead_band (left wheel): 900 nats, p = 0.002; without it the error is larger by 34 % (20 to +50) at 2 s"
+        "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
+        "without it the error grows by 34 % (20 to +50) at 2 s"
     )
 
 
 def test_an_effect_that_is_shown_not_to_matter_is_called_immaterial():
     (note,) = notes(diagnosis(immaterial=(SLIP,), worth={"lateral_slip": SURE}))
     assert note == (
-        "detectable but immaterial: lateral_slip 0.0024 s, 75 nats, changes the error at 5 s by 1.0 % (−1.0 to +3.0)"
+        "detectable but immaterial: lateral_slip 0.0024 s, log-likelihood gain 75 nats, "
+        "changes the error at 5 s by 1.0 % (−1.0 to +3.0)"
     )
 
 
 def test_an_effect_that_may_matter_is_not_called_immaterial():
     (note,) = notes(diagnosis(immaterial=(SLIP,), worth={"lateral_slip": LITTLE}))
     assert note.startswith(
-        "not shown to matter: lateral_slip 0.0024 s, 75 nats, changes the error at 5 s by 1.0 % (−5.8"
+        "not shown to matter: lateral_slip 0.0024 s, log-likelihood gain 75 nats, changes the error at 5 s by 1.0 % "
     )
 
 
 def test_an_effect_that_could_not_be_weighed_is_not_shown_to_matter():
-    assert notes(diagnosis(immaterial=(SLIP,))) == ["not shown to matter: lateral_slip, 75 nats"]
+    assert notes(diagnosis(immaterial=(SLIP,))) == ["not shown to matter: lateral_slip, log-likelihood gain 75 nats"]
 
 
 def test_where_noise_is_not_known_a_manoeuvre_is_to_be_driven_ten_times():
@@ -80,8 +82,10 @@ def test_where_noise_is_not_known_a_manoeuvre_is_to_be_driven_ten_times():
     assert note.startswith("to tell noise from what is missing, drive figure-eight 10 times from the same commands")
     rivals = Manoeuvre(name, text, ("a", "b"), 50.0, shape(TIMES), 10)
     lines = notes(diagnosis(manoeuvre=rivals))
-    assert lines[0].startswith("to tell a from b, drive figure-eight (50 nats a minute): ")
+    assert lines[0].startswith("to tell a from b, drive figure-eight (one minute is ample): ")
     assert "10 times" in lines[1]
+    (weak,) = notes(diagnosis(manoeuvre=Manoeuvre(name, text, ("a", "b"), 3.0, shape(TIMES))))
+    assert "(expected gain 3 nats a minute)" in weak
     assert len(notes(diagnosis(manoeuvre=Manoeuvre(name, text, ("a", "b"), 50.0, shape(TIMES))))) == 1
 
 
@@ -102,7 +106,7 @@ def test_a_ratio_is_told_as_what_it_adds():
 
 def test_a_value_at_the_end_of_its_range_is_no_physics():
     lines = notes(diagnosis(effects=(BAND,), at_edge=lambda effect: effect.names))
-    assert "beware: dead_band.width at the end of what can be: it stands for something else" in lines
+    assert "beware: dead_band.width at the end of the range: it probably stands for something else" in lines
 
 
 def test_beside_what_has_no_name_values_are_no_physics_yet():

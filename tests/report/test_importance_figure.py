@@ -6,7 +6,7 @@ import pytest
 from proxytune.report.study.document import study_document
 from proxytune.report.study.importance_figure import importance_figure
 from proxytune.report.study.page import page
-from proxytune.report.study.search_lines import importance_line
+from proxytune.report.study.search_rows import importance_row
 from proxytune.search.knowledge.importance import Importance
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
@@ -41,6 +41,6 @@ def test_the_document_the_table_and_the_page_say_the_same(result):
         "delay": {"share": 0.25, "interval": [0.1, 0.4], "alone": 0.125},
         "trim": {"share": 0.75, "interval": [0.5, 1.0], "alone": 0.5},
     }
-    line = importance_line(result)
-    assert line.endswith(": trim 75% (50 to 100), delay 25% (10 to 40)")
-    assert line.replace("'", "&#x27;") in page(result, [])
+    label, shares = importance_row(result)
+    assert shares.endswith(": trim 0.75 (0.50 to 1.00), delay 0.25 (0.10 to 0.40)")
+    assert f"<td>{label}</td><td>{shares}</td>" in page(result, [])

@@ -10,8 +10,9 @@ from rich.console import Console
 from proxytune.report.study.document import study_document
 from proxytune.report.study.finding import finding_of
 from proxytune.report.study.page import page
-from proxytune.report.study.search_lines import cut_lines, failure_lines, search_lines
-from proxytune.report.study.table import floor_lines, misfit_line, study_table, worth_lines
+from proxytune.report.study.search_rows import cut_rows, failure_rows, search_rows
+from proxytune.report.study.table import INFORMATION, SEARCH, THETA, USEFULNESS, study_table
+from proxytune.report.study.usefulness_table import floor_rows, misfit_row, usefulness_notes, usefulness_rows
 from proxytune.report.study.verdict import sentence
 from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
@@ -100,16 +101,17 @@ def test_the_document_tells_the_floor_s_kind_and_whether_the_proxy_is_as_good_as
 
 def shown(result):
     console = Console(width=300, file=io.StringIO())
-    console.print(study_table(result, "nothing run", {"figure": "convergence.png"}))
+    console.print(study_table(result, "none run", {"figure": "convergence.png"}))
     return console.file.getvalue()
 
 
 def test_the_first_line_is_the_sentence_that_json_has_too_then_the_table(result):
     first, *others = shown(result).splitlines()
     assert first == sentence(finding_of(result)) == study_document(result)["sentence"]
-    titles = [line for line in others if line in ("What is known of θ", "Who tells what of θ", "The search")]
-    assert titles == ["What is known of θ", "Who tells what of θ", "The search"]
+    titles = [line for line in others if line in (THETA, USEFULNESS, INFORMATION, SEARCH)]
+    assert titles == [THETA, USEFULNESS, INFORMATION, SEARCH]
     assert others[2].split()[:2] == ["parameter", "best"]
+    assert others[-2].split() == ["episodes", "none", "run"]
     assert others[-1].rstrip() == "figure: convergence.png"
 
 
@@ -119,41 +121,60 @@ def test_names_are_shown_as_they_are_and_not_taken_for_markup(result):
 
 
 def test_people_see_what_the_proxy_is_worth(result):
-    lines = worth_lines(result)
-    assert any(line.startswith(f"PRPV {result.best.trial.prpv:g} of at most 30, interval ") for line in lines)
-    assert any(line.startswith("chance ") for line in lines)
-    assert failure_lines(result) == []
-    assert search_lines(result)[0].startswith("wobbly: 7 of 7 trials; best is trial ")
+    rows = {label.strip(): rest for label, *rest in usefulness_rows(result)}
+    assert list(rows) == ["PRPV", "halves", "chance", "PPV", "misfit (p)"]
+    value, interval, meaning = rows["PRPV"]
+    assert value == f"{result.best.trial.prpv:g}"
+    assert " to " in interval
+    assert "0 to 30" in meaning
+    assert rows["PPV"][2].startswith("proxy predictivity value")
+    assert failure_rows(result) == []
+    label, text = search_rows(result)[0]
+    assert (label, text.startswith("7 of 7; best: trial ")) == ("trials", True)
 
 
 def test_halves_are_not_called_a_noise_floor(result):
-    (line,) = floor_lines(result.floor)
-    assert line.startswith("halves ")
-    assert "upper bound" in line
-    (line,) = floor_lines(replace(result.floor, kind="same starts", value=5.0, low=1.0, high=9.0))
-    assert line == "noise floor 5 (1 to 9): target against itself, same starts"
-    assert floor_lines(replace(result.floor, value=None)) == []
+    (row,) = floor_rows(result.floor)
+    assert row[0].strip() == "halves"
+    assert "upper bound" in row[3]
+    (row,) = floor_rows(replace(result.floor, kind="same starts", value=5.0, low=1.0, high=9.0))
+    assert row[:3] == ("  noise floor", "5", "1 to 9")
+    assert row[3] == "target against itself from the same starts: what a perfect proxy scores"
+    assert floor_rows(replace(result.floor, value=None)) == []
 
 
 def test_the_floor_of_a_confirmed_study_is_said_to_be_the_proxy_s_own(result):
-    assert not [line for line in worth_lines(result) if "the proxy at the best θ against itself" in line]
-    told = confirmed(result, kind="same starts")
-    assert [line for line in worth_lines(told) if "the proxy at the best θ against itself" in line]
+    assert not [row for row in usefulness_rows(result) if "this one re-run" in row[3]]
+    again = confirmed(result, kind="same starts")
+    assert [row for row in usefulness_rows(again) if "this one re-run" in row[3]]
+
+
+def test_notes_give_no_advice_that_study_cannot_follow(result):
+    assert any("--unpaired" in note for note in result.judged.notes)
+    assert usefulness_notes(result)
+    assert not any("--unpaired" in note for note in usefulness_notes(result))
 
 
 def test_it_is_said_whether_any_theta_explains_the_target(result):
-    assert misfit_line(planted(result)) == "misfit: some θ may explain the target's scores (p = 0.4)"
-    lacking = planted(result, misfit=LACKS)
-    assert misfit_line(lacking) == "misfit: no θ explains the target's scores (p = 0.002)"
-    assert "too few" in misfit_line(planted(result, misfit=UNTOLD))
+    row = misfit_row(planted(result))
+    assert row == ("misfit (p)", "0.4", "", "some θ may explain the target's scores")
+    lacking = misfit_row(planted(result, misfit=LACKS))
+    assert (lacking[1], lacking[3]) == ("0.002", "no θ explains the target's scores")
+    assert "too few" in misfit_row(planted(result, misfit=UNTOLD))[3]
 
 
 def test_how_a_study_came_to_its_end_is_said_and_a_study_under_way_says_nothing(result):
     assert study_document(result)["stopped"] == "the budget of 7 trials is spent"
-    assert "stopped: the budget of 7 trials is spent" in search_lines(result)
+    assert search_rows(result)[0][1].endswith("; ended: the budget of 7 trials is spent")
     under_way = replace(result, stopped="")
     assert study_document(under_way)["stopped"] is None
-    assert not [line for line in search_lines(under_way) if line.startswith("stopped")]
+    assert "ended" not in search_rows(under_way)[0][1]
+
+
+def test_more_trials_than_the_budget_are_not_written_as_a_share_of_it(result):
+    settings = replace(result.study.settings, budget=5)
+    lowered = replace(result, study=replace(result.study, settings=settings))
+    assert search_rows(lowered)[0][1].startswith("7 (budget 5); best: trial ")
 
 
 def test_that_every_parameter_matters_is_said_too(result):
@@ -168,18 +189,21 @@ def test_that_every_parameter_matters_is_said_too(result):
         "noise": 0.5,
         "pairs": 12,
     }
-    assert search_lines(flown)[1] == "pre-flight: every parameter changes the metrics beyond noise"
+    assert search_rows(flown)[1] == ("pre-flight", "every parameter changes some metric beyond noise")
+    still = replace(flown.preflight, movements=(replace(moved, p_value=0.5),))
+    label, warning = search_rows(replace(flown, preflight=still))[1]
+    assert (label, warning.startswith("'trim' changes no metric")) == ("pre-flight", True)
     assert flown.episodes == result.episodes + 144
 
 
 def test_what_was_cut_off_and_saved_is_told(result):
-    assert cut_lines(result) == []
+    assert cut_rows(result) == []
     assert study_document(result)["trials"][0]["cut_off"] is None
     first, *others = result.trials
     cut = replace(first, state="cut", prpv=None, ppv=None, decided=("agent0", "agent2"), bound=12.0, estimate=17.5)
     found = replace(result, trials=(cut, *others), spared=(12, 3.456))
-    (line,) = cut_lines(found)
-    assert line == "cut off: 1 trials that could not be among the best; 12 episodes saved, about 3.46 s of simulation"
+    (row,) = cut_rows(found)
+    assert row == ("stopped early", "1 trial that could not be the best; saved 12 episodes (3.46 s)")
     document = study_document(found)
     assert document["cut_off"] == {"trials": 1, "episodes": 12, "seconds": 3.456}
     assert document["trials"][0]["prpv"] is None
@@ -188,7 +212,7 @@ def test_what_was_cut_off_and_saved_is_told(result):
         "prpv_estimate": 17.5,
         "agents": ["agent0", "agent2"],
     }
-    assert "<td>cut off, at least 12</td>" in page(found, [])
+    assert "<td>stopped early, at least 12</td>" in page(found, [])
     assert found.episodes == result.episodes - 12
 
 
@@ -198,7 +222,7 @@ def test_failed_episodes_are_told_with_the_first_of_them(make_study):
         study_run = StudyRun(open_study(folder), store)
         run_study(study_run, make_proposer("gp", 5))
         result = result_of(StudyRun(open_study(folder), store))
-    head, first, *_ = failure_lines(result)
-    assert head == "6 of 108 episodes failed; the first:"
-    assert first.startswith("  trial 1: agent 'agent3' failed from start 1: ")
+    head, first, *_ = failure_rows(result)
+    assert head == ("failed", "6 of 108 episodes; the first:")
+    assert first[1].startswith("trial 1: agent 'agent3' failed from start 1: ")
     assert study_document(result)["trials"][0]["failed_episodes"] == 1

@@ -75,7 +75,7 @@ def test_a_full_disk_is_no_episode_s_doing(jobs):
 
 
 def test_a_worker_that_is_killed_is_told_in_one_line():
-    with pytest.raises(RunError, match="was killed .out of memory.*; run again to go on") as told:
+    with pytest.raises(RunError, match="was killed .out of memory.*; run again to continue") as told:
         run_all(Wobbly(faults=("agent1:1:dies",)), 2)
     assert "\n" not in str(told.value)
     assert len(run_all(Wobbly(), 2)) == len(EPISODES), "and later ones still run"

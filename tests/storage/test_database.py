@@ -4,7 +4,7 @@ import sqlite3
 import pytest
 
 from proxytune.errors import StoreError
-from proxytune.storage.database import FORMAT, TRIALS_3, connect, disconnect, told
+from proxytune.storage.database import FORMAT, TRIALS_3, connect, disconnect, sqlite_errors_as_store_errors
 
 
 def made(path):
@@ -237,7 +237,10 @@ def test_a_full_disk_is_told_and_what_was_committed_stays(tmp_path):
     (pages,) = connection.execute("PRAGMA page_count").fetchone()
     connection.execute(f"PRAGMA max_page_count = {pages + 2}")
     written = 0
-    with pytest.raises(StoreError, match="the disk is full; make room and run again"), told(path):
+    with (
+        pytest.raises(StoreError, match="the disk is full; make room and run again"),
+        sqlite_errors_as_store_errors(path),
+    ):
         for number in range(10_000):
             connection.execute("INSERT INTO instances VALUES (?, ?, '{}')", (number, f"identity {number}"))
             written += 1

@@ -8,7 +8,7 @@ from stopping import Stopping
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError
 from proxytune.report.study.document import study_document
-from proxytune.report.study.table import fresh_lines
+from proxytune.report.study.usefulness_table import prpv_rows
 from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.search.knowledge.misfit import Misfit
@@ -178,7 +178,8 @@ def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, fi
 
 def test_it_can_be_turned_off(finished):
     spent, found = confirmed(finished, confirm=0)
-    assert (spent.episodes, found.confirmation, fresh_lines(found)) == (0, None, [])
+    assert (spent.episodes, found.confirmation) == (0, None)
+    assert [row[0] for row in prpv_rows(found)] == ["PRPV"]
     assert study_document(found)["best"]["fresh"] is None
 
 
@@ -201,7 +202,7 @@ def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_s
     _, found = confirmed(finished)
     assert found.confirmation.answer.scores == (None,)
     assert found.best.trial == found.confirmation.candidates[0].trial
-    assert fresh_lines(found) == ["fresh episodes: no PRPV, since an agent failed in all of them"]
+    assert prpv_rows(found)[0] == ("PRPV", "–", "", "none on fresh episodes: an agent failed in all of them")
     assert study_document(found)["best"]["fresh"]["prpv"] is None
 
 
@@ -213,16 +214,18 @@ def test_where_failures_stop_the_study_they_stop_it_here(finished):
         run_confirmation(study_run)
 
 
-def test_how_much_was_luck_is_one_line(finished):
+def test_how_much_was_luck_is_in_the_row_of_the_search(finished):
     _, found = confirmed(finished)
     answer = found.confirmation.answer
     lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
-    (line,) = fresh_lines(replace(found, confirmation=replace(found.confirmation, answer=lucky)))
-    assert f"on fresh episodes PRPV {answer.assessment.prpv.value}, interval " in line
-    assert ": 4 of it was luck" in line
+    fresh, searched = prpv_rows(replace(found, confirmation=replace(found.confirmation, answer=lucky)))
+    assert fresh[:2] == ("PRPV", str(answer.assessment.prpv.value))
+    assert "; fresh episodes" in fresh[3]
+    assert searched[:2] == ("  in search", str(found.best.assessment.prpv.value))
+    assert searched[3].startswith("4 lower by luck")
     unlucky = replace(answer, scores=(int(answer.trial.prpv),))
-    (line,) = fresh_lines(replace(found, confirmation=replace(found.confirmation, answer=unlucky)))
-    assert ": it was not luck" in line
+    _, searched = prpv_rows(replace(found, confirmation=replace(found.confirmation, answer=unlucky)))
+    assert searched[3].startswith("no optimism")
 
 
 def test_the_document_has_the_answer_and_every_candidate(finished):

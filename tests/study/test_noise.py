@@ -78,7 +78,7 @@ def test_any_other_table_works_and_says_what_it_loses(finished, edit):
     assert not shares_starts(found.study)
     (caution,) = found.cautions
     assert caution.startswith("noise is ")
-    assert caution.endswith("to know θ better")
+    assert "; to know θ better, measure the target" in caution
     assert found.best.trial in found.trials
     for low, high in found.knowledge.intervals.values():
         assert low < high
@@ -90,7 +90,7 @@ def test_the_spread_between_starts_is_taken_for_noise_only_where_nothing_better_
         known = noise_of(StudyRun(opened(folder, store), store))
         unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), store))
     assert known.caution == ""
-    assert unknown.caution.startswith("noise is taken from the spread between the target's episodes")
+    assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 
 def test_failed_episodes_of_the_pre_flight_are_left_out(make_study):

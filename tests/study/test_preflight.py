@@ -138,7 +138,7 @@ def test_where_every_agent_fails_everywhere_it_says_so_once_and_of_what(make_stu
     (warning,) = found.warnings
     assert warning.startswith("pre-flight: every agent fails everywhere, first with: agent 'agent0'")
     assert warning.endswith("; correct it")
-    assert all(not movement.pairs and "cannot be judged" in movement.warning for movement in found.movements)
+    assert all(not movement.pairs and "cannot be tested" in movement.warning for movement in found.movements)
 
 
 def test_where_failures_stop_the_study_they_stop_it_here(make_study):
@@ -149,8 +149,8 @@ def test_where_failures_stop_the_study_they_stop_it_here(make_study):
 def test_what_is_wrong_with_a_parameter_and_what_to_do_is_one_line(planted):
     _, found = run(planted())
     dead, noise_sized = found.warnings
-    assert dead.startswith("pre-flight: 'dead' changes nothing at all from end to end of [0, 1]; take it out of")
-    assert noise_sized.startswith("pre-flight: 'noise_sized' changes no metric beyond noise from end to end of [0, 1]")
+    assert dead.startswith("pre-flight: 'dead' changes nothing at all across [0, 1]; remove it from")
+    assert noise_sized.startswith("pre-flight: 'noise_sized' changes no metric beyond noise across [0, 1]")
 
 
 def test_a_parameter_that_is_only_one_more_source_of_noise_is_said_to_matter_in_at_most_one_case_in_twenty():

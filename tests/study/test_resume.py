@@ -75,7 +75,7 @@ def stop(process, number):
         assert status == -signal.SIGKILL
     else:
         expected, word = TOLD[number]
-        line = f"proxytune study: {word}; what was finished is kept, the same command goes on\n"
+        line = f"proxytune study: {word}; everything finished is kept; run the same command to continue\n"
         assert (status, printed) == (expected, line)
 
 
@@ -160,7 +160,7 @@ def test_ctrl_c_ends_with_130_one_line_and_no_process_left(make_study, jobs):
     out, told = process.communicate(timeout=60)
     assert process.returncode == 130
     assert out == ""
-    assert told == "proxytune study: interrupted; what was finished is kept, the same command goes on\n"
+    assert told == "proxytune study: interrupted; everything finished is kept; run the same command to continue\n"
     assert 25 <= finished_episodes(folder) < EPISODES
     assert not (folder / "study.lock").exists()
 
@@ -174,7 +174,7 @@ def test_sigterm_ends_with_143_one_line_and_no_process_left(make_study, send):
     send(process.pid, signal.SIGTERM)
     out, told = process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
     assert (process.returncode, out) == (143, "")
-    assert told == "proxytune study: terminated; what was finished is kept, the same command goes on\n"
+    assert told == "proxytune study: terminated; everything finished is kept; run the same command to continue\n"
     assert 25 <= finished_episodes(folder) < EPISODES
     assert not (folder / "study.lock").exists()
 

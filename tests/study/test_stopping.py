@@ -40,8 +40,8 @@ def test_a_study_under_way_is_not_stopped(finished):
 
 
 RULES = {
-    "time": ({"wall_time_s": NEVER}, 1, "s, stop.wall_time_s is 1e-09; raise it or take it out to go on"),
-    "no gain": ({"no_improvement": ALWAYS}, 5, "stop.no_improvement is 1e+09; lower it or take it out to go on"),
+    "time": ({"wall_time_s": NEVER}, 1, "s and stop.wall_time_s is 1e-09; raise or remove it to continue"),
+    "no gain": ({"no_improvement": ALWAYS}, 5, "stop.no_improvement is 1e+09; lower or remove it to continue"),
 }
 
 

@@ -82,7 +82,7 @@ BAD = {
         {"stop": "{ wall_time = 5 }"},
         "stop.wall_time: unknown key; did you mean 'wall_time_s'",
     ),
-    "no time at all": ({"stop": "{ wall_time_s = 0 }"}, "stop.wall_time_s: must be above 0, got 0; take it out"),
+    "no time at all": ({"stop": "{ wall_time_s = 0 }"}, "stop.wall_time_s: must be above 0, got 0; remove it"),
     "a negative gain": ({"stop": "{ no_improvement = -1 }"}, "stop.no_improvement: must be above 0, got -1"),
     "a word for a flag": ({"preflight": '"no"'}, "preflight: must be true or false, without quotes, got 'no'"),
     "less than no repetition": ({"confirm": "-1"}, "confirm: must be between 0 and 1000, got -1"),

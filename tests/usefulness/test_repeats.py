@@ -116,6 +116,6 @@ def test_more_repeats_of_the_same_starts_make_no_interval_narrower():
 def test_starts_and_not_repeats_are_counted_as_few():
     values = np.random.default_rng(0).normal(size=(4, 12))
     found = assess(proxy=table(values, labelled(3, 4)), target=table(values, labelled(3, 4)), metrics=M)
-    assert any(note.startswith("3 starts per agent are few") for note in found.notes)
+    assert any(note.startswith("only 3 starts per agent") for note in found.notes)
     loose = table(values, labelled(3, 4)).unpaired()
     assert not any("few" in note for note in assess(proxy=loose, target=loose, metrics=M).notes)

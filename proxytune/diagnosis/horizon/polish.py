@@ -23,7 +23,7 @@ from proxytune.diagnosis.horizon.windows import (
 )
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
 from proxytune.diagnosis.model.coordinates import Coordinate, placed, smooth, span
-from proxytune.diagnosis.model.fitting import STEP, Fit, seen
+from proxytune.diagnosis.model.fitting import STEP, Fit, evaluate
 from proxytune.space import Theta
 
 HORIZONS_S = (1.0, 2.0, 5.0)
@@ -191,7 +191,7 @@ def polished(fitted: Fit) -> tuple[Fit, Polish | None]:
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
     polish = Polish(best[1], best[2], _intervals(drives, theta, smooth(fitted.free, drives.robot), windows))
-    return seen(drives, theta, fitted.free, fitted.noise), polish
+    return evaluate(drives, theta, fitted.free, fitted.noise), polish
 
 
 def _intervals(

@@ -69,11 +69,11 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
         theta = _scanned(drives, theta, rough, whiten, SCANS[min(number, len(SCANS) - 1)])
         theta = _fit_theta(drives, theta, sloped, whiten)
         noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
-    return seen(drives, theta, free, noise)
+    return evaluate(drives, theta, free, noise)
 
 
-def seen(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise) -> Fit:
-    """A model with its noise as these drives show it, nothing fitted."""
+def evaluate(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise) -> Fit:
+    """Residuals of fixed parameters on these drives; nothing is fitted."""
     whiten = whitener(drives, noise)
     left = whiten.whiten(drives.measured - increments(drives, theta))
     return Fit(drives, theta, free, noise, whiten, left, slopes(drives, theta, free, whiten))
@@ -81,7 +81,7 @@ def seen(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Nois
 
 def renoised(fitted: Fit, noise: Noise) -> Fit:
     """The same model with another noise."""
-    return seen(fitted.drives, fitted.theta, fitted.free, noise)
+    return evaluate(fitted.drives, fitted.theta, fitted.free, noise)
 
 
 def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:

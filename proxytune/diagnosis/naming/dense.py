@@ -9,7 +9,7 @@ import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.coordinates import placed, span
-from proxytune.diagnosis.model.fitting import Fit, seen
+from proxytune.diagnosis.model.fitting import Fit, evaluate
 from proxytune.diagnosis.model.innovations import HUBER, clipped
 from proxytune.diagnosis.model.replay import increments
 from proxytune.diagnosis.naming.candidates import Candidate
@@ -42,7 +42,7 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     if not dense:
         return list(forms)
     part = part_of(base.drives)
-    left = _left_by(seen(part, base.theta, base.free, base.noise))
+    left = _left_by(evaluate(part, base.theta, base.free, base.noise))
     best = {form.effect: _best(left, form) for form in dense}
     return [replace(form, probes=(*form.probes, *best.get(form.effect, ()))) for form in forms]
 

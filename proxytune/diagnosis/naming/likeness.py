@@ -7,7 +7,7 @@ import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.model.coordinates import Coordinate, span
-from proxytune.diagnosis.model.fitting import KEPT_SOLVABLE, Fit, seen, slopes
+from proxytune.diagnosis.model.fitting import KEPT_SOLVABLE, Fit, evaluate, slopes
 from proxytune.diagnosis.model.innovations import HUBER, clipped
 
 GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
@@ -42,7 +42,7 @@ def two_robots(drives: Drives, model: Fit) -> Unlike | None:
     Effects of one robot that a model lacks spread the drives' gains too, but do not leave a gap between two groups.
     """
     neutral = {name: model.theta.get(name, 1.0) for (name,) in GAINS}
-    whole = seen(drives, {**model.theta, **neutral}, (), model.noise)
+    whole = evaluate(drives, {**model.theta, **neutral}, (), model.noise)
     episodes = np.unique(drives.episode)
     if len(episodes) < 2 * LEAST_DRIVES:
         return None

@@ -32,7 +32,7 @@ def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -
         ],
     )
     soon = _table(
-        "evaluations to the noise floor",
+        "evaluations needed to reach the noise floor",
         ("reached", "median", f"{first.engine}'s share", f"saved by {first.engine}"),
         [
             (one.engine, _of(one.reached, one.seeds), needed(one.evaluations, budget), *_paired(one))
@@ -77,20 +77,21 @@ def _table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) 
 def compare_lines(summaries: Sequence[EngineSummary]) -> list[str]:
     """What the comparison says, one line per rival of the first, and how to read the tables."""
     first = summaries[0].engine
-    lines = [f"{first} {verdict(one)} than {one.engine}" for one in summaries[1:]]
-    how = "with 95 % bootstrap intervals over seeds: means of scores and of pairs of one seed, medians of the others"
+    reach = "to reach the noise floor (paired 95 % interval)"
+    lines = [f"{first} {verdict(one)} than {one.engine} {reach}" for one in summaries[1:]]
+    how = "intervals: 95 % bootstrap over seeds; means of scores and of paired differences, medians of the rest"
     return [*lines, how]
 
 
 def verdict(summary: EngineSummary) -> str:
     """Whether the first engine gets to the floor in fewer evaluations than this engine, beyond the paired interval."""
     if summary.saved is None:
-        return "is the one that the others are compared with"
+        return "is the engine that the others are compared with"
     if summary.saved.low > 0.0:
-        return "reaches the noise floor in fewer evaluations"
+        return "needs significantly fewer evaluations"
     if summary.saved.high < 0.0:
-        return "reaches the noise floor in more evaluations"
-    return "reaches the noise floor in no fewer evaluations, beyond the paired interval,"
+        return "needs significantly more evaluations"
+    return "needs no significantly fewer evaluations"
 
 
 def told(estimate: Estimate | None, digits: str) -> str:

@@ -1,4 +1,4 @@
-"""What a diagnosis says of the clocks of a log: as JSON, and in sentences with what to do."""
+"""What a diagnosis says about the clocks of a log: as JSON, and in sentences with what to do."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,7 +9,7 @@ from proxytune.diagnosis.measured.clocks import Clocks, Offset
 def clocks_document(clocks: Sequence[Clocks]) -> dict[str, Any]:
     """The clocks of the log, and under `test` those of the log to test on where that is another."""
     own, *test = clocks
-    told = {
+    own_document = {
         "offset_s": own.offset.value,
         "interval": list(own.offset.interval),
         "latency_s": own.latency.value,
@@ -18,17 +18,17 @@ def clocks_document(clocks: Sequence[Clocks]) -> dict[str, Any]:
         "drives": {name: {"offset_s": one.value, "interval": list(one.interval)} for name, one in own.drives.items()},
         "jumps": [{"drive": jump.drive, "time_s": jump.time_s, "by_s": jump.by_s} for jump in own.jumps],
     }
-    return told | ({"test": clocks_document(test)} if test else {})
+    return own_document | ({"test": clocks_document(test)} if test else {})
 
 
 def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -> list[str]:
-    """What is wrong with the clocks and what to do; that delay and offset are one number, where a delay is told."""
+    """What is wrong with the clocks and what to do; where a delay was fitted, that an offset looks the same."""
     notes = [note for own in clocks for note in (*_whole(own), *_drives(own), *_jumps(own))]
     notes = [f"clocks of {log}: {note}" for note in notes]
     if "delay" in theta:
         notes.append(
-            "delay and an offset between the clocks of commands and poses are one number: the delay told here is the "
-            "robot's only if both were stamped by one clock"
+            "delay and an offset between the clocks of commands and poses are one number: the delay is the "
+            "robot's only if one clock stamped both"
         )
     return notes
 
@@ -37,22 +37,22 @@ def _whole(clocks: Clocks) -> list[str]:
     if not clocks.offset.value:
         return []
     latency, offset, assumed = clocks.latency, clocks.offset, clocks.assumed_delay_s
-    seen = (
+    lag = (
         f"motion comes {-latency.value:.2f} s before its command, which no robot does"
         if latency.value < 0.0
         else f"motion comes {latency.value:.2f} s after its command"
     )
     early = "early" if offset.value < 0.0 else "late"
     return [
-        f"{seen}; poses are stamped {abs(offset.value):.2f} s too {early} ({_interval(offset)}) if the robot's delay "
-        f"is {assumed:.2f} s; that was taken out. Stamp both with one clock, or move the poses yourself"
+        f"{lag}; poses are stamped {abs(offset.value):.2f} s too {early} ({_interval(offset)}) if the robot's delay "
+        f"is {assumed:.2f} s; this was corrected. Stamp both with one clock, or move the poses yourself"
     ]
 
 
 def _drives(clocks: Clocks) -> list[str]:
     return [
         f"in drive {name} poses are stamped {abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} "
-        f"({_interval(one)}) than in the others; that was taken out. Look at how its clocks were set"
+        f"({_interval(one)}) than in the others; this was corrected. Check how its clocks were set"
         for name, one in clocks.drives.items()
     ]
 

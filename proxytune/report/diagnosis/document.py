@@ -29,8 +29,8 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "robot": diagnosis.robot.name,
         "verdict": diagnosis.verdict,
         "declared": {name: _estimate(estimate) for name, estimate in diagnosis.declared.items()},
-        "effects": [_added(effect, diagnosis) for effect in diagnosis.effects],
-        "immaterial": [_immaterial(effect, diagnosis) for effect in diagnosis.immaterial],
+        "effects": [_added_document(effect, diagnosis) for effect in diagnosis.effects],
+        "immaterial": [_immaterial_document(effect, diagnosis) for effect in diagnosis.immaterial],
         "extended": {name: _estimate(estimate) for name, estimate in diagnosis.theta.items()},
         "candidates": [
             {"name": tried.effect, "form": tried.form, "held_out_gain": tried.gain, "p_value": tried.p_value}
@@ -70,7 +70,7 @@ def _effect(effect: Adopted, theta: Mapping[str, Estimate], catalogue: Catalogue
     }
 
 
-def _added(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
+def _added_document(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
     worth = _worth(diagnosis.worth.get(effect.effect, {}))
     return _effect(effect, diagnosis.theta, diagnosis.robot.catalogue) | {
         "worth": worth,
@@ -78,14 +78,14 @@ def _added(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
-    """An effect that was dropped: `changes_error_by` is told at the horizon where it matters most."""
+def _immaterial_document(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
+    """An effect that was dropped; `changes_error_by` is for the horizon where it matters most."""
     worth = diagnosis.worth.get(effect.effect, {})
     horizon = decisive(worth) if worth else None
     change = _percent(worth[horizon]) if horizon is not None else {"value": None, "interval": None, "unit": "%"}
-    told = {"nats": effect.gain, "changes_error_by": change["value"], "interval": change["interval"], "unit": "%"}
+    evidence = {"nats": effect.gain, "changes_error_by": change["value"], "interval": change["interval"], "unit": "%"}
     open_ = {"horizon_s": horizon, "may_matter": not worth or may_matter(worth), "worth": _worth(worth)}
-    return _effect(effect, diagnosis.dropped_values, diagnosis.robot.catalogue) | told | open_
+    return _effect(effect, diagnosis.dropped_values, diagnosis.robot.catalogue) | evidence | open_
 
 
 def _worth(worth: Worth) -> dict[str, Any]:
@@ -132,15 +132,15 @@ def _error(error: HorizonError) -> dict[str, Any]:
 
 
 def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    found = diagnosis.manoeuvre
-    if found is None:
+    manoeuvre = diagnosis.manoeuvre
+    if manoeuvre is None:
         return None
     return {
-        "name": found.name,
-        "description": found.description,
-        "tells_apart": list(found.between),
-        "nats_per_minute": found.nats_per_minute,
-        "times": found.times,
+        "name": manoeuvre.name,
+        "description": manoeuvre.description,
+        "tells_apart": list(manoeuvre.between),
+        "nats_per_minute": manoeuvre.nats_per_minute,
+        "times": manoeuvre.times,
     }
 
 
@@ -149,23 +149,21 @@ def model_file(diagnosis: Diagnosis) -> str:
     theta = {name: estimate.value for name, estimate in diagnosis.theta.items()} | dict(diagnosis.learning.theta)
     bounds = {name: estimate.interval for name, estimate in diagnosis.theta.items()}
     catalogue = diagnosis.robot.catalogue
-    known = diagnosis.robot.name in robot_names(catalogue.folder)
-    geometry = {} if known else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
+    in_robots = diagnosis.robot.name in robot_names(catalogue.folder)
+    geometry = {} if in_robots else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
     added = ", ".join(effect.effect for effect in diagnosis.effects) or "nothing"
     comments = (f"{diagnosis.verdict}: fitted to {diagnosis.log}; added to what was declared: {added}",)
     return model_text(Model(diagnosis.robot.name, None, theta, bounds, geometry), comments, catalogue)
 
 
-def shown(diagnosis: Diagnosis) -> Group:
-    """What a person reads."""
+def tables_and_notes(diagnosis: Diagnosis) -> Group:
+    """The diagnosis as `diagnose` prints it: the verdict, tables and notes."""
     parts = [_parameters(diagnosis), _errors(diagnosis), _candidates(diagnosis)]
     return Group(Text(headline(diagnosis), style="bold"), *parts, *(Text(note) for note in notes(diagnosis)))
 
 
 def _parameters(diagnosis: Diagnosis) -> Table:
-    table = _table(
-        "Parameters, fitted", ("parameter", "declared alone", "with what was found", "95 % interval", "unit")
-    )
+    table = _table("Fitted parameters", ("parameter", "declared only", "effects added", "95 % interval", "unit"))
     for name, after in diagnosis.theta.items():
         if name.endswith(".imbalance") and after.value == 0.0:
             continue
@@ -178,7 +176,7 @@ def _parameters(diagnosis: Diagnosis) -> Table:
 
 def _errors(diagnosis: Diagnosis) -> Table:
     table = _table(
-        "Error on drives that were not fitted, RMSE of position [mm] (heading [deg])",
+        "Error on held-out drives: RMSE of position [mm] (heading [deg])",
         ("window", "before", "after", "after / before", "noise floor"),
     )
     confirmed = [(diagnosis.confirmed, ", bullet")] if diagnosis.confirmed else []
@@ -198,7 +196,7 @@ def _millimetres(value: float, interval: tuple[float, float], heading: float) ->
 
 
 def _candidates(diagnosis: Diagnosis) -> Table:
-    table = _table("Effects tried, best first", ("effect", "form", "evidence [nats]", "p"))
+    table = _table("Effects tried, best first", ("effect", "form", "log-likelihood gain [nats]", "p"))
     for tried in diagnosis.found.tried[:8]:
         table.add_row(tried.effect, tried.form, f"{tried.gain:.1f}", f"{tried.p_value:.3f}")
     return table
@@ -208,5 +206,5 @@ def _table(title: str, columns: tuple[str, ...]) -> Table:
     table = Table(title=escape(title), title_justify="left", title_style="bold", box=None, pad_edge=False)
     for column in columns:
         text = column in ("parameter", "unit", "window", "effect", "form")
-        table.add_column(escape(column), justify="left" if text else "right")
+        table.add_column(escape(column), justify="left" if text else "right", overflow="fold")
     return table

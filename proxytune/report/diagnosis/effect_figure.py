@@ -41,13 +41,13 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
         best = next(iter(found.remainder), None)
         return None if best is None else means_figure(diagnosis, best, GROUPS[best.group.name])
     first = found.adopted[0]
-    shown = _shown(first, diagnosis.robot.catalogue)
-    if isinstance(shown, Means):
-        return means_figure(diagnosis, _curve(found.curves, shown.cue), shown.panels)
-    return _wheels_figure(diagnosis) if shown is WheelCurve.STEADY else _steps_figure(diagnosis)
+    kind = _curve_kind(first, diagnosis.robot.catalogue)
+    if isinstance(kind, Means):
+        return means_figure(diagnosis, _curve(found.curves, kind.cue), kind.panels)
+    return _wheels_figure(diagnosis) if kind is WheelCurve.STEADY else _steps_figure(diagnosis)
 
 
-def _shown(effect: Adopted, catalogue: Catalogue) -> WheelCurve | Means:
+def _curve_kind(effect: Adopted, catalogue: Catalogue) -> WheelCurve | Means:
     trace = catalogue.effect(effect.effect).trace
     return trace.shown_in(effect.form) if trace else WheelCurve.STEP
 
@@ -70,7 +70,7 @@ def _wheels_figure(diagnosis: Diagnosis) -> Figure:
         draw_means(panels[1, column], rates, place, GROUPS["wheel command"][column])
         panels[0, column].set_title(f"{side} wheel", fontsize=8)
         panels[1, column].set_xlabel("command [duty]", fontsize=8)
-    for row, label in enumerate(("steady speed [m/s]", "added speed [mm/s]")):
+    for row, label in enumerate(("steady speed [m/s]", "speed − declared [mm/s]")):
         panels[row, 0].set_ylabel(label, fontsize=8)
         panels[row, 1].set_ylabel("")
     legend_below(figure, *panels.ravel())
@@ -124,11 +124,9 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     found, drives = diagnosis.found, diagnosis.found.declared.drives
     figure = Figure(figsize=(5.2, 2.8), layout="constrained")
     axes = figure.subplots()
-    lasts = (
-        STEPS_S
-        if any(_shown(one, diagnosis.robot.catalogue) is WheelCurve.REVERSAL for one in found.adopted)
-        else STEP_S
-    )
+    catalogue = diagnosis.robot.catalogue
+    reverses = any(_curve_kind(one, catalogue) is WheelCurve.REVERSAL for one in found.adopted)
+    lasts = STEPS_S if reverses else STEP_S
     times = np.arange(round(lasts * drives.tick_hz)) / drives.tick_hz
     size = min(0.5, float(np.abs(drives.duties).max()))
     duties = np.repeat(np.where(times < STEP_S, size, -size)[None, :, None], 2, axis=2)

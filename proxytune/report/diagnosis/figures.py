@@ -41,7 +41,7 @@ ADOPTED = _Role("adopted", BLUE, BLUE)
 RIVAL = _Role("rival of an adopted effect", LIGHT_BLUE, LIGHT_BLUE)
 OTHER = _Role("other named effect", GREY, GREY)
 CHANCE = _Role(f"named effect, p > {P_VALUE:g}", GREY, "white")
-SIGNAL = _Role("any curve over this signal", PURPLE, PURPLE)
+SIGNAL = _Role("free curve over this signal", PURPLE, PURPLE)
 
 
 def diagnosis_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
@@ -117,8 +117,8 @@ def _errors(diagnosis: Diagnosis) -> Figure:
     pairs = [(BEFORE, VERMILLION, "o", -0.08), (after(diagnosis), BLUE, "s", 0.08)]
     for axes, factor, heads, column in ((place, 1e3, False, 0), (heading, 180.0 / np.pi, True, 1)):
         for number, (name, colour, marker, shift) in enumerate(pairs[: 2 if diagnosis.effects else 1]):
-            shown = [_told(error, heads)[number] for error in errors]
-            _estimates(axes, shown, factor, (colour, marker, name, shift))
+            rms_errors = [_before_and_after(error, heads)[number] for error in errors]
+            _estimates(axes, rms_errors, factor, (colour, marker, name, shift))
         spots = range(len(errors))
         _draw_floor(axes, [floor[column] for floor in floors])
         axes.set_xticks(spots, [f"{error.horizon_s:g}" for error in errors])
@@ -144,18 +144,26 @@ def _draw_floor(axes: Axes, brackets: Sequence[tuple[float, float]]) -> None:
     axes.hlines(lower, spots - 0.25, spots + 0.25, color=GREEN, lw=1.4, label="noise floor: poses alone, to upper end")
 
 
-def _told(error: HorizonError, heads: bool) -> tuple[Rmse, Rmse]:
+def _before_and_after(error: HorizonError, heads: bool) -> tuple[Rmse, Rmse]:
     return (error.heading_before, error.heading_after) if heads else (error.before, error.after)
 
 
-def _estimates(axes: Axes, shown: Sequence[Rmse], factor: float, style: tuple[str, str, str, float]) -> None:
+def _estimates(axes: Axes, rms_errors: Sequence[Rmse], factor: float, style: tuple[str, str, str, float]) -> None:
     """Values with their intervals, where those are finite."""
     colour, marker, name, shift = style
-    values = factor * np.array([one.value for one in shown])
-    ends = factor * np.array([one.interval for one in shown])
+    values = factor * np.array([one.value for one in rms_errors])
+    ends = factor * np.array([one.interval for one in rms_errors])
     whole = np.isfinite(ends).all(axis=1, keepdims=True)
     ends = np.where(whole, ends, values[:, None])
     arms = np.maximum(0.0, np.stack((values - ends[:, 0], ends[:, 1] - values)))
     axes.errorbar(
-        np.arange(len(shown)) + shift, values, yerr=arms, fmt=marker, color=colour, ms=4, capsize=2, lw=1.0, label=name
+        np.arange(len(rms_errors)) + shift,
+        values,
+        yerr=arms,
+        fmt=marker,
+        color=colour,
+        ms=4,
+        capsize=2,
+        lw=1.0,
+        label=name,
     )

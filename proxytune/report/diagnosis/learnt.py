@@ -46,13 +46,13 @@ def ratio_document(one: Ratio) -> dict[str, Any]:
     return {"value": one.value, "interval": list(one.interval)}
 
 
-def ratios_document(found: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
+def ratios_document(ratios: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
     """Such ratios by horizon in seconds."""
-    return {f"{horizon_s:g}": ratio_document(one) for horizon_s, one in found.items()}
+    return {f"{horizon_s:g}": ratio_document(one) for horizon_s, one in ratios.items()}
 
 
 def learnt_notes(learning: Learning) -> list[str]:
-    """What a person reads of it: nothing where nothing was found."""
+    """What was learnt, in sentences; nothing where nothing was."""
     beside = learning.remainder
     notes = []
     curves = ", ".join(f"{title} ({100.0 * beside.share[title]:.0f} %)" for title in beside.share)
@@ -62,9 +62,9 @@ def learnt_notes(learning: Learning) -> list[str]:
             f"({error.ratio.interval[0]:.2f} … {error.ratio.interval[1]:.2f}) of that with names alone"
             for error in learning.errors
         )
-        notes.append(f"learnt, not physics: curves over {curves}; error with them after {worth}")
+        notes.append(f"learnt, not physics: curves over {curves}; position error with them at {worth}")
     elif beside.theta:
-        notes.append(f"curves over {curves} were tried and left out: they are not shown to help on drives left out")
+        notes.append(f"curves over {curves} were tried and dropped: they do not clearly help on drives left out")
     if learning.looks_like is not None:
         like = learning.looks_like
         values = ", ".join(f"{name} {value:.3g}" for name, value in like.theta.items())
@@ -73,7 +73,7 @@ def learnt_notes(learning: Learning) -> list[str]:
         )
     if learning.names_doubtful:
         notes.append(
-            "beware: curves beside what is declared alone predict better than beside the named effects; the names are "
+            "beware: curves beside the declared model predict better than beside the named effects: the names are "
             "likely wrong"
         )
     return notes

@@ -38,8 +38,8 @@ def learnt_figure(learning: Learning) -> Figure | None:
     if effect is None:
         return None
     order = list(learning.remainder.share)
-    shown = {curve.group for curve in effect.curves} - {LEVEL}
-    groups = sorted(shown, key=lambda group: order.index(GROUPS[group].title))
+    members = {curve.group for curve in effect.curves} - {LEVEL}
+    groups = sorted(members, key=lambda group: order.index(GROUPS[group].title))
     rows = [[curve for curve in effect.curves if curve.group == group] for group in groups]
     rows = [_courses(row) if row[0].group == HEADING else row for row in rows]
     across = max(len(row) for row in rows)
@@ -57,22 +57,22 @@ def learnt_figure(learning: Learning) -> Figure | None:
 def _courses(curves: Sequence[Curve]) -> list[Curve]:
     """Harmonics of the heading as curves over it, one for each direction."""
     around = np.linspace(0.0, 360.0, 73)
-    found = []
+    courses = []
     for to in dict.fromkeys(curve.channel.split("_")[0] for curve in curves):
         total = np.zeros(len(around))
         for curve in curves:
             if curve.channel.startswith(to):
                 wave = np.cos if curve.channel.endswith("cos") else np.sin
                 total += wave(np.radians(around)[:, None] * np.asarray(curve.knots)) @ np.asarray(curve.weights)
-        found.append(Curve(HEADING, to, tuple(around.tolist()), tuple(total.tolist())))
-    return found
+        courses.append(Curve(HEADING, to, tuple(around.tolist()), tuple(total.tolist())))
+    return courses
 
 
 def _draw(axes: Axes, effect: Learnt, curve: Curve) -> None:
     group = GROUPS[curve.group]
     unit = group.channels[curve.channel if curve.group != HEADING else f"{curve.channel}_cos"].unit
-    factor, told = SHOWN_AS.get(unit, (100.0, f"% {unit}"))
-    label = f"{curve.channel} [{told}]"
+    factor, label_unit = SHOWN_AS.get(unit, (100.0, f"% {unit}"))
+    label = f"{curve.channel} [{label_unit}]"
     if curve.group == PAIRS:
         _surface(axes, curve, factor, label)
     else:
@@ -109,9 +109,9 @@ def _surface(axes: Axes, curve: Curve, factor: float, label: str) -> None:
     values = np.zeros((len(turns), len(speeds)))
     values[np.searchsorted(turns, places[:, 1]), np.searchsorted(speeds, places[:, 0])] = weights
     most = float(np.abs(values).max()) or 1.0
-    drawn = axes.pcolormesh(speeds, turns, values, shading="gouraud", cmap="RdBu_r", vmin=-most, vmax=most)
+    mesh = axes.pcolormesh(speeds, turns, values, shading="gouraud", cmap="RdBu_r", vmin=-most, vmax=most)
     axes.set_xlabel("forward speed [m/s]", fontsize=8)
     axes.set_ylabel("yaw rate [rad/s]", fontsize=8)
-    bar = axes.figure.colorbar(drawn, ax=axes)
+    bar = axes.figure.colorbar(mesh, ax=axes)
     bar.set_label(label, fontsize=8)
     bar.ax.tick_params(labelsize=7)

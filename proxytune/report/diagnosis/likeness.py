@@ -1,4 +1,4 @@
-"""What a diagnosis says of drives that seem to be of two robots."""
+"""What a diagnosis says about drives that seem to be of two robots."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -27,5 +27,5 @@ def unlike_notes(unlike: Unlike | None, names: Sequence[str]) -> list[str]:
     ]
     return [
         f"drives disagree: the {unlike.wheel} wheel's gain is {' but '.join(parts)}, as if of two robots, or of "
-        "one on two floors; nothing told here holds for both: diagnose each group alone, or find what was changed"
+        "one on two floors; no result here holds for both: diagnose each group alone, or find what changed"
     ]

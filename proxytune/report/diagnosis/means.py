@@ -22,7 +22,7 @@ from proxytune.space import Theta
 BINS = 20
 """Values of the signal, equally often driven, over which means are taken."""
 
-MEASURED, ANY = "measured", "any curve over the signal"
+MEASURED, ANY = "measured", "free curve"
 
 DEGREES = 180.0 / np.pi
 
@@ -73,13 +73,13 @@ class Rates(NamedTuple):
 def rates_of(diagnosis: Diagnosis, curve: Curve | None) -> Rates:
     """What the declared model says, and what is added to it by measurement, by effects, by the flexible curve."""
     found, drives = diagnosis.found, diagnosis.found.declared.drives
-    said = increments(drives, found.declared.theta)
-    added = {MEASURED: drives.measured - said}
+    declared = increments(drives, found.declared.theta)
+    added = {MEASURED: drives.measured - declared}
     if found.adopted:
-        added[after(diagnosis)] = increments(drives, found.model.theta) - said
+        added[after(diagnosis)] = increments(drives, found.model.theta) - declared
     if curve is not None and curve.gain > 0.0:
-        added[ANY] = disturbed(drives, retuned(found.declared, curve), curve.group.twists @ curve.weights) - said
-    return Rates(_channels(drives, said), {name: _channels(drives, moved) for name, moved in added.items()})
+        added[ANY] = disturbed(drives, retuned(found.declared, curve), curve.group.twists @ curve.weights) - declared
+    return Rates(_channels(drives, declared), {name: _channels(drives, moved) for name, moved in added.items()})
 
 
 def retuned(declared: Fit, curve: Curve) -> Theta:
@@ -104,18 +104,18 @@ def _channels(drives: Drives, moved: Floats) -> dict[str, Floats]:
 
 def _signal(drives: Drives, rates: Rates, curve: Curve | None, panel: Panel) -> Floats:
     """The signal of a panel at each increment (N,)."""
-    said = rates.declared
+    declared = rates.declared
     direct = {
         "x": drives.poses[:, 0, 0],
         "y": drives.poses[:, 0, 1],
         "heading": np.degrees(np.mod(drives.poses[:, 0, 2], 2.0 * np.pi)),
-        "turn": np.degrees(said["turn"]),
+        "turn": np.degrees(declared["turn"]),
         "left angle": np.mod(drives.angles[drives.episode, drives.first, 0], 2.0 * np.pi),
         "right angle": np.mod(drives.angles[drives.episode, drives.first, 1], 2.0 * np.pi),
-        "bend": said["forward"] * said["turn"],
+        "bend": declared["forward"] * declared["turn"],
     }
     if panel.signal:
-        return np.asarray(direct.get(panel.signal, said.get(panel.signal)))
+        return np.asarray(direct.get(panel.signal, declared.get(panel.signal)))
     assert curve is not None
     return np.asarray(curve.group.signal[drives.episode, (drives.first + drives.last) // 2])
 
@@ -152,5 +152,5 @@ def draw_means(axes: Axes, rates: Rates, signal: Floats, panel: Panel) -> None:
         places, values = _means(signal, added[panel.motion], rates.declared[panel.motion] if panel.share else None)
         style = {MEASURED: ("o", GREY, 3.0, 1), ANY: ("--", PURPLE, 0.0, 3)}.get(name, ("-", BLUE, 0.0, 2))
         axes.plot(places, factor * values, style[0], color=style[1], ms=style[2], lw=1.4, zorder=style[3], label=name)
-    axes.set_ylabel(f"added {NAMES[panel.motion]} [{unit}]", fontsize=8)
+    axes.set_ylabel(f"{NAMES[panel.motion]} − declared [{unit}]", fontsize=8)
     dress(axes)

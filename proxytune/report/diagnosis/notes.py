@@ -10,13 +10,17 @@ from proxytune.report.diagnosis.likeness import unlike_notes
 from proxytune.report.numbers import fixed, listed
 
 MEANINGS = {
-    "nothing missing": "what is left over is no more than noise",
-    "explained": "named effects explain what the declared model left over",
-    "partly explained": "named effects explain a part; more than noise is left that no named effect accounts for",
-    "unexplained": "something is missing, and no named effect accounts for it",
-    "cannot be told": "the error is larger than the noise of the poses, no structure was found in it, and how far two "
-    "drives from the same commands differ is not known",
+    "nothing missing": "only noise is left",
+    "explained": "with the effects added, only noise is left",
+    "partly explained": "the effects added explain a part; more than noise is left, and no named effect explains it",
+    "unexplained": "something is missing, and no named effect explains it",
+    "cannot be told": "the error is larger than the noise of the poses but shows no structure; how far two drives "
+    "from the same commands differ is not known",
 }
+
+
+AMPLE = 30.0
+"""Log-likelihood gain [nats] in a minute above which one minute surely decides."""
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -25,18 +29,18 @@ def headline(diagnosis: Diagnosis) -> str:
 
 
 def notes(diagnosis: Diagnosis) -> list[str]:
-    """Everything that tables do not hold, a line each."""
+    """Everything that the tables do not hold, a line each."""
     lines = clocks_notes(diagnosis.log, diagnosis.clocks, diagnosis.theta)
     lines += unlike_notes(diagnosis.unlike, diagnosis.drive_names)
-    lines += [_added(diagnosis, effect) for effect in diagnosis.effects]
-    lines += [_immaterial(effect, diagnosis) for effect in diagnosis.immaterial]
+    lines += [_say_added(diagnosis, effect) for effect in diagnosis.effects]
+    lines += [_say_immaterial(effect, diagnosis) for effect in diagnosis.immaterial]
     lines += _cautions(diagnosis)
     if diagnosis.residual_depends_on:
-        lines.append(f"not explained by any named effect; it depends on: {', '.join(diagnosis.residual_depends_on)}")
+        lines.append(f"no named effect explains the rest, which depends on: {', '.join(diagnosis.residual_depends_on)}")
     lines += learnt_notes(diagnosis.learning)
     if diagnosis.could_not_be_seen:
-        lines.append(f"could not have been seen in these drives: {', '.join(diagnosis.could_not_be_seen)}")
-    return lines + _next(diagnosis)
+        lines.append(f"these drives could not have shown: {', '.join(diagnosis.could_not_be_seen)}")
+    return lines + _say_manoeuvre(diagnosis)
 
 
 def per_cent(one: Ratio) -> tuple[float, tuple[float, float]]:
@@ -55,30 +59,34 @@ def may_matter(worth: Worth) -> bool:
     return any(one.interval[1] >= MATERIAL for one in worth.values())
 
 
-def _added(diagnosis: Diagnosis, effect: Adopted) -> str:
+def _say_added(diagnosis: Diagnosis, effect: Adopted) -> str:
     rivals = ", ".join(rival.label for rival in effect.rivals)
-    beside = f"; these drives cannot tell it from {rivals}" if rivals else ""
+    beside = f"; these drives fit {rivals} as well" if rivals else ""
     worth = diagnosis.worth.get(effect.effect, {})
-    told = [f"{fixed(per_cent(one)[0], 0)} % ({_ends(one, 0)}) at {h:g} s" for h, one in worth.items()]
-    larger = f"; without it the error is larger by {listed(told)}" if told else ""
-    return f"added {_label(effect)}: {effect.gain:.0f} nats, p = {effect.p_value:.3f}{larger}{beside}"
+    growth = [f"{fixed(per_cent(one)[0], 0)} % ({_ends(one, 0)}) at {h:g} s" for h, one in worth.items()]
+    larger = f"; without it the error grows by {listed(growth)}" if growth else ""
+    return f"added {_label(effect)}: {_gain(effect)}, p = {effect.p_value:.3f}{larger}{beside}"
 
 
-def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> str:
+def _say_immaterial(effect: Adopted, diagnosis: Diagnosis) -> str:
     worth = diagnosis.worth.get(effect.effect, {})
     if not worth:
-        return f"not shown to matter: {_label(effect)}, {effect.gain:.0f} nats"
+        return f"not shown to matter: {_label(effect)}, {_gain(effect)}"
     horizon = decisive(worth)
     value, _ = per_cent(worth[horizon])
     kind = "not shown to matter" if may_matter(worth) else "detectable but immaterial"
     change = f"changes the error at {horizon:g} s by {fixed(value, 1)} % ({_ends(worth[horizon], 1)})"
-    return f"{kind}: {_label(effect)}{_values(effect, diagnosis)}, {effect.gain:.0f} nats, {change}"
+    return f"{kind}: {_label(effect)}{_values(effect, diagnosis)}, {_gain(effect)}, {change}"
 
 
 def _values(effect: Adopted, diagnosis: Diagnosis) -> str:
     """The fitted values of an effect that is no longer in the model."""
-    known = {name: estimate for name, estimate in diagnosis.dropped_values.items() if name in effect.names}
-    return "".join(f" {estimate.value:.3g} {estimate.unit}".rstrip() for estimate in known.values())
+    estimates = {name: estimate for name, estimate in diagnosis.dropped_values.items() if name in effect.names}
+    return "".join(f" {estimate.value:.3g} {estimate.unit}".rstrip() for estimate in estimates.values())
+
+
+def _gain(effect: Adopted) -> str:
+    return f"log-likelihood gain {effect.gain:.0f} nats"
 
 
 def _label(effect: Adopted) -> str:
@@ -92,30 +100,32 @@ def _ends(one: Ratio, decimals: int) -> str:
 
 def _cautions(diagnosis: Diagnosis) -> list[str]:
     edges = [name for effect in diagnosis.effects for name in diagnosis.at_edge(effect)]
-    lines = [f"beware: {listed(edges)} at the end of what can be: it stands for something else"] if edges else []
+    lines = [f"beware: {listed(edges)} at the end of the range: it probably stands for something else"] if edges else []
     if diagnosis.verdict == "partly explained":
-        lines.append("beware: where something is left that has no name, added effects may stand for it: no physics yet")
+        lines.append("beware: added effects may stand in for what is still unnamed: their values are no physics yet")
     worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
     if worse:
-        lines.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; look at the heading")
+        lines.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; check the heading")
     if diagnosis.polish is not None:
-        told = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.polish.ratios.items())
+        ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.polish.ratios.items())
         lines.append(
-            f"parameters were fitted to windows of {diagnosis.polish.horizon_s:g} s, not to single steps: their error "
-            f"by the other's, on blocks left out, {told}"
+            f"parameters were fitted to windows of {diagnosis.polish.horizon_s:g} s instead of single steps; ratio of "
+            f"the errors on blocks left out: {ratios}"
         )
     return lines
 
 
-def _next(diagnosis: Diagnosis) -> list[str]:
-    found = diagnosis.manoeuvre
-    if found is None:
+def _say_manoeuvre(diagnosis: Diagnosis) -> list[str]:
+    next_drive = diagnosis.manoeuvre
+    if next_drive is None:
         return []
-    often = f"{found.times} times from the same commands, and diagnose the log with these drives in it"
-    if found.nats_per_minute is None:
-        return [f"to tell noise from what is missing, drive {found.name} {often}: {found.description}"]
-    clear = f"({found.nats_per_minute:.0f} nats a minute)"
-    lines = [f"to tell {' from '.join(found.between)}, drive {found.name} {clear}: {found.description}"]
-    if found.times > 1:
+    often = f"{next_drive.times} times from the same commands, and diagnose the log with these drives in it"
+    if next_drive.nats_per_minute is None:
+        return [f"to tell noise from what is missing, drive {next_drive.name} {often}: {next_drive.description}"]
+    gain = f"expected gain {next_drive.nats_per_minute:.0f} nats a minute"
+    clear = "one minute is ample" if next_drive.nats_per_minute >= AMPLE else gain
+    drive = f"drive {next_drive.name} ({clear}): {next_drive.description}"
+    lines = [f"to tell {' from '.join(next_drive.between)}, {drive}"]
+    if next_drive.times > 1:
         lines.append(f"to tell noise from what is missing, drive this {often}")
     return lines

@@ -136,11 +136,11 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     figure, panels = _panels(len(both), extent[0] > WIDE * extent[1])
     scale = Normalize(0.0, float(np.quantile(before.rms, 0.98)))
     for axes, (name, one) in zip(panels, both.items(), strict=True):
-        drawn = (_paths if len(one.rms) <= MANY_WINDOWS else _floor)(axes, drives, one, scale)
+        colours = (_paths if len(one.rms) <= MANY_WINDOWS else _floor)(axes, drives, one, scale)
         axes.set_title(textwrap.fill(name, TITLE), fontsize=8)
         axes.set_aspect("equal")
         dress(axes)
-    bar = figure.colorbar(drawn, ax=list(panels), extend="max", shrink=0.85)
+    bar = figure.colorbar(colours, ax=list(panels), extend="max", shrink=0.85)
     bar.set_label(f"distance to prediction\nin {before.horizon_s:g}-s windows [mm]", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     return figure
@@ -161,10 +161,10 @@ def _panels(count: int, stacked: bool) -> tuple[Figure, list[Axes]]:
 def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: Normalize) -> LineCollection:
     rows = np.split(strayed.increment, np.flatnonzero(np.diff(strayed.window)) + 1)
     lines = [np.concatenate((drives.poses[own[:1], 0, :2], drives.poses[own, 1, :2])) for own in rows]
-    drawn = LineCollection(lines, array=strayed.rms, cmap="viridis", norm=scale, linewidths=1.2, capstyle="round")
-    axes.add_collection(drawn)
+    paths = LineCollection(lines, array=strayed.rms, cmap="viridis", norm=scale, linewidths=1.2, capstyle="round")
+    axes.add_collection(paths)
     axes.autoscale_view()
-    return drawn
+    return paths
 
 
 def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: Normalize) -> Collection:

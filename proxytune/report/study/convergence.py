@@ -34,7 +34,7 @@ def convergence(result: StudyResult) -> Figure:
 
 
 def _levels(axes: Axes, result: StudyResult) -> None:
-    """What a proxy that knows nothing would get, and what no proxy can be told to beat."""
+    """Chance, and the noise floor that a perfect proxy would score."""
     chance, floor = result.judged.chance, result.floor
     axes.axhline(chance.mean, color="0.45", linewidth=1.0, linestyle=":", label=f"chance {chance.mean:.1f}")
     if floor.value is not None and floor.low is not None and floor.high is not None:
@@ -53,7 +53,7 @@ def _trials(axes: Axes, result: StudyResult) -> None:
     if failed:
         axes.plot(failed, np.zeros(len(failed)), "x", color=VERMILLION, markersize=4, label="failed")
     if bounds:
-        axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="cut off, at least")
+        axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="stopped early (lower bound)")
 
 
 def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) -> None:
@@ -65,16 +65,16 @@ def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) 
 def _answer(axes: Axes, result: StudyResult) -> None:
     """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's."""
     pairs = zip(result.trials, result.answers, strict=True)
-    known = [(trial.number, answer.prpv) for trial, answer in pairs if answer is not None]
-    ends = [*known, (result.trials[-1].number + 1, result.best.trial.prpv)]
+    answers = [(trial.number, answer.prpv) for trial, answer in pairs if answer is not None]
+    ends = [*answers, (result.trials[-1].number + 1, result.best.trial.prpv)]
     axes.step(*zip(*ends, strict=True), where="post", color=ORANGE, linewidth=1.5, label="answer so far")
 
 
 def _fresh(axes: Axes, result: StudyResult) -> None:
-    found = result.confirmation.answer.assessment if result.confirmation else None
-    if found is None:
+    fresh = result.confirmation.answer.assessment if result.confirmation else None
+    if fresh is None:
         return
-    score, inner = found.prpv.value, found.prpv_interval
+    score, inner = fresh.prpv.value, fresh.prpv_interval
     reach = None if inner.low is None or inner.high is None else [[score - inner.low], [inner.high - score]]
     place, label = result.trials[-1].number + 1, "answer, fresh episodes"
     bars = np.maximum(0.0, reach) if reach else None

@@ -24,7 +24,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         **knowledge_document(result.knowledge),
         "truth": None if result.truth is None else dict(result.truth),
         "cautions": list(result.cautions),
-        "importance": {found.name: _importance(found) for found in result.importances},
+        "importance": {one.name: _importance(one) for one in result.importances},
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
         "cut_off": {"trials": len(result.cut), "episodes": result.spared[0], "seconds": result.spared[1]},
@@ -63,40 +63,40 @@ def _worth(result: StudyResult) -> dict[str, Any]:
     }
 
 
-def _importance(found: Importance) -> dict[str, Any]:
-    return {"share": found.share, "interval": list(found.interval), "alone": found.alone}
+def _importance(one: Importance) -> dict[str, Any]:
+    return {"share": one.share, "interval": list(one.interval), "alone": one.alone}
 
 
-def _fresh(found: Confirmation | None) -> dict[str, Any] | None:
+def _fresh(confirmation: Confirmation | None) -> dict[str, Any] | None:
     """What fresh episodes say of the answer and of its rivals."""
-    if found is None:
+    if confirmation is None:
         return None
-    measures = document_of(found.answer.assessment) if found.answer.assessment else {}
+    measures = document_of(confirmation.answer.assessment) if confirmation.answer.assessment else {}
     return {
         **{key: measures.get(key) for key in ("prpv", "prpv_normalised", "prpv_interval", "ppv")},
-        "optimism": found.answer.optimism,
-        "episodes": found.episodes,
+        "optimism": confirmation.answer.optimism,
+        "episodes": confirmation.episodes,
         "candidates": [
             {
                 "index": one.trial.number,
                 "prpv": round(one.trial.prpv or 0.0),
                 "fresh_prpv": [None if score is None else round(score) for score in one.scores],
             }
-            for one in found.candidates
+            for one in confirmation.candidates
         ],
     }
 
 
-def _preflight(found: Preflight | None) -> dict[str, Any] | None:
-    if found is None:
+def _preflight(preflight: Preflight | None) -> dict[str, Any] | None:
+    if preflight is None:
         return None
     keys = ("moves", "p_value", "metric", "change", "noise", "pairs")
-    moved = {one.interval.name: {key: getattr(one, key) for key in keys} for one in found.movements}
+    moved = {one.interval.name: {key: getattr(one, key) for key in keys} for one in preflight.movements}
     return {
-        "base": dict(found.base),
-        "episodes": found.episodes,
+        "base": dict(preflight.base),
+        "episodes": preflight.episodes,
         "parameters": moved,
-        "warnings": list(found.warnings),
+        "warnings": list(preflight.warnings),
     }
 
 

@@ -1,4 +1,4 @@
-"""What a study has found out, as the plain figures that its first sentence is made of."""
+"""What a study found, as the plain figures that its first sentence is made of."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from proxytune.usefulness.chance import Chance
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownParameter:
     """What is known of one parameter.
 
     Attributes:
@@ -43,21 +43,21 @@ class Finding:
         prpv: PRPV of the best θ.
         fresh: Whether that is of fresh episodes.
         floor: What a perfect proxy would score.
-        chance: What a proxy that knows nothing would score.
-        perfect: Whether it is shown that the proxy cannot be told from a perfect one.
-        misfit: p-value of the misfit; None where that cannot be told.
-        fits: Whether some θ explains the target's scores; None where that cannot be told.
-        informed: What the scores tell of the least known parameter; None where nothing is known of that.
-        left: Trials that are still to be run; 0 where the search has ended.
-        budget: Trials that the study may take, or has taken where that was more.
+        chance: What a proxy that ranks at random would score.
+        perfect: Whether no difference between proxy and target can be seen, which takes fresh episodes.
+        misfit: p-value of the misfit test; None where there is none.
+        fits: Whether some θ explains the target's scores; None where that cannot be tested.
+        information: What informs the least known parameter; None where nothing does.
+        left: Trials still to be run; 0 where the search has ended.
+        budget: Trials that the study may take, or took where that was more.
         ruled: Whether a rule ended the search before its budget.
-        starts: From how many starts each agent drives.
-        most_starts: From how many it can.
+        starts: How many starts each agent drives from.
+        most_starts: How many starts there are.
         confirm: How often the study drives its best θ again.
         declared: The effects on motion that θ belongs to, which `diagnose` is to tune in any case.
     """
 
-    parameters: tuple[Known, ...]
+    parameters: tuple[KnownParameter, ...]
     region: float
     inside: bool
     prpv: int
@@ -67,7 +67,7 @@ class Finding:
     perfect: bool
     misfit: float | None
     fits: bool | None
-    informed: Information | None
+    information: Information | None
     left: int
     budget: int
     ruled: bool
@@ -77,16 +77,16 @@ class Finding:
     declared: tuple[str, ...]
 
     @property
-    def least(self) -> Known:
+    def least(self) -> KnownParameter:
         """The least known parameter."""
-        return max(self.parameters, key=lambda known: known.share)
+        return max(self.parameters, key=lambda one: one.share)
 
 
 def finding_of(result: StudyResult) -> Finding:
     """What the sentence of a study is made of."""
     settings, learnt, judged = result.study.settings, result.knowledge, result.judged
     parameters = known_parameters(result)
-    least = max(parameters, key=lambda known: known.share).name
+    least = max(parameters, key=lambda one: one.share).name
     return Finding(
         parameters=parameters,
         region=learnt.posterior.share,
@@ -98,7 +98,7 @@ def finding_of(result: StudyResult) -> Finding:
         perfect=bool(result.perfect),
         misfit=learnt.misfit.p_value,
         fits=learnt.misfit.fits,
-        informed=next((one for one in learnt.information if one.name == least and _tells(one)), None),
+        information=next((one for one in learnt.information if one.name == least and _informs(one)), None),
         left=0 if result.stopped else settings.budget - len(result.trials),
         budget=max(settings.budget, len(result.trials)),
         ruled=bool(result.stopped) and len(result.trials) < settings.budget,
@@ -109,20 +109,21 @@ def finding_of(result: StudyResult) -> Finding:
     )
 
 
-def _tells(found: Information) -> bool:
-    return any(share > 0.0 for _, share in found.agents)
+def _informs(information: Information) -> bool:
+    return any(share > 0.0 for _, share in information.agents)
 
 
-def known_parameters(result: StudyResult) -> tuple[Known, ...]:
+def known_parameters(result: StudyResult) -> tuple[KnownParameter, ...]:
     """What is known of each parameter, in the order of the box."""
     units, learnt = result.study.family.parameters, result.knowledge
-    found = []
+    parameters = []
     for interval in result.study.settings.space.intervals:
         name, ends = interval.name, learnt.intervals[interval.name]
         share = (ends[1] - ends[0]) / (interval.high - interval.low)
         best = result.best.trial.theta[name]
-        found.append(Known(name, units[name].unit, best, ends, share, name not in learnt.unidentified))
-    return tuple(found)
+        identified = name not in learnt.unidentified
+        parameters.append(KnownParameter(name, units[name].unit, best, ends, share, identified))
+    return tuple(parameters)
 
 
 def declared_of(names: Sequence[str]) -> tuple[str, ...]:

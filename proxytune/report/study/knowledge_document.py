@@ -20,7 +20,7 @@ def knowledge_document(learnt: Knowledge) -> dict[str, Any]:
         },
         "trades": [[one, other, float(correlation)] for one, other, correlation in learnt.trades],
         "as_good": {"region_share": float(share), "theta_interval": intervals_document(ends)},
-        "information": {found.name: _information(found) for found in learnt.information},
+        "information": {one.name: _information(one) for one in learnt.information},
     }
 
 
@@ -29,9 +29,9 @@ def intervals_document(intervals: Mapping[str, Ends]) -> dict[str, list[float]]:
     return {name: [float(low), float(high)] for name, (low, high) in intervals.items()}
 
 
-def _information(found: Information) -> dict[str, Any]:
+def _information(one: Information) -> dict[str, Any]:
     return {
-        "agents": {name: float(share) for name, share in found.agents},
-        "metrics": {name: float(share) for name, share in found.metrics},
-        "limit": found.limit,
+        "agents": {name: float(share) for name, share in one.agents},
+        "metrics": {name: float(share) for name, share in one.metrics},
+        "limit": one.limit,
     }

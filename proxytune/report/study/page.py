@@ -7,9 +7,11 @@ from pathlib import Path
 from string import Template
 
 from proxytune.report.study.finding import finding_of
-from proxytune.report.study.search_lines import search_lines
-from proxytune.report.study.table import SEARCH, THETA, TOLD, WORTH, worth_lines
-from proxytune.report.study.theta_table import TOLD_BY, theta_columns, theta_lines, theta_rows, told_rows
+from proxytune.report.study.information_table import INFORMATION_COLUMNS, information_rows
+from proxytune.report.study.search_rows import search_rows
+from proxytune.report.study.table import INFORMATION, SEARCH, THETA, USEFULNESS
+from proxytune.report.study.theta_table import theta_columns, theta_notes, theta_rows
+from proxytune.report.study.usefulness_table import USEFULNESS_COLUMNS, usefulness_notes, usefulness_rows
 from proxytune.report.study.verdict import sentence
 from proxytune.storage.records import TrialRecord
 from proxytune.study.result import StudyResult
@@ -38,7 +40,7 @@ $figures
 <h2>Trials</h2>
 <div class="scroll">$trials</div>
 <h2>Settings</h2>
-$settings
+<div class="scroll">$settings</div>
 </body>
 </html>
 """)
@@ -64,26 +66,28 @@ def page(result: StudyResult, figures: Sequence[Path]) -> str:
 
 def _groups(result: StudyResult) -> str:
     """What the terminal shows below the sentence, under the same heads."""
+    informed = information_rows(result)
+    usefulness = _table(USEFULNESS_COLUMNS, usefulness_rows(result))
     return "".join((
-        _group(THETA, theta_lines(result), _table(theta_columns(result), theta_rows(result))),
-        _group(WORTH, worth_lines(result)),
-        _group(TOLD, [], _table(TOLD_BY, told)) if (told := told_rows(result)) else "",
-        _group(SEARCH, search_lines(result)),
+        _group(THETA, _table(theta_columns(result), theta_rows(result)), theta_notes(result)),
+        _group(USEFULNESS, usefulness, usefulness_notes(result)),
+        _group(INFORMATION, _table(INFORMATION_COLUMNS, informed)) if informed else "",
+        _group(SEARCH, _table((), search_rows(result))),
     ))  # fmt: skip
 
 
-def _group(title: str, lines: Sequence[str], table: str = "") -> str:
-    items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
-    shown = f'<div class="scroll">{table}</div>' if table else ""
-    return f"<h2>{html.escape(title)}</h2>{shown}" + (f"<ul>{items}</ul>" if items else "")
+def _group(title: str, table: str, notes: Sequence[str] = ()) -> str:
+    items = "".join(f"<li>{html.escape(note)}</li>" for note in notes)
+    return f'<h2>{html.escape(title)}</h2><div class="scroll">{table}</div>' + (f"<ul>{items}</ul>" if items else "")
 
 
 def _meaning(result: StudyResult) -> str:
     agents = len(result.study.settings.agents)
     return (
-        f"PRPV counts how unlike the target the proxy ranks the {agents} agents, over ordered pairs. "
-        "The best θ is the visited one of lowest expected PRPV given all trials, and fresh episodes where they were "
-        "driven. The 95 % interval holds what agrees with every agent's every metric on the target."
+        "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
+        f"{agents} agents proxy and target disagree which is the better. The best θ is the visited one of lowest "
+        "expected PRPV, given all trials and fresh episodes. The 95 % interval holds the values that agree with every "
+        "agent's every metric on the target; “by PRPV alone” those whose PRPV is as low as the best, within noise."
     )
 
 
@@ -95,7 +99,7 @@ def _trial_row(trial: TrialRecord, names: tuple[str, ...]) -> tuple[str, ...]:
     theta = (f"{trial.theta[name]:.4g}" for name in names)
     prpv = "failed" if trial.prpv is None else f"{trial.prpv:g}"
     if trial.bound is not None:
-        prpv = f"cut off, at least {trial.bound:g}"
+        prpv = f"stopped early, at least {trial.bound:g}"
     ppv = "" if trial.ppv is None else f"{trial.ppv:.3g}"
     return (str(trial.number), *theta, prpv, ppv, str(trial.failed_episodes))
 
@@ -121,5 +125,6 @@ def _image(path: Path) -> str:
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     cells = "".join(f"<th>{html.escape(name)}</th>" for name in head)
+    top = f"<tr>{cells}</tr>" if cells else ""
     body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><tr>{cells}</tr>{body}</table>"
+    return f"<table>{top}{body}</table>"

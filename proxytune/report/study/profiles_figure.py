@@ -69,9 +69,9 @@ def density_of(result: StudyResult, place: int) -> tuple[Array, Array]:
     """
     box, posterior = result.study.settings.space.intervals[place], result.knowledge.posterior
     values = box.low + (box.high - box.low) * posterior.points[:, place]
-    found, edges = np.histogram(values, bins=BINS, weights=posterior.weights, density=True)
+    heights, edges = np.histogram(values, bins=BINS, weights=posterior.weights, density=True)
     # Mirrored at its ends: at an end of the box nothing leaks out of it.
-    smooth = gaussian_filter1d(found, _reach(values, posterior.weights) / (edges[1] - edges[0]), mode="reflect")
+    smooth = gaussian_filter1d(heights, _reach(values, posterior.weights) / (edges[1] - edges[0]), mode="reflect")
     centres = 0.5 * (edges[1:] + edges[:-1])
     places = np.concatenate([[box.low, edges[0]], centres, [edges[-1], box.high]])
     return places, np.concatenate([[0.0, smooth[0]], smooth, [smooth[-1], 0.0]])

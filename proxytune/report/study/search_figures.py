@@ -43,12 +43,12 @@ def evaluations_figure(result: StudyResult) -> Figure:
     grid = figure.add_gridspec(cells, columns)
     scores = [trial.score for trial in result.trials if trial.score is not None]
     norm = Normalize(min(scores), max(scores))
-    drawn = [(column, row) for row in range(1, count) for column in range(row)]
-    for column, row in drawn:
+    pairs = [(column, row) for row in range(1, count) for column in range(row)]
+    for column, row in pairs:
         _pair(figure.add_subplot(grid[row - 1, column]), result, (column, row), norm)
-    if not drawn:
+    if not pairs:
         _alone(figure.add_subplot(grid[0, 0]), result, norm)
-    _key(figure.add_subplot(grid[0, 1:]), figure.axes[: len(drawn) or 1], norm)
+    _key(figure.add_subplot(grid[0, 1:]), figure.axes[: len(pairs) or 1], norm)
     return figure
 
 
@@ -83,12 +83,12 @@ def _alone(axes: Axes, result: StudyResult, norm: Normalize) -> None:
 
 
 def _trials(axes: Axes, result: StudyResult, points: Array, norm: Normalize) -> None:
-    known = np.array([trial.score is not None for trial in result.trials])
+    scored = np.array([trial.score is not None for trial in result.trials])
     scores = [trial.score for trial in result.trials if trial.score is not None]
-    across, up = points[known].T
+    across, up = points[scored].T
     axes.scatter(across, up, c=scores, cmap=COLOURS, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
-    if not known.all():
-        across, up = points[~known].T
+    if not scored.all():
+        across, up = points[~scored].T
         axes.scatter(across, up, marker="x", color=VERMILLION, s=12, linewidths=0.8, clip_on=False, label="failed")
 
 

@@ -1,25 +1,19 @@
-"""What is known of θ, as rows and lines: intervals, what is as good, what trades, and who tells what."""
-
-from collections.abc import Sequence
+"""What is known of θ, as rows and notes: intervals, what PRPV alone leaves, and which parameters trade off."""
 
 from proxytune.report.numbers import Ends, digits, fixed, listed, percent, short, span
 from proxytune.report.study.finding import known_parameters
 from proxytune.report.style import plain
-from proxytune.search.knowledge.information import Information
 from proxytune.study.result import StudyResult
 
 Row = tuple[str, ...]
 
-TOLD_BY = ("parameter", "agents that tell most", "metrics that tell most", "more by")
-NAMED = 3
-"""So many agents and metrics are named."""
 BOX = "share of the box"
 
 
 def theta_columns(result: StudyResult) -> Row:
     """The heads of the table of θ; the truth has a column only where it is known."""
     truth = () if result.truth is None else ("truth",)
-    return ("parameter", "best", "95 % interval", *truth, "as good by PRPV", "searched")
+    return ("parameter", "best", "95 % interval", *truth, "by PRPV alone", "box")
 
 
 def theta_rows(result: StudyResult) -> list[Row]:
@@ -35,8 +29,8 @@ def _row(result: StudyResult, place: int, as_good: Ends) -> Row:
     value = f"{short4(known.best)} {known.unit}".strip()
     interval = span(known.interval) if known.identified else "unidentified"
     truth = () if result.truth is None else (_truth(result.truth.get(known.name), known.interval),)
-    searched = f"{short(box.low)} to {short(box.high)}"
-    return (known.name, value, interval, *truth, span(as_good, digits(as_good)), searched)
+    limits = f"{short(box.low)} to {short(box.high)}"
+    return (known.name, value, interval, *truth, span(as_good, digits(as_good)), limits)
 
 
 def short4(value: float) -> str:
@@ -50,49 +44,34 @@ def _truth(value: float | None, interval: Ends) -> str:
     return short4(value) if interval[0] <= value <= interval[1] else f"{short4(value)} (outside)"
 
 
-def theta_lines(result: StudyResult) -> list[str]:
+def theta_notes(result: StudyResult) -> list[str]:
     """What the table of θ does not hold, most needed first."""
-    return [*_unidentified(result), *_inside(result), *_trades(result), *_cautions(result)]
+    return [*_unidentified(result), *_inside(result), *_trades(result), *result.cautions]
 
 
 def _unidentified(result: StudyResult) -> list[str]:
     names = [plain(name) for name in result.knowledge.unidentified]
-    return [f"unidentified: {listed(names)}; the target's scores agree with nearly any value"] if names else []
+    few = f"{len(result.trials)} trials exclude almost no value of {listed(names)}"
+    return [f"{few}; unidentified: the interval fills more than 0.9 of the range"] if names else []
 
 
 def _inside(result: StudyResult) -> list[str]:
     """Whether the best θ and the truth are in the 95 % region, where that is worth a line."""
     space, learnt = result.study.settings.space, result.knowledge
-    lines = []
+    notes = []
     if not result.inside:
-        lines.append("the best θ by PRPV is outside the 95 % region, which is by every metric of every agent")
+        notes.append("the best θ by PRPV is outside the 95 % region, which uses every metric of every agent")
     if result.truth is not None and set(space.names) <= set(result.truth):
         holds = learnt.holds(space.values(result.truth))
-        lines.append(f"the 95 % region {'holds' if holds else 'does not hold'} the truth")
-    return lines
+        notes.append(f"the 95 % region {'contains' if holds else 'does not contain'} the truth")
+    return notes
 
 
 def _trades(result: StudyResult) -> list[str]:
     """The pairs that make up for each other, the strongest first."""
     ordered = sorted(result.knowledge.trades, key=lambda pair: -abs(pair[2]))
     return [
-        f"{plain(one)} and {plain(other)} make up for each other, correlation {fixed(found, 1)}"
-        for one, other, found in ordered
+        f"{plain(one)} and {plain(other)} trade off: a change of one makes up for the other "
+        f"(correlation {fixed(correlation, 1)})"
+        for one, other, correlation in ordered
     ]
-
-
-def _cautions(result: StudyResult) -> list[str]:
-    return [f"caution: {line}" for line in result.cautions]
-
-
-def told_rows(result: StudyResult) -> list[Row]:
-    """Per parameter of which anything is told, the agents and metrics that tell most, and what would tell more."""
-    return [_told(found) for found in result.knowledge.information if _most(found.agents)]
-
-
-def _told(found: Information) -> Row:
-    return (found.name, _most(found.agents), _most(found.metrics), f"more {found.limit}")
-
-
-def _most(shares: Sequence[tuple[str, float]]) -> str:
-    return ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares[:NAMED] if share >= 0.005)

@@ -8,20 +8,20 @@ from proxytune.study.settings import as_document
 from proxytune.teaching.experiment import Experiment, Lesson, teaching_settings
 
 
-def teach_document(found: Experiment, prpv: Mapping[str, float | None]) -> dict[str, Any]:
+def teach_document(experiment: Experiment, prpv: Mapping[str, float | None]) -> dict[str, Any]:
     """A learning experiment as plain JSON; None where a figure is undefined or was not reached."""
     return {
-        "name": found.settings.name,
-        "best_score": found.best_score,
+        "name": experiment.settings.name,
+        "best_score": experiment.best_score,
         "convergence": {
-            "level": found.when.level,
-            "tolerance": found.when.tolerance,
-            "threshold": found.when.threshold,
-            "settled": found.settled,
+            "level": experiment.when.level,
+            "tolerance": experiment.when.tolerance,
+            "threshold": experiment.when.threshold,
+            "settled": experiment.settled,
         },
-        "without": _curve(found.without),
-        "proxies": {lesson.name: _lesson(lesson, prpv.get(lesson.name)) for lesson in found.lessons},
-        "settings": {**as_document(found.settings), "teaching": _settings(found)},
+        "without": _curve(experiment.without),
+        "proxies": {lesson.name: _lesson(lesson, prpv.get(lesson.name)) for lesson in experiment.lessons},
+        "settings": {**as_document(experiment.settings), "teaching": _settings(experiment)},
     }
 
 
@@ -47,8 +47,8 @@ def _curve(curve: Curve) -> dict[str, Any]:
     return {"target_samples": list(curve.counts), "scores": scores}
 
 
-def _settings(found: Experiment) -> dict[str, Any]:
-    taught = teaching_settings(found.settings)
+def _settings(experiment: Experiment) -> dict[str, Any]:
+    taught = teaching_settings(experiment.settings)
     names = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance")
     return {
         "target": str(taught.target),

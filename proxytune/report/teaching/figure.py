@@ -1,4 +1,4 @@
-"""The figure of a learning experiment: what is scored in the target after so many target samples."""
+"""The figure of a learning experiment: score on the target against the number of target samples."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,20 +24,20 @@ RESAMPLES = 1000
 LEVELS = (2.5, 97.5)
 
 
-def teach_figure(found: Experiment) -> Figure:
+def teach_figure(experiment: Experiment) -> Figure:
     """Draw the mean learning curve with and without each proxy, with the 95 % band over seeds.
 
     Above the dashed line a learner counts as converged; 0 target samples are the zero-shot score.
     """
     figure = Figure(figsize=(5.2, 3.6), layout="constrained")
     axes = figure.subplots()
-    _curve(axes, found.without, NONE, ("black", ":", "x"))
-    for lesson, look in zip(found.lessons, LOOKS * len(found.lessons), strict=False):
+    _curve(axes, experiment.without, NONE, ("black", ":", "x"))
+    for lesson, look in zip(experiment.lessons, LOOKS * len(experiment.lessons), strict=False):
         _curve(axes, lesson.curve, lesson.name, look)
-    axes.axhline(found.when.threshold, color=GREY, linewidth=0.8, linestyle="--", label="converged")
-    smallest = found.without.counts[1]
+    axes.axhline(experiment.when.threshold, color=GREY, linewidth=0.8, linestyle="--", label="converged")
+    smallest = experiment.without.counts[1]
     axes.set_xscale("symlog", linthresh=smallest, linscale=0.5)
-    axes.xaxis.set_major_locator(FixedLocator(found.without.counts))
+    axes.xaxis.set_major_locator(FixedLocator(experiment.without.counts))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlim(left=-0.15 * smallest)

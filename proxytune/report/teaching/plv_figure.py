@@ -8,12 +8,12 @@ from proxytune.report.style import BLUE, ORANGE, VERMILLION, dress, legend_below
 from proxytune.teaching.search import PlvStudy, plv_or_worst
 
 
-def plv_figure(found: PlvStudy) -> Figure:
+def plv_figure(study: PlvStudy) -> Figure:
     """Draw PLV with its 95 % interval trial by trial, and the highest so far; crosses did not converge."""
     figure = Figure(figsize=(5.2, 3.2), layout="constrained")
     axes = figure.subplots()
-    grid = found.without.counts[-1]
-    for trial in found.trials:
+    grid = study.without.counts[-1]
+    for trial in study.trials:
         figures = trial.worth.plv
         if figures.value is None:
             axes.plot(trial.number, 0.0, "x", color=VERMILLION, markersize=5, label="not converged")
@@ -21,11 +21,11 @@ def plv_figure(found: PlvStudy) -> Figure:
         low, high = (end if end is not None else far for end, far in ((figures.low, -grid), (figures.high, grid)))
         axes.plot((trial.number, trial.number), (low, high), color=BLUE, linewidth=1.0, alpha=0.6)
         axes.plot(trial.number, figures.value, "o", color=BLUE, markersize=4, label="PLV")
-    values = np.array([plv_or_worst(trial) for trial in found.trials])
+    values = np.array([plv_or_worst(trial) for trial in study.trials])
     numbers = np.arange(1, len(values) + 1)
     highest = np.maximum.accumulate(values)
-    shown = np.isfinite(highest)
-    axes.step(numbers[shown], highest[shown], where="post", color=ORANGE, linewidth=1.5, label="highest so far")
+    reached = np.isfinite(highest)
+    axes.step(numbers[reached], highest[reached], where="post", color=ORANGE, linewidth=1.5, label="highest so far")
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     axes.set_xlabel("trial", fontsize=8)
     axes.set_ylabel("PLV [target samples saved]", fontsize=8)

@@ -11,26 +11,28 @@ from proxytune.learning.plv import Estimate
 from proxytune.learning.settings import NONE
 from proxytune.teaching.experiment import Experiment, Lesson
 
-COLUMNS = ("proxy", "PRPV", "zero-shot", "target samples", "PLV", "reduction")
-NOT_REACHED = "not reached"
+COLUMNS = ("proxy", "PRPV", "zero-shot score", "samples needed", "PLV", "reduction")
+NOT_REACHED, UNKNOWN = "not converged", "unknown"
+CONVERGED = "converged: the mean score is at least {} and stays so"
+PLV_MEANING = "PLV (proxy learning value): target samples saved by learning in the proxy first"
 
 
-def teach_table(found: Experiment, prpv: Mapping[str, float | None], files: Mapping[str, Any]) -> RenderableType:
+def teach_table(experiment: Experiment, prpv: Mapping[str, float | None], files: Mapping[str, Any]) -> RenderableType:
     """The result of a learning experiment as `teach` shows it."""
     table = Table(box=None, pad_edge=False)
     for name in COLUMNS:
         table.add_column(name, justify="left" if name == "proxy" else "right")
-    for row in table_rows(found, prpv):
+    for row in table_rows(experiment, prpv):
         table.add_row(*row)
-    lines = [*convergence_lines(found), *(f"{what}: {path}" for what, path in files.items())]
+    lines = [PLV_MEANING, *convergence_lines(experiment), *(f"{what}: {path}" for what, path in files.items())]
     return Group(table, *(Text(line) for line in lines))
 
 
-def table_rows(found: Experiment, prpv: Mapping[str, float | None]) -> list[tuple[str, ...]]:
+def table_rows(experiment: Experiment, prpv: Mapping[str, float | None]) -> list[tuple[str, ...]]:
     """The rows of table 1 as texts: the learner without a proxy, then one per proxy."""
-    worth = next((lesson.worth for lesson in found.lessons if lesson.worth), None)
+    worth = next((lesson.worth for lesson in experiment.lessons if lesson.worth), None)
     alone = (NONE, "", "", count(worth.without) if worth else NOT_REACHED, "", "")
-    return [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in found.lessons)]
+    return [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in experiment.lessons)]
 
 
 def _row(lesson: Lesson, prpv: float | None) -> tuple[str, ...]:
@@ -38,33 +40,34 @@ def _row(lesson: Lesson, prpv: float | None) -> tuple[str, ...]:
     predicts = "" if prpv is None else f"{prpv:g}"
     if worth is None:
         return (lesson.name, predicts, zero_shot, "", "", "")
-    return (lesson.name, predicts, zero_shot, count(worth.needed), count(worth.plv), _share(worth.reduction))
+    return (lesson.name, predicts, zero_shot, count(worth.needed), count(worth.plv, UNKNOWN), _share(worth.reduction))
 
 
-def convergence_lines(found: Experiment) -> list[str]:
+def convergence_lines(experiment: Experiment) -> list[str]:
     """What counts as converged, and whether the learner without a proxy has."""
-    when, last = found.when, found.without.counts[-1]
-    said = f"converged: a mean score of at least {when.threshold:.1f} of {found.best_score:g}, from there on"
-    if found.settled:
-        return [said, *(line for lesson in found.lessons for line in _told(lesson))]
+    when, last = experiment.when, experiment.without.counts[-1]
+    converged = CONVERGED.format(f"{when.threshold:.1f} of {experiment.best_score:g}")
+    if experiment.settled:
+        return [converged, *(line for lesson in experiment.lessons for line in _say_factor(lesson))]
     return [
-        said,
-        f"without a proxy the score still rises by more than {when.tolerance:g} up to {last} target samples, so it has "
-        "not converged and PLV is not known; raise teaching.target_samples",
+        converged,
+        f"without a proxy the score still rises by more than {when.tolerance:g} up to {last} target samples: it has "
+        "not converged and PLV is unknown; raise teaching.target_samples",
     ]
 
 
-def _told(lesson: Lesson) -> list[str]:
+def _say_factor(lesson: Lesson) -> list[str]:
     """The factor by which a proxy divides the target samples that are needed."""
     worth = lesson.worth
     if worth is None or worth.factor.value is None:
         return []
-    return [f"{lesson.name}: η(∅) / η(S) = {worth.factor.value:.3g} ({_ends(worth.factor)})"]
+    factor = f"{worth.factor.value:.3g} ({_ends(worth.factor)})"
+    return [f"{lesson.name}: samples needed without the proxy / with it = {factor}"]
 
 
-def count(figure: Estimate) -> str:
-    """A number of samples with its interval; what was not reached is said."""
-    value = NOT_REACHED if figure.value is None else f"{figure.value:g}"
+def count(figure: Estimate, missing: str = NOT_REACHED) -> str:
+    """A number of samples with its interval; without a number, why it is missing."""
+    value = missing if figure.value is None else f"{figure.value:g}"
     ends = _ends(figure)
     return f"{value} ({ends})" if ends else value
 

@@ -17,13 +17,14 @@ from proxytune.report.study.profiles_figure import profiles_figure
 from proxytune.report.study.search_figures import evaluations_figure
 from proxytune.report.writing import save, write_text
 from proxytune.running.progress import Silent, Watcher
-from proxytune.search.engines.registry import make_proposer, why_not
+from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Theta
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
 from proxytune.study import confirmation, preflight
 from proxytune.study.evaluation import Spent
 from proxytune.study.knowledge import goal_of
+from proxytune.study.provenance import note_search
 from proxytune.study.result import Best, StudyResult, result_of
 from proxytune.study.run import as_stored, check_facts, run_study
 from proxytune.study.settings import StudySettings
@@ -108,16 +109,15 @@ def run_opened(
     Args:
         study: The study.
         watching: Gives what hears of every episode.
-        warn: Hears of every parameter that the pre-flight finds to do nothing, before the first trial.
+        warn: Hears, before the first trial, of another search than before and of parameters without effect.
     """
     settings = study.settings
-    _check_engine(study)
     with locked(settings.folder), Store.open(settings.folder) as store:
         with watching as watcher:
             under_way = StudyRun(study, store, watcher)
             _prepare(under_way, warn)
-            # The pre-flight measures the noise that the proposer is to forgive.
-            run_study(under_way, make_proposer(settings.engine, settings.initial, goal_of(under_way)))
+            # The proposer allows for the noise that the pre-flight measured.
+            run_study(under_way, make_proposer(study.engine, settings.initial, goal_of(under_way)))
             confirmation.run_confirmation(under_way)
         return StudyReport(result_of(under_way), under_way.spent)
 
@@ -141,16 +141,11 @@ def most_episodes(settings: StudySettings) -> int:
 
 
 def _prepare(under_way: StudyRun, warn: Callable[[str], None]) -> None:
-    """Run the pre-flight and say at once which parameters do nothing: the study may be stopped for that."""
+    """Run the pre-flight and warn at once of parameters without effect, so that the user can stop the study."""
     check_facts(under_way)
+    if line := note_search(under_way.study, under_way.store):
+        warn(line)
     preflight.run_preflight(under_way)
     learnt = preflight.preflight_of(under_way) if under_way.spent.episodes else None
     for warning in learnt.warnings if learnt else ():
         warn(warning)
-
-
-def _check_engine(study: Study) -> None:
-    settings = study.settings
-    reason = why_not(settings.engine, composed=settings.objective != "plv")
-    if reason:
-        raise settings.error("engine", reason)

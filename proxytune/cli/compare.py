@@ -19,7 +19,8 @@ from proxytune.errors import InputError, StoreError
 from proxytune.report.compare.document import compare_document, compare_lines, compare_tables
 from proxytune.report.compare.figure import compare_figure
 from proxytune.report.writing import save, write_text
-from proxytune.search.engines.registry import NAMES, STUDY_ENGINES, engine_code, why_not
+from proxytune.search.engines.engine import Engine
+from proxytune.search.engines.registry import NAMES, STUDY_ENGINES, engine_code, engine_of, why_not
 from proxytune.storage.lock import locked
 
 FILE_NAME = "runs.jsonl"
@@ -65,8 +66,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     _make(output)
     with locked(output), objective_of(arguments, output, len(engines)) as (objective, budget, initial, jobs):
         keys = _keys(objective, engines, arguments.seeds, budget, initial)
-        runs = _finish_all(objective, keys, output / FILE_NAME, jobs)
-    grouped = [[runs[key] for key in keys if key.engine == engine] for engine in engines]
+        runs = _finish_all(objective, keys, output / FILE_NAME, jobs, _beside(arguments))
+    grouped = [[runs[key] for key in keys if key.engine == engine.name] for engine in engines]
     summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
     return _answer(objective, summaries, grouped, output)
 
@@ -83,20 +84,26 @@ def _answer(
     return Answer({**document, "figures": [str(figure)]}, Group(*tables, *(Text(line) for line in lines)))
 
 
-def _engines(arguments: argparse.Namespace) -> list[str]:
+def _engines(arguments: argparse.Namespace) -> list[Engine]:
     """The engines asked for, in that order."""
     stand_in = STAND_INS.get(arguments.study)
     composed = stand_in is None or stand_in.goal(1) is not None
     if arguments.engines is None:
-        return [name for name in STUDY_ENGINES if not why_not(name, composed=composed)]
+        return [engine_of(name) for name in STUDY_ENGINES if not why_not(name, composed=composed)]
     named = [name.strip() for name in arguments.engines.split(",") if name.strip()]
     for name in named:
-        reason = why_not(name, composed=composed)
+        reason = why_not(name, composed=composed, beside=_beside(arguments))
         if reason:
             raise InputError(f"--engines: {reason}")
     if not named:
         raise InputError(f"--engines: names no engine; give some of {', '.join(NAMES)}")
-    return list(dict.fromkeys(named))
+    return [engine_of(name, _beside(arguments)) for name in dict.fromkeys(named)]
+
+
+def _beside(arguments: argparse.Namespace) -> Path:
+    """Where one's own engines lie: beside the study, or for a test problem in the current folder."""
+    path = Path(arguments.study)
+    return path if path.is_dir() else path.parent
 
 
 def _check(arguments: argparse.Namespace) -> None:
@@ -107,15 +114,17 @@ def _check(arguments: argparse.Namespace) -> None:
     check_truths(arguments)
 
 
-def _keys(objective: Objective, engines: Sequence[str], seeds: int, budget: int, initial: int) -> list[RunKey]:
+def _keys(objective: Objective, engines: Sequence[Engine], seeds: int, budget: int, initial: int) -> list[RunKey]:
     return [
-        RunKey(objective.identity, engine, seed, budget, initial, engine_code(engine))
+        RunKey(objective.identity, engine.name, seed, budget, initial, engine_code(engine))
         for seed in range(1, seeds + 1)
         for engine in engines
     ]
 
 
-def _finish_all(objective: Objective, keys: Sequence[RunKey], path: Path, jobs: int) -> Mapping[RunKey, Run]:
+def _finish_all(
+    objective: Objective, keys: Sequence[RunKey], path: Path, jobs: int, beside: Path
+) -> Mapping[RunKey, Run]:
     """All runs, each written as soon as it is finished.
 
     Runs that the file lacks are run now; runs that an older version judged are judged again.
@@ -123,14 +132,15 @@ def _finish_all(objective: Objective, keys: Sequence[RunKey], path: Path, jobs: 
     runs = read_runs(path)
     missing = [key for key in keys if key not in runs or runs[key].judgement.code != judging_code()]
     with Parallel(n_jobs=min(jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
-        for run in parallel(delayed(_finish)(objective, key, runs.get(key)) for key in missing):
+        for run in parallel(delayed(_finish)(objective, key, runs.get(key), beside) for key in missing):
             _append(path, run)
             runs[run.key] = run
     return runs
 
 
-def _finish(objective: Objective, key: RunKey, run: Run | None) -> Run:
-    return judged_again(objective, run) if run else run_engine(objective, key)
+def _finish(objective: Objective, key: RunKey, run: Run | None, beside: Path) -> Run:
+    engine = engine_of(key.engine, beside)
+    return judged_again(objective, run, engine) if run else run_engine(objective, key, engine)
 
 
 def read_runs(path: Path) -> dict[RunKey, Run]:

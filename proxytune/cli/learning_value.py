@@ -26,7 +26,7 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str,
     points = points_of(school, school.settings.budget)
     with locked(folder), Store.open(folder) as store, Bars(points, "points of learning curves") as bars:
         search = PlvSearch(settings, school, store, space, bars)
-        result = search.run(make_proposer(settings.engine, settings.initial))
+        result = search.run(make_proposer(study.engine, settings.initial))
     figure = folder / "figures" / "plv.png"
     save(plv_figure(result), figure)
     return Answer({**plv_document(result), "figure": str(figure)}, plv_table(result, {"figure": figure}))

@@ -9,13 +9,14 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from proxytune.api.studies import StudyReport
 from proxytune.cli.answer import Answer
-from proxytune.cli.study import draw
 from proxytune.cli.sweep import draw_curves
 from proxytune.report.study.document import study_document
 from proxytune.report.study.table import study_table
 from proxytune.scores import Metric
 from proxytune.storage.store import Store
+from proxytune.study.evaluation import Spent
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import as_stored
@@ -49,7 +50,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     figures = draw_curves(curves, folder / "figures")
     document: dict[str, Any] = {}
     if result:
-        own_figures, report = draw(result, folder)
+        own_figures, report = StudyReport(result, Spent()).write(folder)
         figures = [*own_figures, *figures]
         document = {**study_document(result), "report": str(report)}
     paths = [str(path) for path in figures]

@@ -7,7 +7,8 @@ from typing import Any
 
 from proxytune.comparison.analytic import Objective
 from proxytune.comparison.judgement import Judgement, judge, judgement_from
-from proxytune.search.engines.registry import WITH_OUTPUTS, make_proposer
+from proxytune.search.engines.engine import Engine
+from proxytune.search.engines.registry import make_proposer
 from proxytune.search.loop import Propose, Search
 from proxytune.search.proposer import Trial, Values
 
@@ -50,19 +51,20 @@ class Run:
     judgement: Judgement
 
 
-def run_engine(objective: Objective, key: RunKey) -> Run:
+def run_engine(objective: Objective, key: RunKey, engine: Engine) -> Run:
     """Spend the budget, and judge what came of it.
 
     Raises:
         InputError: If there is no such engine, or it needs a library that is not installed.
         RunError: If no trial has a score.
     """
-    goal = objective.goal(key.seed) if key.engine in WITH_OUTPUTS else None
-    proposer = make_proposer(key.engine, key.initial, goal)
+    learns = engine.learns_from == "outputs"
+    goal = objective.goal(key.seed) if learns else None
+    proposer = make_proposer(engine, key.initial, goal)
     visits = Visits(objective, key)
     Search(objective.space, proposer, key.seed, key.budget, key.initial).run(visits)
     points = tuple(trial.values for trial in visits.trials())
-    judgement = judge(objective, points, key.seed, by_outputs=key.engine in WITH_OUTPUTS)
+    judgement = judge(objective, points, key.seed, by_outputs=learns)
     return Run(key, points, visits.seconds / max(1, key.budget - key.initial), judgement)
 
 
@@ -95,9 +97,9 @@ class Visits:
         self._trials += [Trial(v, objective.score(v, seed), objective.outcome(v, seed)) for v in points]
 
 
-def judged_again(objective: Objective, run: Run) -> Run:
+def judged_again(objective: Objective, run: Run, engine: Engine) -> Run:
     """A finished run, judged by the code of today: nothing is proposed, and nothing of a point is evaluated twice."""
-    found = judge(objective, run.visited, run.key.seed, by_outputs=run.key.engine in WITH_OUTPUTS)
+    found = judge(objective, run.visited, run.key.seed, by_outputs=engine.learns_from == "outputs")
     return Run(run.key, run.visited, run.seconds, found)
 
 

@@ -3,10 +3,14 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from proxytune.errors import ExtensionError, InputError
+from proxytune.extensions import load, plugins
 from proxytune.scores import Array, Metric, ScoreTable
-from proxytune.study.settings import StudySettings
-from proxytune.usefulness import ppv, prpv
+from proxytune.settings import nearest
+from proxytune.study.settings import LEARNING, StudySettings
+from proxytune.usefulness import MEASURES, Measure, ppv, prpv
 from proxytune.usefulness.prpv import prpv_of_means
 
 OfMeans = Callable[[Array, Array, Sequence[Metric]], Array]
@@ -53,5 +57,30 @@ PRPV = Objective("prpv", "PRPV", False, prpv_of_means)
 
 
 def objective_of(settings: StudySettings) -> Objective:
-    """The measure that the trials of a study are scored by; a study of learning value is narrowed by PRPV."""
-    return PRPV
+    """The measure that the trials of a study are scored by; a study of learning value is narrowed by PRPV.
+
+    Raises:
+        SettingsError: If there is no such measure, or it is no single number of mean scores.
+    """
+    name = settings.objective
+    if name in (PRPV.name, LEARNING):
+        return PRPV
+    shipped = {measure.key: measure for measure in MEASURES if measure.on_means and not measure.per_metric}
+    try:
+        if ":" not in name and name not in shipped and name not in plugins("measure", shipped):
+            known = (*shipped, LEARNING)
+            raise InputError(f"unknown measure '{name}' (your own is written module:attribute); {nearest(name, known)}")
+        measure = load(name, kind="measure", beside=settings.folder, shipped=shipped)
+        return _as_objective(name, measure)
+    except InputError as problem:
+        raise settings.error("objective", str(problem)) from None
+
+
+def _as_objective(name: str, measure: Any) -> Objective:
+    if not isinstance(measure, Measure):
+        raise ExtensionError(f"measure '{name}' is a {type(measure).__name__}; make it a proxytune.Measure")
+    if measure.on_means is None or measure.per_metric:
+        raise ExtensionError(
+            f"measure '{name}' is no single number of mean scores: it needs on_means, without per_metric"
+        )
+    return Objective(name, measure.name, not measure.lower_is_better, measure.on_means)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from proxytune.search.engines.registry import engine_code, engine_of
+from proxytune.search.engines.registry import engine_code
 from proxytune.storage.store import Store
 from proxytune.study.study import Study
 from proxytune.versions import version_changes, versions_of
@@ -39,10 +39,10 @@ def note_search(study: Study, store: Store) -> str:
     Returns:
         One line if it is other code than before, or other packages; empty if not, or if no trial is left to propose.
     """
-    engine, first = study.settings.engine, len(store.trials()) + 1
+    engine, first = study.engine, len(store.trials()) + 1
     if first > study.settings.budget:
         return ""
-    library = engine_of(engine).needs
+    library = engine.needs
     needs = library.modules if library else ()
     now = {"first_trial": first, "code": engine_code(engine), "versions": versions_of((*PACKAGES, *needs))}
     known = [one for one in store.facts().get(SEARCH, []) if one["first_trial"] < first]

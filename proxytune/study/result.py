@@ -110,6 +110,10 @@ class StudyResult:
             return False
         return bool(self.judged.at_noise_floor) and self.knowledge.misfit.fits is not False and self.inside
 
+    def value_of(self, trial: TrialRecord) -> float | None:
+        """The objective of a finished trial; None of any other."""
+        return trial.measures.get(self.study.objective.name)
+
     @property
     def failed_episodes(self) -> int:
         """How many episodes of all trials failed."""

@@ -8,14 +8,15 @@ from typing import Any
 from proxytune.errors import InputError
 from proxytune.learning.settings import TeachingSettings, read_teaching
 from proxytune.scores import Metric
-from proxytune.search.engines.registry import DEFAULT_ENGINE, SCORE_ENGINE, STUDY_ENGINES
+from proxytune.search.engines.registry import DEFAULT_ENGINE, SCORE_ENGINE
 from proxytune.settings import Section, read_settings
 from proxytune.space import Interval, Space
 
 DEFAULT_FAMILY = "proxytune.driving.family:lane_following"
 FILE_NAME = "study.toml"
 FORMAT = 1
-OBJECTIVES = ("prpv", "plv")
+LEARNING = "plv"
+"""The objective that is not a measure of scores but of learning."""
 KEYS = (
     "format", "name", "family", "proxy", "target", "truth", "objective", "metrics", "agents",
     "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
@@ -48,14 +49,14 @@ class StudySettings:
         proxy: A model.toml whose effects the proxy has, if any.
         target: The score table of the target.
         truth: A model.toml of what made the target, where that is known.
-        objective: The measure that is made small.
+        objective: The measure that is made small or large: "prpv", "ppv", "plv", or one's own.
         metrics: How agents are compared.
         agents: Names of the agents, at least two.
         starts: How many of the family's starting conditions, the first ones, each agent drives from.
         budget: How many trials.
         initial: How many of them come from the quasi-random design.
         batch: How many trials are proposed together, and their episodes run together.
-        engine: What proposes the others.
+        engine: Name of what proposes the others.
         seed: Seed of the episodes and of the search.
         jobs: How many processes run episodes.
         stop_on_failure: Whether a failing episode stops the study.
@@ -121,14 +122,14 @@ def read_study_settings(path: Path) -> StudySettings:
         proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
         target=path.parent / read.text("target"),
         truth=path.parent / read.text("truth") if "truth" in read.values else None,
-        objective=read.text("objective", "prpv", choices=OBJECTIVES),
+        objective=read.text("objective", "prpv"),
         metrics=_metrics(read),
         agents=_agents(read),
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", low=1, high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
         batch=read.whole("batch", 1, low=1, high=100_000),
-        engine=read.text("engine", _default_engine(read), choices=STUDY_ENGINES),
+        engine=read.text("engine", _default_engine(read)),
         seed=read.whole("seed", 1),
         jobs=read.whole("jobs", 1, low=1, high=1024),
         stop_on_failure=read.text("on_failure", "continue", choices=("continue", "stop")) == "stop",
@@ -144,7 +145,7 @@ def read_study_settings(path: Path) -> StudySettings:
 
 def _default_engine(read: Section) -> str:
     """Of learning value nothing is known but the score."""
-    return SCORE_ENGINE if read.text("objective", "prpv", choices=OBJECTIVES) == "plv" else DEFAULT_ENGINE
+    return SCORE_ENGINE if read.text("objective", "prpv") == LEARNING else DEFAULT_ENGINE
 
 
 def _metrics(read: Section) -> tuple[Metric, ...]:

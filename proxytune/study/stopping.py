@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from proxytune.search.engines.composite import expected_gain
 from proxytune.search.engines.gaussian_process import expected_improvement
-from proxytune.search.engines.registry import WITH_OUTPUTS
 from proxytune.search.proposer import batch_at
 from proxytune.storage.records import TrialRecord
 from proxytune.study.evaluation import plan
@@ -70,7 +69,7 @@ def _nothing_to_gain(run: StudyRun, done: Sequence[TrialRecord]) -> str:
 def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:
     """The most that any θ is expected to improve the objective, and its noise, as the study's engine sees it."""
     settings = run.settings
-    if settings.engine in WITH_OUTPUTS:
+    if run.study.engine.learns_from == "outputs":
         trials = [run.search_trial(trial) for trial in done]
         return expected_gain(settings.space, trials, goal_of(run), settings.seed)
     return expected_improvement(settings.space, score_trials(settings.space, done), settings.seed)

@@ -11,12 +11,14 @@ from proxytune.domain import DomainFamily
 from proxytune.effects import Catalogue, read_model
 from proxytune.errors import InputError, ScoresError
 from proxytune.scores import ScoreTable, read_scores
-from proxytune.search.engines.registry import WITH_OUTPUTS
+from proxytune.search.engines import gaussian_process
+from proxytune.search.engines.engine import Engine
+from proxytune.search.engines.registry import STUDY_ENGINES, engine_of, why_not_engine
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.objective import PRPV, Objective, objective_of
-from proxytune.study.settings import StudySettings, read_study_settings
+from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
 from proxytune.study.weights import unnoticed
 from proxytune.usefulness.repeats import start_of, starts_of
 from proxytune.versions import version_changes
@@ -38,6 +40,7 @@ class Study:
         truth: The θ that made the target, where study.toml names a model of it; nothing depends on it.
         cautions: What of study.toml or of the target's table is left out, in one line each.
         objective: The measure that its trials make small or large.
+        engine: What proposes its trials after the design.
     """
 
     settings: StudySettings
@@ -47,6 +50,7 @@ class Study:
     truth: Theta | None = None
     cautions: tuple[str, ...] = ()
     objective: Objective = PRPV
+    engine: Engine = gaussian_process.ENGINE
 
 
 def open_study(path: Path) -> Study:
@@ -62,7 +66,25 @@ def open_study(path: Path) -> Study:
     left_out = (f"the target has no scores of {', '.join(absent)}: left out",) if absent else ()
     cautions = (*left_out, *unnoticed(settings.folder))
     target, objective = read_target(known, family), objective_of(settings)
-    return Study(known, family, target, family.identity, _truth(settings), cautions, objective)
+    return Study(known, family, target, family.identity, _truth(settings), cautions, objective, _engine(settings))
+
+
+def _engine(settings: StudySettings) -> Engine:
+    """The engine that a study names, which is installed and may be named.
+
+    Raises:
+        SettingsError: If it is not.
+    """
+    try:
+        engine = engine_of(settings.engine, settings.folder)
+    except InputError as problem:
+        raise settings.error("engine", str(problem)) from None
+    if not engine.in_studies:
+        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, STUDY_ENGINES)}")
+    reason = why_not_engine(engine, composed=settings.objective != LEARNING)
+    if reason:
+        raise settings.error("engine", reason)
+    return engine
 
 
 def _with_scores(settings: StudySettings) -> StudySettings:
@@ -129,7 +151,7 @@ def facts(study: Study) -> dict[str, Any]:
     named: dict[str, Any] = {"batch": settings.batch, "engine": settings.engine}
     said = {key: value for key, value in named.items() if value != UNSAID[key]}
     compared = [metric.name for metric in settings.metrics]
-    learns = settings.engine in WITH_OUTPUTS
+    learns = study.engine.learns_from == "outputs"
     if learns:
         said["preflight"] = settings.preflight
     versions = getattr(study.family, "versions", None)

@@ -11,6 +11,7 @@ FLOORS = (
     {"study"},
     {"sweep", "teaching", "comparison", "diagnosis"},
     {"report"},
+    {"api"},
     {"cli"},
     {"__main__", "__init__"},
 )

@@ -6,11 +6,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from proxytune.report.style import BLUE, COLUMN, GREEN, ORANGE, VERMILLION, dress, floor_name, legend_below
+from proxytune.study.objective import PRPV
 from proxytune.study.result import StudyResult
 
 
 def convergence(result: StudyResult) -> Figure:
     """Draw every trial's PRPV, that of the answer so far, and at the end the answer's on fresh episodes.
+
+    Where the objective is another measure, that is drawn in its place.
 
     The answer so far is the visited θ of lowest expected PRPV, which need not be the luckiest trial. Filled points were
     proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that failed, triangles
@@ -21,13 +24,16 @@ def convergence(result: StudyResult) -> Figure:
     axes = figure.subplots()
     _trials(axes, result)
     _answer(axes, result)
-    _fresh(axes, result)
-    _levels(axes, result)
+    if result.study.objective == PRPV:
+        _fresh(axes, result)
+        _levels(axes, result)
     axes.set_xlabel("trial", fontsize=8)
-    axes.set_ylabel("PRPV [ordered pairs]", fontsize=8)
-    axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_ylabel(result.study.objective.label, fontsize=8)
+    if result.study.objective == PRPV:
+        axes.set_ylabel("PRPV [ordered pairs]", fontsize=8)
+        axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     dress(axes)
     legend_below(figure, axes)
     return figure
@@ -44,7 +50,7 @@ def _levels(axes: Axes, result: StudyResult) -> None:
 
 
 def _trials(axes: Axes, result: StudyResult) -> None:
-    scored = [(trial.number, trial.prpv) for trial in result.trials if trial.prpv is not None]
+    scored = [(trial.number, value) for trial in result.trials if (value := result.value_of(trial)) is not None]
     failed = [trial.number for trial in result.trials if trial.state == "failed"]
     bounds = [(trial.number, trial.bound) for trial in result.trials if trial.bound is not None]
     initial = result.study.settings.initial
@@ -65,8 +71,8 @@ def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) 
 def _answer(axes: Axes, result: StudyResult) -> None:
     """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's."""
     pairs = zip(result.trials, result.answers, strict=True)
-    answers = [(trial.number, answer.prpv) for trial, answer in pairs if answer is not None]
-    ends = [*answers, (result.trials[-1].number + 1, result.best.trial.prpv)]
+    answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
+    ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
     axes.step(*zip(*ends, strict=True), where="post", color=ORANGE, linewidth=1.5, label="answer so far")
 
 

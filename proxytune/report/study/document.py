@@ -9,6 +9,7 @@ from proxytune.report.study.verdict import sentence
 from proxytune.search.knowledge.importance import Importance
 from proxytune.storage.records import TrialRecord
 from proxytune.study.confirmation import Confirmation
+from proxytune.study.objective import PRPV
 from proxytune.study.preflight import Preflight
 from proxytune.study.result import StudyResult
 from proxytune.study.settings import as_document
@@ -46,7 +47,8 @@ def _best(result: StudyResult) -> dict[str, Any]:
         "region_share": float(learnt.posterior.share),
         "unidentified": list(learnt.unidentified),
         **{key: measures[key] for key in shared},
-        "fresh": _fresh(result.confirmation),
+        "objective": {"name": result.study.objective.name, "value": result.value_of(best.trial)},
+        "fresh": _fresh(result.confirmation, by_prpv=result.study.objective == PRPV),
         "posterior_mean": best.posterior_mean,
         "posterior_deviation": best.posterior_deviation,
         "usefulness": measures,
@@ -67,7 +69,7 @@ def _importance(one: Importance) -> dict[str, Any]:
     return {"share": one.share, "interval": list(one.interval), "alone": one.alone}
 
 
-def _fresh(confirmation: Confirmation | None) -> dict[str, Any] | None:
+def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any] | None:
     """What fresh episodes say of the answer and of its rivals."""
     if confirmation is None:
         return None
@@ -80,7 +82,8 @@ def _fresh(confirmation: Confirmation | None) -> dict[str, Any] | None:
             {
                 "index": one.trial.number,
                 "prpv": round(one.trial.prpv or 0.0),
-                "fresh_prpv": [None if score is None else round(score) for score in one.scores],
+                "fresh_prpv": [None if score is None else round(score) for score in one.scores if by_prpv],
+                "fresh_scores": list(one.scores),
             }
             for one in confirmation.candidates
         ],
@@ -106,6 +109,7 @@ def _trial(trial: TrialRecord) -> dict[str, Any]:
         "theta": dict(trial.theta),
         "prpv": None if trial.prpv is None else round(trial.prpv),
         "ppv": trial.ppv,
+        "measures": dict(trial.measures),
         "failed_episodes": trial.failed_episodes,
         "failure": trial.failure or None,
         "cut_off": _cut(trial),

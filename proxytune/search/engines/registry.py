@@ -1,8 +1,13 @@
 """The engines by name."""
 
+import inspect
+from dataclasses import replace
 from importlib.util import find_spec
+from pathlib import Path
 
-from proxytune.errors import InputError
+from proxytune.errors import ExtensionError, InputError
+from proxytune.extensions import load, plugins
+from proxytune.meaning import meaning_of
 from proxytune.search.digest import code_of
 from proxytune.search.engines import (
     after_design,
@@ -46,36 +51,50 @@ SCORE_ENGINE = gaussian_process.ENGINE.name
 """The default where a score has no parts."""
 
 
-def engine_of(name: str) -> Engine:
+def engine_of(name: str, beside: Path | None = None) -> Engine:
     """The engine of this name; every look-up goes through here.
 
+    Args:
+        name: Of a shipped engine or of a plug-in, or `module:attribute` of one's own.
+        beside: The folder whose modules come before the installed ones.
+
     Raises:
-        InputError: If there is no such engine.
+        InputError: If there is no such engine, or it is none.
     """
-    for engine in ENGINES:
-        if engine.name == name:
-            return engine
-    raise InputError(f"unknown engine '{name}'; {nearest(name, NAMES)}")
+    shipped = {engine.name: engine for engine in ENGINES}
+    if name not in shipped and ":" not in name and name not in plugins("engine", shipped):
+        raise InputError(f"unknown engine '{name}' (your own is written module:attribute); {nearest(name, NAMES)}")
+    engine = load(name, kind="engine", beside=beside, shipped=shipped)
+    if not isinstance(engine, Engine):
+        kind = type(engine).__name__
+        raise ExtensionError(f"engine '{name}' is a {kind}; make it a proxytune.search.engines.engine.Engine")
+    return engine if engine.name == name else replace(engine, name=name)
 
 
-def why_not(name: str, *, composed: bool) -> str:
+def why_not(name: str, *, composed: bool, beside: Path | None = None) -> str:
     """Why an engine cannot be used, in one phrase; empty if it can.
 
     Args:
         name: Of the engine.
         composed: Whether the score is computed from outcomes that are known.
+        beside: The folder whose modules come before the installed ones.
     """
     try:
-        engine = engine_of(name)
+        return why_not_engine(engine_of(name, beside), composed=composed)
     except InputError as problem:
         return str(problem)
+
+
+def why_not_engine(engine: Engine, *, composed: bool) -> str:
+    """The same of an engine at hand."""
     if engine.needs and not installed(engine):
         modules, library, extra = engine.needs
         verb = "are" if len(modules) > 1 else "is"
         remedy = f"pip install 'proxytune[{extra}]', or use another engine"
-        return f"'{name}' needs {library}, which {verb} not installed; {remedy}"
+        return f"'{engine.name}' needs {library}, which {verb} not installed; {remedy}"
     if engine.learns_from == "outputs" and not composed:
-        return f"'{name}' models what a score is computed from, and this one has no such parts; use '{SCORE_ENGINE}'"
+        remedy = f"use '{SCORE_ENGINE}'"
+        return f"'{engine.name}' models what a score is computed from, and this one has no such parts; {remedy}"
     return ""
 
 
@@ -84,24 +103,29 @@ def installed(engine: Engine) -> bool:
     return engine.needs is None or all(find_spec(module) for module in engine.needs.modules)
 
 
-def make_proposer(name: str, initial: int, goal: Goal | None = None) -> Proposer:
+def make_proposer(engine: str | Engine, initial: int, goal: Goal | None = None) -> Proposer:
     """The proposer of an engine, with so many trials from the quasi-random design first: all engines share it.
 
     Args:
-        name: Of the engine.
+        engine: The engine, or the name of a shipped one.
         initial: How many trials come from the design.
         goal: What the outputs of a trial are to come to; None where a score has no such parts.
 
     Raises:
         InputError: If there is no such engine, or it cannot be used.
     """
-    reason = why_not(name, composed=goal is not None)
+    engine = engine_of(engine) if isinstance(engine, str) else engine
+    reason = why_not_engine(engine, composed=goal is not None)
     if reason:
         raise InputError(reason)
-    engine = engine_of(name)
     return AfterDesign(engine.make(goal) if engine.learns_from == "outputs" else engine.make(), initial)
 
 
-def engine_code(name: str) -> str:
+def engine_code(engine: str | Engine) -> str:
     """A digest of the code that an engine's proposals depend on."""
-    return code_of(after_design.__name__, engine_of(name).make.__module__)
+    engine = engine_of(engine) if isinstance(engine, str) else engine
+    code = code_of(after_design.__name__, engine.make.__module__)
+    if engine.name in NAMES:
+        return code
+    source = Path(inspect.getfile(engine.make))
+    return f"{code} {meaning_of([source], source.parent)[:12]}"

@@ -164,3 +164,9 @@ def test_a_plugin_with_the_name_of_something_shipped_is_refused(install):
     install("fast_agents", "agent.steady = a:b")
     with pytest.raises(ExtensionError, match="'agent.steady' of fast_agents has the name of a shipped agent; rename"):
         load("steady", kind="agent", shipped=SHIPPED)
+
+
+def test_a_plugin_whose_name_could_not_be_written_as_one_word_is_refused(install):
+    install("fast_agents", "agent.very.quick = a:b")
+    with pytest.raises(ExtensionError, match="'agent.very.quick' of fast_agents must be called agent.NAME, one word"):
+        plugins("agent")

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from proxytune.effects import Cue, Means, Panel, Setting, Signal, Stage, Trace
+from proxytune.effects.trace import Draws
 from proxytune.space import Parameter
 
 
@@ -77,6 +78,11 @@ WRONG = {
     ),
     "a bug": ("self.loss)", "self.lost)", "raised AttributeError: .*lost.*; correct its begin and apply"),
     "not neutral": ("(1.0 - self.loss)", "(0.9 - self.loss)", r"changes the signal at its neutral value \[0.0\]"),
+    "chance": (
+        "cues=(Cue.DIRECTION,),",
+        "cues=(Cue.DIRECTION,), draws=Draws(lambda value, rate: None, (0.1, 1.0)),",
+        "draws at random, which only shipped effects may",
+    ),
     "no class": ("class WeakReverse:", "class Other:", "weak_reverse has no 'WeakReverse'"),
 }
 """What is replaced in it, by what, and what is said of that."""

@@ -4,6 +4,7 @@ import sqlite3
 
 import pytest
 
+from proxytune.cli.main import main
 from proxytune.errors import SettingsError
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.store import Store
@@ -147,3 +148,13 @@ def test_nothing_is_said_or_kept_of_the_search_once_all_trials_are_proposed(fini
     before = sqlite3.connect(finished / "study.db").execute("SELECT * FROM facts").fetchall()
     assert noted(finished) == ""
     assert sqlite3.connect(finished / "study.db").execute("SELECT * FROM facts").fetchall() == before
+
+
+def test_a_sweep_finds_the_episodes_of_an_earlier_identity(make_study, newer, monkeypatch, capsys):
+    folder, command = make_study(), ["sweep", "--parameter", "trim", "--points", "2"]
+    with monkeypatch.context() as then:
+        then.setattr("wobbly.Wobbly.identity", "wobbly 1 ()")
+        assert main([*command, str(folder)]) == 0
+    assert "36 episodes run" in capsys.readouterr().out
+    assert main([*command, str(folder)]) == 0
+    assert "\n0 episodes run" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""`list`: the robots, effects, agents and metrics there are."""
+"""`list`: the robots, maps, effects, agents and metrics there are."""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -7,6 +7,8 @@ from rich.table import Table
 
 from proxytune.cli.answer import Answer
 from proxytune.driving.agents import AGENTS
+from proxytune.driving.road.lane import lane_length
+from proxytune.driving.road.reading import map_names, shipped_map
 from proxytune.driving.robot import read_robot, robot_names
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE, DECLARED, theta_names
@@ -42,6 +44,19 @@ def _robots() -> list[Row]:
     ]
 
 
+def _maps() -> list[Row]:
+    return [
+        {
+            "name": road.name,
+            "description": road.description,
+            "outer_lap_m": float(lane_length(road, True)),
+            "inner_lap_m": float(lane_length(road, False)),
+            "starts": len(road.starts),
+        }
+        for road in map(shipped_map, map_names())
+    ]
+
+
 def _effects() -> list[Row]:
     rows: list[Row] = []
     for name, effect in CATALOGUE.items():
@@ -62,6 +77,7 @@ def _metrics() -> list[Row]:
 
 _KINDS: Mapping[str, Callable[[], list[Row]]] = {
     "robots": _robots,
+    "maps": _maps,
     "effects": _effects,
     "agents": _agents,
     "metrics": _metrics,

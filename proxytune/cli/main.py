@@ -45,7 +45,7 @@ COMMANDS: dict[str, Command] = {
     "predict": Command("predict", "what a fitted model says of any log"),
     "compare": Command("compare", "how fast each search engine finds a good theta", resumes=True),
     "plot": Command("plot", "draw a study's figures again"),
-    "list": Command("listing", "robots, effects, agents or metrics"),
+    "list": Command("listing", "robots, maps, effects, agents or metrics"),
 }
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2

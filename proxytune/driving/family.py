@@ -124,9 +124,7 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        return task.score_trajectory(
-            self.map, self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds
-        )
+        return task.score_trajectory(self.map, self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
 
     def drive(self, episode: Episode) -> Drive:
         """Drive one episode.

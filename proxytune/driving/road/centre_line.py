@@ -107,4 +107,5 @@ def _nearest_section(layout: Layout, places: Values) -> Numbers:
     view = _view(layout, order, places[..., None, :])
     over = np.maximum(np.arctan2(view.past, view.out) - layout.turn[order], 0.0)
     beyond = np.where(view.in_bend, layout.radius[order] * over, np.abs(view.past))
-    return order[np.argmin(np.abs(view.outside) + beyond + BEYOND * (beyond > 0.0), axis=-1)]
+    distance = np.abs(view.outside) + beyond + BEYOND * (beyond > 0.0)
+    return np.asarray(order[np.argmin(distance, axis=-1)])

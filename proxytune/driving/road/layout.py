@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from proxytune.driving.road.segments import Section, Segment, repeating_part, sections
+from proxytune.driving.road.segments import Section, Segment, repeats_of, sections
 
 Values = NDArray[np.float64]
 Begin = tuple[float, float, float]
@@ -38,7 +38,7 @@ class Layout(NamedTuple):
         across: Unit vectors of `normal`, (sections, 2).
         along: Unit vectors of the straights' directions, (sections, 2).
         origin: Point of the map that repeats of the road turn about, x and y [m].
-        repeats: How many times the road repeats its first sections to close.
+        repeats: How many times the road repeats its first sections to close, 1 where it does not.
     """
 
     normal: Values
@@ -67,14 +67,14 @@ def lay_out(begin: Begin, segments: tuple[Segment, ...]) -> Layout:
         segments: Of the whole lap.
     """
     lap = tuple(sections(segments))
-    repeats = len(segments) // len(repeating_part(segments))
+    repeats = repeats_of(lap)
     starts = corners(begin, segments)[:-1]
     origin = np.round(starts[:: len(lap) // repeats].mean(axis=0), PICOMETRE)
     rows = [(*_place(begin, lap, number, starts[number] - origin), *_before(lap, number)) for number in range(len(lap))]
     figures = np.array(rows).T
     across, side = unit(figures[0]), figures[1]
     along = side[:, None] * np.stack((-across[:, 1], across[:, 0]), axis=-1)
-    return Layout(*figures, across, along, origin, repeats)
+    return Layout._make((*figures, across, along, origin, repeats))
 
 
 def corners(begin: Begin, segments: tuple[Segment, ...]) -> Values:

@@ -45,7 +45,10 @@ def chosen_map(section: Section) -> Road:
     name = section.text("map", "small_loop")
     if name.endswith(".toml"):
         return read_map(section.path.parent / name)
-    return shipped_map(section.text("map", "small_loop", choices=map_names()))
+    if name not in map_names():
+        hint = f"{nearest(name, map_names())} (a map file of your own ends in .toml)"
+        raise section.error("map", f"unknown value '{name}'; {hint}")
+    return shipped_map(name)
 
 
 def read_map(path: Path) -> Road:

@@ -60,11 +60,10 @@ def sections(segments: tuple[Segment, ...]) -> Iterator[Section]:
         yield Section(math.fsum(lengths), 0.0, 0.0)
 
 
-def repeating_part(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
-    """The fewest segments of which the road is so many repeats: a quarter of a square loop."""
-    count = len(segments)
-    shortest = next(n for n in range(1, count + 1) if count % n == 0 and segments[:n] * (count // n) == segments)
-    return segments[:shortest]
+def repeats_of(lap: tuple[Section, ...]) -> int:
+    """How many times a lap repeats its first sections: 4 on a square loop, 1 where it never does."""
+    count = len(lap)
+    return next(n for n in range(count, 0, -1) if count % n == 0 and lap[: count // n] * n == lap)
 
 
 def tightened(segment: Segment, radius: float | None) -> tuple[Segment, ...]:

@@ -29,7 +29,7 @@ COLOURS = MappingProxyType(
 )
 """Red, green, blue, 0 to 255: means over the frames of gym-duckietown's photographed tiles."""
 
-STRIP = 16
+STRIP = 8
 """Rows that are drawn at once, to stay small in memory; divides MARGIN."""
 
 DASH_PER_GAP = 2.0
@@ -80,7 +80,7 @@ def _paint(road: Road, stretches: list[tuple[Segment, ...]], positions: Metres) 
     for colour, distance in _shapes(road, stretches, positions).items():
         cover = np.clip(0.5 - distance * PIXELS_PER_METRE, 0.0, 1.0)[..., None]
         picture += cover * (np.array(COLOURS[colour]) - picture)
-    return np.rint(picture).astype(np.uint8)
+    return np.asarray(np.rint(picture), dtype=np.uint8)
 
 
 def _shapes(road: Road, stretches: list[tuple[Segment, ...]], positions: Metres) -> dict[str, Metres]:

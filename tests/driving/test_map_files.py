@@ -135,7 +135,7 @@ def test_bends_are_painted_on_the_roads_own_radius_where_the_file_says_nothing(t
         ("lane_width = 0.22", "lane_width = 0.3", "road.lane_width: the two lanes overlap at 0.3 m"),
         ("width = 0.585", "width = 0.4", "road.width: 0.4 m has no room for two lanes; at least 0.4774 m"),
         ("bend_radius = 0.17", "bend_radius = 0.3", "paint.bend_radius: 0.3 m is wider than a bend; at most 0.2925"),
-        ("[0.4237, 0.702", "[0.8775, 0.8775", "starts[0]: lies 0.456 m beside the lane that runs its way"),
+        ("[0.4237, 0.702", "[0.8775, 0.8775", "starts[0]: lies 0.714 m beside the lane that runs its way"),
         ("[0.4237, 0.702, 104.3]", "[0.4, 0.7]", "starts[0]: must be a list of 3 finite numbers, got"),
         ("starts = [", "starts = []\nmore = [", "more: unknown key"),
     ],

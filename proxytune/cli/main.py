@@ -49,7 +49,7 @@ COMMANDS: dict[str, Command] = {
     "predict": Command("predict", "predict the poses of a log with a fitted model"),
     "compare": Command("compare", "compare how fast each search engine finds a good θ", resumes=True),
     "plot": Command("plot", "draw a study's figures and report again, without simulating"),
-    "list": Command("listing", "list robots, effects, agents, metrics, engines or measures"),
+    "list": Command("listing", "list robots, maps, effects, agents, metrics, engines or measures"),
 }
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2

@@ -7,7 +7,7 @@ import pandas as pd
 
 from proxytune.diagnosis.manoeuvres import LIBRARY
 from proxytune.diagnosis.measured.drives import Floats
-from proxytune.driving.family import LaneFollowing
+from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.recording import follow
 from proxytune.driving.robot import read_robot
 from proxytune.logs import Log, LogEpisode

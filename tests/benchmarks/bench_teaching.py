@@ -22,7 +22,8 @@ from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.drivetrain import Drivetrain
 from proxytune.driving.episode import _View, drive
 from proxytune.driving.expert import Expert
-from proxytune.driving.family import LaneFollowing, lane_following
+from proxytune.driving.family import lane_following
+from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.planar import PlanarPlant
 from proxytune.learning.cache import Cache
 from proxytune.learning.cloning import BehaviourCloning

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.horizon.floor import PoseNoise, noise_floor
-from proxytune.diagnosis.horizon.polish import FEWEST_BLOCKS
 from proxytune.diagnosis.horizon.repeats import repeated
 from proxytune.diagnosis.horizon.windows import Ratio, Rmse, Windows, blocks_of, cut, ratio, rmse, strays
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.naming.found import Found
+from proxytune.diagnosis.rules import RULES
 from proxytune.diagnosis.verdict import Bracket, bracket
 from proxytune.space import Theta
 
@@ -82,7 +82,7 @@ def horizon_error(
     """
     drives = tested.drives
     windows = cut(drives, horizon_s)
-    if len(np.unique(drives.block[windows.begin])) < FEWEST_BLOCKS:
+    if len(np.unique(drives.block[windows.begin])) < RULES.fewest_blocks:
         return None
     blocks = blocks_of(drives, windows)
     before, after = (how(drives, fitted.theta, windows) ** 2 for fitted in (found.declared, found.model))

@@ -7,10 +7,10 @@ import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.fitting import Fit, seen
-from proxytune.diagnosis.naming.adoption import NATS_APART
 from proxytune.diagnosis.naming.candidates import Candidate
 from proxytune.diagnosis.naming.found import Adopted, Found
 from proxytune.diagnosis.naming.visibility import trace_of
+from proxytune.diagnosis.rules import RULES
 
 SECONDS = 60.0
 
@@ -118,7 +118,7 @@ def _best_offer(found: Found) -> Manoeuvre | None:
         return None
     offers = [(_clear(found.model, shape, *pairs[0]), name, text, shape) for name, text, shape in LIBRARY]
     clear, name, text, shape = max(offers, key=lambda offer: offer[0])
-    if clear <= NATS_APART:
+    if clear <= RULES.rival_nats:
         return None
     between = (pairs[0][0].effect, pairs[0][1].effect)
     return Manoeuvre(name, text, between, clear, _driven(shape, found.model.drives))

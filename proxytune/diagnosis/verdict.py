@@ -5,23 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.horizon.repeats import Repeated
-
-AT_FLOOR = 1.15
-"""An error of no more than so many times the floor is at it."""
-
-WIDE = 1.5
-"""A bracket whose upper end is no more than so many times its lower is narrow enough to say that all is explained."""
-
-CHANCE = 1.03
-"""The lowest of several errors is lower than that of the right model by chance, by no more than this."""
-
-LOWERS = 0.95
-"""A model lowers the error if it brings it to this share."""
-
-
-ALIKE = 1.3
-"""What was driven again speaks for all drives if the error is no more than so many times what it does not repeat: a
-manoeuvre that never meets what is missing is repeated well, too."""
+from proxytune.diagnosis.rules import RULES
 
 
 class Bracket(NamedTuple):
@@ -51,7 +35,7 @@ def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
     """
     lower = min(lower, reached)
     upper = reached if again is None else _not_repeated(reached, again)
-    return Bracket(lower, max(lower, CHANCE * upper), reached, again)
+    return Bracket(lower, max(lower, RULES.lowest_by_chance * upper), reached, again)
 
 
 def _not_repeated(reached: float, again: Repeated) -> float:
@@ -78,15 +62,15 @@ def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:
 
 def at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
     """Whether an error is no more than noise: of poses, or of what drives do not repeat, or nothing lowers it."""
-    if after <= AT_FLOOR * floor.lower:
+    if after <= RULES.floor_factor * floor.lower:
         return True
-    if unnamed or floor.reached < LOWERS * after:
+    if unnamed or floor.reached < RULES.lowers * after:
         return False
     if floor.again is not None:
-        return floor.again.share.value >= 1.0 / AT_FLOOR and after <= ALIKE * floor.again.apart
-    return floor.upper < CHANCE * WIDE * floor.lower
+        return floor.again.share.value >= 1.0 / RULES.floor_factor and after <= RULES.repeats_alike * floor.again.apart
+    return floor.upper < RULES.lowest_by_chance * RULES.narrow_bracket * floor.lower
 
 
 def _beyond(floor: Bracket) -> bool:
     """Whether drives repeat more than the model predicts."""
-    return floor.again is not None and floor.again.share.interval[1] < 1.0 / AT_FLOOR
+    return floor.again is not None and floor.again.share.interval[1] < 1.0 / RULES.floor_factor

@@ -22,7 +22,7 @@ from proxytune.diagnosis.horizon.floor import PoseNoise
 from proxytune.diagnosis.horizon.polish import HORIZONS_S
 from proxytune.diagnosis.horizon_error import KeptAside, horizon_error
 from proxytune.diagnosis.naming.found import Adopted, Found
-from proxytune.diagnosis.verdict import CHANCE
+from proxytune.diagnosis.rules import RULES
 from proxytune.driving.robot import read_robot
 from proxytune.effects import PARAMETERS
 from proxytune.errors import LogError
@@ -69,7 +69,7 @@ def test_errors_are_told_at_every_horizon_and_fall_to_the_floor(diagnosis):
         assert error.ratio.value == pytest.approx(error.after.value / error.before.value)
         assert error.after.value < error.before.value
         assert 0.85 * error.floor.lower < error.after.value < 1.15 * error.floor.lower
-        assert error.floor.lower <= error.floor.upper <= CHANCE * error.after.value + 1e-12
+        assert error.floor.lower <= error.floor.upper <= RULES.lowest_by_chance * error.after.value + 1e-12
     error = diagnosis.errors[1]
     assert error.ratio.interval[1] < 1.0
     assert error.removable_left < 0.3

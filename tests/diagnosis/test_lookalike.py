@@ -14,9 +14,9 @@ from planted import TRUTH, planted_drives
 
 from proxytune.diagnosis.horizon.windows import cut, strays
 from proxytune.diagnosis.naming.candidates import candidates
+from proxytune.diagnosis.remainder import lookalike as reading
 from proxytune.diagnosis.remainder.lookalike import lookalike
 from proxytune.diagnosis.remainder.remainder import Remainder
-from proxytune.diagnosis.remainder.remainder import lookalike as reading
 
 TAKEN = ("trim", "delay")
 FEW = ("lateral_slip", "turn_slip", "yaw_scrub")

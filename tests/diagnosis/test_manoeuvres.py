@@ -13,9 +13,9 @@ from planted import DECLARED, NOISE, ROBOT, TRUTH, driven_log, drives_of
 from proxytune.diagnosis.manoeuvres import LIBRARY, imagined, next_manoeuvre
 from proxytune.diagnosis.model.fitting import seen
 from proxytune.diagnosis.model.replay import increments
-from proxytune.diagnosis.naming.adoption import NATS_APART
 from proxytune.diagnosis.naming.candidates import candidates
 from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.rules import RULES
 
 SIZES = {
     "dead_band": {"dead_band.width": 0.08, "dead_band.imbalance": 0.0},
@@ -62,7 +62,7 @@ def test_where_noise_is_not_known_what_is_driven_is_driven_ten_times(drives):
 def test_rivals_are_told_apart_by_a_manoeuvre_that_can_be_driven(drives, effect, rival):
     offer = next_manoeuvre(found(drives, effect, rival))
     assert offer.between == (effect, rival)
-    assert offer.nats_per_minute > NATS_APART
+    assert offer.nats_per_minute > RULES.rival_nats
     assert offer.name in {name for name, _, _ in LIBRARY}
     assert offer.duties.shape == (1200, 2)
 

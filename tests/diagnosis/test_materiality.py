@@ -12,7 +12,8 @@ from planted import DECLARED, NOISE, TRUTH, planted_drives
 from proxytune.diagnosis.horizon.windows import Ratio
 from proxytune.diagnosis.model.fitting import seen
 from proxytune.diagnosis.naming.found import Adopted, Found, Variant, lacking
-from proxytune.diagnosis.naming.materiality import MATERIAL, Weighed, without_immaterial, worth
+from proxytune.diagnosis.naming.materiality import Weighed, without_immaterial, worth
+from proxytune.diagnosis.rules import RULES
 
 SCRUB, SLIP = (("yaw_scrub",),), (("lateral_slip",),)
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
@@ -74,7 +75,7 @@ def test_worth_is_told_on_drives_that_were_not_fitted(drives):
     assert set(much) == set(little) == {1.0, 2.0, 5.0}
     assert max(one.interval[0] for one in much.values()) > 1.2
     assert max(one.value for one in much.values()) > 1.5
-    assert all(one.interval[0] < MATERIAL and one.value < 1.2 for one in little.values())
+    assert all(one.interval[0] < RULES.material_factor and one.value < 1.2 for one in little.values())
 
 
 @pytest.mark.parametrize(("size", "matters"), [(0.4, True), (0.02, False)])
@@ -107,7 +108,7 @@ def test_without_a_random_effect_its_mean_lateness_is_delay():
 def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger(ratios, material):
     one = Weighed(adopted("x"), {float(h): Ratio(value, ends) for h, (value, *ends) in enumerate(ratios)})
     assert one.material == material
-    assert MATERIAL == 1.05
+    assert RULES.material_factor == 1.05
 
 
 def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_without_it():

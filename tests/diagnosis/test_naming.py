@@ -11,8 +11,8 @@ sys.path.append(str(Path(__file__).parent))
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.naming import names as naming
 from proxytune.diagnosis.naming.found import Adopted, Found
-from proxytune.diagnosis.naming.names import names as naming
 
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
 SLIP, SCRUB = (Adopted(name, "", (name,), ((name,),), 60.0, 0.002, ()) for name in ("lateral_slip", "yaw_scrub"))

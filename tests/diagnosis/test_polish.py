@@ -11,9 +11,10 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
-from proxytune.diagnosis.horizon.polish import HARMS, HELPS, fit_windows, held_out, horizons, polished
+from proxytune.diagnosis.horizon.polish import fit_windows, held_out, horizons, polished
 from proxytune.diagnosis.horizon.windows import cut, strays
 from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.rules import RULES
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +76,8 @@ def test_values_that_predict_poorly_are_fitted_again(drives):
     poor = model(drives, trim=0.08, delay=0.2)
     better, polish = polished(poor)
     assert squares(drives, better.theta).mean() < 0.5 * squares(drives, poor.theta).mean()
-    assert min(one.value for one in polish.ratios.values()) < HELPS
-    assert max(one.value for one in polish.ratios.values()) <= HARMS
+    assert min(one.value for one in polish.ratios.values()) < RULES.polish_helps
+    assert max(one.value for one in polish.ratios.values()) <= RULES.polish_harms
     for name, true in TRUTH.items():
         low, high = polish.intervals[name]
         assert low < better.theta[name] < high
@@ -90,7 +91,7 @@ def test_values_that_windows_do_not_mend_are_kept(drives):
 
 def test_values_that_would_do_harm_at_some_horizon_are_not_taken(drives, monkeypatch):
     poor = model(drives, trim=0.08, delay=0.2)
-    monkeypatch.setattr("proxytune.diagnosis.horizon.polish.HARMS", 0.01)
+    monkeypatch.setattr("proxytune.diagnosis.horizon.polish.RULES", replace(RULES, polish_harms=0.01))
     assert polished(poor) == (poor, None)
 
 

@@ -12,7 +12,8 @@ from learnt_truth import TURNING
 from planted import TRUTH, planted_drives
 
 from proxytune.diagnosis.horizon.windows import Ratio, cut, strays
-from proxytune.diagnosis.remainder.remainder import HARMS, HELPS, Remainder, _helps, remainder
+from proxytune.diagnosis.remainder.remainder import Remainder, _helps, remainder
+from proxytune.diagnosis.rules import RULES
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +80,7 @@ BAD, UNSURE = Ratio(1.1, (0.9, 1.3)), Ratio(0.8, (0.6, 1.01))
     ],
 )
 def test_the_guard_wants_a_sure_gain_somewhere_and_a_loss_nowhere(guard, used):
-    assert DULL.value < HARMS < BAD.value
-    assert GOOD.value < HELPS < DULL.value
+    assert DULL.value < RULES.remainder_harms < BAD.value
+    assert GOOD.value < RULES.remainder_helps < DULL.value
     assert _helps(guard) == used
     assert not Remainder().used

@@ -17,8 +17,8 @@ from proxytune.diagnosis.model.innovations import huber
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, disturbed, increments
 from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, candidates
 from proxytune.diagnosis.naming.found import Adopted
-from proxytune.diagnosis.naming.round import LEAST_GAIN
 from proxytune.diagnosis.naming.signals import signal_groups
+from proxytune.diagnosis.rules import RULES
 from proxytune.driving.robot import read_robot
 from proxytune.effects import Means, theta_names
 from proxytune.effects.catalogue import CATALOGUE
@@ -199,7 +199,7 @@ def test_the_ranking_holds_every_gain_best_first(diagnosis, figures):
     assert upper.get_yticklabels()[0].get_text() == "dead band"
     assert [one.get_label() for one in upper.get_lines() if one.get_marker() == "o"].count("adopted") == 1
     threshold = [one for one in upper.get_lines() if one.get_linestyle() == ":"]
-    assert list(threshold[0].get_xdata()) == [LEAST_GAIN, LEAST_GAIN]
+    assert list(threshold[0].get_xdata()) == [RULES.least_gain_nats, RULES.least_gain_nats]
 
 
 def test_rivals_are_marked_in_the_ranking(diagnosis):

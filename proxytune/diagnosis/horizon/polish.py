@@ -24,6 +24,7 @@ from proxytune.diagnosis.horizon.windows import (
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
 from proxytune.diagnosis.model.coordinates import Coordinate, placed, smooth, span
 from proxytune.diagnosis.model.fitting import STEP, Fit, seen
+from proxytune.diagnosis.rules import RULES
 from proxytune.space import Theta
 
 HORIZONS_S = (1.0, 2.0, 5.0)
@@ -31,9 +32,6 @@ HORIZONS_S = (1.0, 2.0, 5.0)
 
 FITTED_S = (5.0, 2.0)
 """Windows of these lengths are fitted to."""
-
-FEWEST_BLOCKS = 3
-"""No error is told over windows from fewer blocks: it would have no interval."""
 
 FOLDS = 4
 """Blocks are dealt out to so many folds; each is predicted by what was fitted to the others."""
@@ -44,10 +42,6 @@ ROBUST = 1.5
 MOST_WINDOWS = 400
 MOST_TRIALS = 20
 """A fit takes no more windows, and looks no more often: it stays within seconds on long logs."""
-
-HELPS, HARMS = 0.98, 1.02
-"""Fitted values are taken where they lower the held-out error to this share at some horizon and raise it so far at
-none: where they change nothing, single steps tell the parameters more sharply."""
 
 
 class Polish(NamedTuple):
@@ -66,7 +60,7 @@ class Polish(NamedTuple):
 
 def horizons(drives: Drives) -> tuple[float, ...]:
     """The horizons of which these drives have windows in enough blocks."""
-    return tuple(h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= FEWEST_BLOCKS)
+    return tuple(h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= RULES.fewest_blocks)
 
 
 def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
@@ -184,7 +178,8 @@ def polished(fitted: Fit) -> tuple[Fit, Polish | None]:
     for length in [s for s in FITTED_S if s in plain]:
         ratios = compared(drives, held_out(drives, fitted.theta, fitted.free, length), plain)
         values = [one.value for one in ratios.values()]
-        if min(values) < HELPS and max(values) <= HARMS and (best is None or sum(values) < best[0]):
+        helps = min(values) < RULES.polish_helps and max(values) <= RULES.polish_harms
+        if helps and (best is None or sum(values) < best[0]):
             best = (sum(values), length, ratios)
     if best is None:
         return fitted, None

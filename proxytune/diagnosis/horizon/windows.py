@@ -9,13 +9,11 @@ from scipy.stats import wilcoxon
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, relative
 from proxytune.diagnosis.model.replay import window_paths
+from proxytune.diagnosis.rules import RULES
 from proxytune.space import Theta
 
 SHORTEST = 0.9
 """Windows that cover less of the horizon are left out: poses seldom end exactly at it, but a stub is no window."""
-
-P_VALUE = 0.025
-"""Ratios of so many blocks on one side of 1 are no chance."""
 
 
 class Windows(NamedTuple):
@@ -118,12 +116,12 @@ class Ratio(NamedTuple):
     @property
     def below(self) -> bool:
         """Whether it is shown to be below 1, by its interval or, where few blocks weigh most, by signed ranks."""
-        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < P_VALUE)
+        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < RULES.ratio_p_value)
 
     @property
     def above(self) -> bool:
         """Whether it is shown to be above 1."""
-        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < P_VALUE)
+        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < RULES.ratio_p_value)
 
 
 def rmse(squares: Floats, blocks: Whole) -> Rmse:

@@ -3,15 +3,12 @@
 from collections.abc import Mapping, Sequence
 
 from proxytune.diagnosis.measured.drives import Floats
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects import CATALOGUE, PARAMETERS, effect_of
 from proxytune.space import Theta
 
 Coordinate = tuple[str, ...]
 """Parameters of θ that share one value."""
-
-
-EDGE = 0.01
-"""A value this near to an end of its range, as a share of the range, is at the end."""
 
 
 def span(coordinate: Coordinate) -> tuple[float, float]:
@@ -28,7 +25,7 @@ def placed(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str
 def at_edge(name: str, value: float, figures: Mapping[str, float]) -> bool:
     """Whether a value lies at an end of its parameter's range that is not neutral."""
     parameter = PARAMETERS[name]
-    reach = EDGE * (parameter.high - parameter.low)
+    reach = RULES.edge_share * (parameter.high - parameter.low)
     ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(figures)]
     return any(abs(value - end) <= reach for end in ends)
 

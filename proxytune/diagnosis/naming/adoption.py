@@ -7,15 +7,9 @@ from proxytune.diagnosis.model.fitting import Fit, fit, predictive
 from proxytune.diagnosis.naming.candidates import Candidate
 from proxytune.diagnosis.naming.choice import Choice, no_worse
 from proxytune.diagnosis.naming.found import Adopted, Variant, lacking
-from proxytune.diagnosis.naming.round import LEAST_GAIN, Round
+from proxytune.diagnosis.naming.round import Round
 from proxytune.diagnosis.naming.screening import Lead
-
-NATS_APART = 3.0
-COSINE_APART = 0.95
-"""Effects closer than this in evidence, or in what they do to the innovations, are rivals."""
-
-RIVAL_SHARE = 0.7
-"""Effects are rivals too if the second has this share of the evidence and predicts no worse."""
+from proxytune.diagnosis.rules import RULES
 
 
 def adopt(adopted: list[Adopted], best: Choice, looked: Round) -> list[Adopted]:
@@ -32,7 +26,7 @@ def _steady(best: Choice, looked: Round) -> Adopted:
 
 
 def _drawn(effect: RandomEffect, looked: Round) -> Adopted:
-    least = min(effect.gain - NATS_APART, RIVAL_SHARE * effect.gain)
+    least = min(effect.gain - RULES.rival_nats, RULES.rival_share * effect.gain)
     close = [other for other in looked.random if other.effect != effect.effect and other.gain > least]
     rivals = tuple(Candidate(other.effect, "", ((other.parameter,),), {}, (0.0,), ((other.value,),)) for other in close)
     return Adopted(
@@ -44,15 +38,15 @@ def _rivals(best: Lead, chosen: Fit, gain: float, looked: Round) -> tuple[Candid
     found: dict[str, Candidate] = {}
     for lead in looked.leads:
         other = looked.fits.get(lead.candidate.label)
-        close = other is not None and (other[2] > gain - NATS_APART or _as_good(other, gain, chosen))
-        if lead.candidate.effect != best.candidate.effect and (close or _cosine(lead, best) > COSINE_APART):
+        close = other is not None and (other[2] > gain - RULES.rival_nats or _as_good(other, gain, chosen))
+        if lead.candidate.effect != best.candidate.effect and (close or _cosine(lead, best) > RULES.rival_cosine):
             found.setdefault(lead.candidate.effect, lead.candidate)
     return tuple(found.values())
 
 
 def _as_good(other: tuple[Lead, Fit, float], gain: float, chosen: Fit) -> bool:
     """Whether it has most of the evidence and predicts no worse, block by block."""
-    return other[2] >= RIVAL_SHARE * gain and no_worse(other[1], chosen)
+    return other[2] >= RULES.rival_share * gain and no_worse(other[1], chosen)
 
 
 def _cosine(one: Lead, other: Lead) -> float:
@@ -66,6 +60,6 @@ def without_idle(model: Fit, adopted: list[Adopted]) -> tuple[Fit, list[Adopted]
         if effect.free and len(adopted) > 1:
             rest = lacking(Variant(model.theta, model.free), effect, model.drives.rate_hz)
             without = fit(model.drives, rest.theta, rest.free, model.noise)
-            if float(predictive(model).sum() - predictive(without).sum()) < LEAST_GAIN:
+            if float(predictive(model).sum() - predictive(without).sum()) < RULES.least_gain_nats:
                 return without, [other for other in adopted if other is not effect]
     return model, adopted

@@ -12,27 +12,8 @@ from proxytune.diagnosis.model.fitting import Fit, fit
 from proxytune.diagnosis.model.replay import lateness
 from proxytune.diagnosis.naming.round import Round
 from proxytune.diagnosis.naming.screening import Lead
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects import CATALOGUE, theta_names
-
-CLEAR_GAIN = 30.0
-"""Nats that a random effect must gain: its chance is drawn from shifted innovations, which is rough."""
-
-P_VALUE = 0.01
-"""Chance must gain as much as rarely as this."""
-
-PLAIN_SHARE = 0.8
-"""An effect of both wheels is preferred to one of a single wheel if it gains this share."""
-
-WITHIN_SHARE = 0.8
-"""An effect within its range is preferred to one at an end of it if it gains this share and predicts no worse."""
-
-MOST_PLACES = 0.9
-"""A part of the map that holds more of the drives than this is no part."""
-
-ERROR_HORIZON_S = 2.0
-ERROR_FACTOR = 1.05
-"""A model predicts worse if its error over windows of this horizon is shown to be larger by more than this factor: such
-an effect is not adopted, whatever the evidence of single steps."""
 
 
 class Choice(NamedTuple):
@@ -53,9 +34,10 @@ class Choice(NamedTuple):
 
 def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
     """The effect with most evidence, if that is more than chance and predicts no worse."""
-    fits = [Choice(gain, fitted, lead) for lead, fitted, gain in looked.fits.values() if lead.p_value <= P_VALUE]
+    fits = [Choice(gain, fitted, lead) for lead, fitted, gain in looked.fits.values() if lead.p_value <= RULES.p_value]
     named = [choice for choice in fits if not _is_everywhere(choice)]
-    clear = [effect for effect in looked.random if effect.p_value <= P_VALUE and effect.gain >= CLEAR_GAIN]
+    rare = [effect for effect in looked.random if effect.p_value <= RULES.p_value]
+    clear = [effect for effect in rare if effect.gain >= RULES.least_random_gain_nats]
     everything: list[Choice | RandomEffect] = [*named, *clear]
     ranked = sorted(everything, key=lambda one: -one.gain)
     enough = (choice_of(model, found) for found in ranked if found.gain >= least)
@@ -73,7 +55,7 @@ def choice_of(model: Fit, found: Choice | RandomEffect) -> Choice:
 
 def _within(model: Fit, best: Choice, ranked: Sequence[Choice | RandomEffect]) -> Choice:
     """The first that gains nearly as much as the best, is not at an end of its range, and predicts no worse."""
-    near = (choice_of(model, found) for found in ranked if found.gain > WITHIN_SHARE * best.gain)
+    near = (choice_of(model, found) for found in ranked if found.gain > RULES.inside_share * best.gain)
     inside = next((choice for choice in near if not _is_at_edge(choice)), None)
     return inside if inside is not None and no_worse(inside.fitted, best.fitted) else best
 
@@ -85,7 +67,7 @@ def _is_everywhere(choice: Choice) -> bool:
         return False
     _, x, y, radius = (choice.fitted.theta[name] for name in theta_names(effect))
     places = choice.fitted.drives.poses[:, 0, :2]
-    return float((np.hypot(*(places - (x, y)).T) < radius).mean()) > MOST_PLACES
+    return float((np.hypot(*(places - (x, y)).T) < radius).mean()) > RULES.patch_share
 
 
 def _is_at_edge(choice: Choice) -> bool:
@@ -100,7 +82,7 @@ def _is_plain_form_of(choice: Choice, best: Choice) -> bool:
     if choice.lead is None or best.lead is None or choice is best or choice.lead.candidate.form:
         return False
     same = choice.lead.candidate.effect == best.lead.candidate.effect
-    return same and choice.gain > PLAIN_SHARE * best.gain
+    return same and choice.gain > RULES.plain_share * best.gain
 
 
 def _drawing(model: Fit, effect: RandomEffect) -> Fit:
@@ -112,9 +94,9 @@ def _drawing(model: Fit, effect: RandomEffect) -> Fit:
 
 
 def no_worse(one: Fit, other: Fit) -> bool:
-    """Whether one model's error over windows is not shown to be larger than the other's by more than ERROR_FACTOR."""
-    windows = cut(other.drives, ERROR_HORIZON_S)
+    """Whether one model's error over windows is not shown to be larger than the other's beyond the guard's factor."""
+    windows = cut(other.drives, RULES.guard_horizon_s)
     if len(windows.begin) < 2:
         return True
     squares = [strays(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
-    return ratio(squares[0], squares[1], blocks_of(other.drives, windows)).interval[0] <= ERROR_FACTOR
+    return ratio(squares[0], squares[1], blocks_of(other.drives, windows)).interval[0] <= RULES.guard_factor

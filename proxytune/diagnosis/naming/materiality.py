@@ -17,9 +17,7 @@ from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.fitting import fit
 from proxytune.diagnosis.model.replay import drawn_paths, paths
 from proxytune.diagnosis.naming.found import Adopted, Dropped, Found, Variant, lacking
-
-MATERIAL = 1.05
-"""An effect matters if without it the error at some horizon is so many times as large, being shown to be larger."""
+from proxytune.diagnosis.rules import RULES
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
@@ -43,12 +41,12 @@ class Weighed(NamedTuple):
     @property
     def material(self) -> bool:
         """Whether predictions are shown to need it."""
-        return any(one.value >= MATERIAL and one.above for one in self.worth.values())
+        return any(one.value >= RULES.material_factor and one.above for one in self.worth.values())
 
     @property
     def harmful(self) -> bool:
         """Whether predictions are shown to be better without it."""
-        return any(one.value <= 1.0 / MATERIAL and one.below for one in self.worth.values())
+        return any(one.value <= 1.0 / RULES.material_factor and one.below for one in self.worth.values())
 
     @property
     def largest(self) -> float:

@@ -13,20 +13,14 @@ from proxytune.diagnosis.naming.candidates import candidates
 from proxytune.diagnosis.naming.flexible import Curve, curves
 from proxytune.diagnosis.naming.found import Tried
 from proxytune.diagnosis.naming.screening import Lead, screen
+from proxytune.diagnosis.rules import RULES
 from proxytune.space import Theta
-
-LEAST_GAIN = 15.0
-"""Nats that an effect must gain on blocks it was not fitted to."""
 
 REFITTED = 6
 """So many effects are fitted in full."""
 
 WORTH_FITTING = 0.1
 """Leads that promise less than this share of the best one are not fitted."""
-
-FLEXIBLE_LEAD = 1.2
-FLEXIBLE_NATS = 30.0
-"""A curve over a signal is believed over named effects when it gains so many times as much, and so many nats more."""
 
 
 class Round(NamedTuple):
@@ -76,7 +70,7 @@ def _refit(
     fits = {}
     for lead in leads:
         label = lead.candidate.label
-        if label not in done and lead.gain > max(LEAST_GAIN, WORTH_FITTING * best):
+        if label not in done and lead.gain > max(RULES.least_gain_nats, WORTH_FITTING * best):
             fitted = fit(model.drives, _start(model, lead), model.free + lead.candidate.free, model.noise)
             fits[label] = (lead, fitted, float(predictive(fitted).sum()) - plain)
     return fits
@@ -94,7 +88,7 @@ def _start(model: Fit, lead: Lead) -> Theta:
 
 def leads_over(curve: Curve, gain: float) -> bool:
     """Whether a curve says clearly more than a named effect of this gain."""
-    return curve.gain > FLEXIBLE_LEAD * gain and curve.gain > gain + FLEXIBLE_NATS
+    return curve.gain > RULES.curve_factor * gain and curve.gain > gain + RULES.curve_margin_nats
 
 
 def unnamed(looked: Round, gain: float) -> list[Curve]:

@@ -9,19 +9,10 @@ from proxytune.diagnosis.naming.adoption import adopt, without_idle
 from proxytune.diagnosis.naming.choice import Choice, best_of, choice_of
 from proxytune.diagnosis.naming.flexible import Curve
 from proxytune.diagnosis.naming.found import Adopted, Found, Tried
-from proxytune.diagnosis.naming.round import FLEXIBLE_NATS, LEAST_GAIN, look, tried_of, unnamed
+from proxytune.diagnosis.naming.round import look, tried_of, unnamed
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects import effect_of
 from proxytune.space import Theta
-
-MOST_EFFECTS = 5
-"""No more effects are adopted."""
-
-LEAST_SHARE = 0.01
-"""What gains less than this share of all that was gained before may only mend the form of that."""
-
-WORTH_ADDING = 0.3
-"""Beside a signal that explains more, an effect is added if it explains this share of that."""
-
 
 Told = Callable[[str], None]
 """Takes a line about what is being done."""
@@ -47,16 +38,16 @@ def search(base: Fit, seed: int, told: Told, without: Collection[str] = ()) -> F
     tried: list[Tried] = []
     first_curves: list[Curve] = []
     remainder: list[Curve] = []
-    for number in range(MOST_EFFECTS + 1):
+    for number in range(RULES.most_effects + 1):
         told(f"looking for what is missing, round {number + 1}")
         taken = declared | {effect.effect for effect in adopted}
         looked = look(model, taken, seed)
         tried = tried or tried_of(looked)
         first_curves = first_curves or looked.curves
-        least = max(LEAST_GAIN, LEAST_SHARE * sum(effect.gain for effect in adopted))
+        least = max(RULES.least_gain_nats, RULES.least_gain_share * sum(effect.gain for effect in adopted))
         best = best_of(model, looked, least)
         remainder = unnamed(looked, max(least, best.gain if best else 0.0))
-        if best is None or number == MOST_EFFECTS or (remainder and not _goes_on(adopted, best, remainder)):
+        if best is None or number == RULES.most_effects or (remainder and not _goes_on(adopted, best, remainder)):
             break
         if best.random is not None:
             best = choice_of(model, sized(model, best.random, seed))
@@ -66,4 +57,5 @@ def search(base: Fit, seed: int, told: Told, without: Collection[str] = ()) -> F
 
 def _goes_on(adopted: list[Adopted], best: Choice, remainder: list[Curve]) -> bool:
     """Whether an effect is worth adding though some signal explains more: not as the first, for it might be wrong."""
-    return bool(adopted) and best.gain > FLEXIBLE_NATS and best.gain > WORTH_ADDING * remainder[0].gain
+    least = max(RULES.curve_margin_nats, RULES.share_of_curve * remainder[0].gain)
+    return bool(adopted) and best.gain > least

@@ -9,24 +9,19 @@ from proxytune.diagnosis.model.fitting import Fit
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, increments
 from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, Candidate, candidates
 from proxytune.diagnosis.naming.screening import without
-
-CLEAR_NATS = 10.0
-"""An effect counts as visible if its middle probe changes the log-likelihood by so much."""
-
-LOST_SHARE = 0.1
-"""A random effect is asked to strike one command in ten."""
+from proxytune.diagnosis.rules import RULES
 
 
 def unseen(model: Fit, taken: set[str]) -> tuple[str, ...]:
-    """The motion effects that would have left fewer than CLEAR_NATS at the middle of their probes."""
+    """The motion effects that would have left too few nats to be seen at the middle of their probes."""
     forms = candidates(model.drives.robot.figures, model.theta, taken)
     best: dict[str, float] = {}
     plain = {form.effect for form in forms if not form.form}
     for form in (form for form in forms if not form.form or form.effect not in plain):
         best[form.effect] = max(best.get(form.effect, 0.0), _trace(model, form))
-    strike = LOST_SHARE * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
+    strike = RULES.struck_share * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
     best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}
-    return tuple(name for name in MOTION_EFFECTS if name not in taken and best.get(name, 0.0) < CLEAR_NATS)
+    return tuple(name for name in MOTION_EFFECTS if name not in taken and best.get(name, 0.0) < RULES.visible_nats)
 
 
 def _trace(model: Fit, form: Candidate) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from proxytune.diagnosis.horizon.window_slopes import Slopes
 from proxytune.diagnosis.measured.drives import Floats, Whole, sum_by
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects.learnt.features import LEVEL
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
@@ -17,12 +18,6 @@ FIRMEST_ONLY = {"speed_and_turn": 0.1}
 
 FREE = 1e-6
 """The level is hardly pulled."""
-
-LEAST_SHARE = 0.02
-"""A group is added if it takes away at least this share of the squared error on blocks that it was not fitted to."""
-
-LEAST_T = 2.0
-"""And if that gain is so many times its standard error between the blocks."""
 
 ROBUST = 1.5
 """Errors beyond so many medians count less and less."""
@@ -112,7 +107,7 @@ def _tried(
 def _pays(before: Floats, after: Floats) -> bool:
     gain = before - after
     spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-    return bool(gain.sum() > LEAST_SHARE * before.sum() and gain.sum() > LEAST_T * spread)
+    return bool(gain.sum() > RULES.group_share * before.sum() and gain.sum() > RULES.group_t * spread)
 
 
 def _penalised(groups: Mapping[str, Whole], pulls: Mapping[str, float], mean: Floats) -> tuple[Whole, Floats]:

@@ -12,10 +12,8 @@ from proxytune.diagnosis.measured.drives import Drives
 from proxytune.diagnosis.naming.found import Found
 from proxytune.diagnosis.remainder.lookalike import Lookalike, lookalike
 from proxytune.diagnosis.remainder.remainder import Remainder, remainder
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects import effect_of
-
-DOUBTFUL = 0.95
-"""Names are doubtful if curves beside what is declared alone bring the error beneath this share of that with names."""
 
 
 class LearntError(NamedTuple):
@@ -96,4 +94,4 @@ def _doubtful(found: Found, beside: Remainder) -> bool:
     windows = cut(drives, FITTED_S)
     blocks = blocks_of(drives, windows)
     compared = ratio(alone.held_out, beside.held_out, blocks)
-    return alone.used and compared.value < DOUBTFUL and compared.below
+    return alone.used and compared.value < RULES.doubtful_names and compared.below

@@ -12,10 +12,8 @@ from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.coordinates import placed, span
 from proxytune.diagnosis.naming.candidates import Candidate, candidates
 from proxytune.diagnosis.remainder.remainder import Remainder
+from proxytune.diagnosis.rules import RULES
 from proxytune.space import Theta
-
-KEPT = 0.9
-"""A name is told if it alone keeps this share of what the curves gain on blocks that are left out."""
 
 PROMISING = 3
 """So many forms are tuned, those whose probes gain most."""
@@ -66,7 +64,7 @@ def lookalike(drives: Drives, theta: Theta, beside: Remainder, taken: Iterable[s
     least, form, values = min(tuned, key=lambda found: found[0])
     share = (plain - least) / gained
     found = placed(form.fixed, form.free, values)
-    return Lookalike(form.effect, form.form, found, share) if share >= KEPT else None
+    return Lookalike(form.effect, form.form, found, share) if share >= RULES.lookalike_share else None
 
 
 def _tuned(

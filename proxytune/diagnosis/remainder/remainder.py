@@ -11,6 +11,7 @@ from proxytune.diagnosis.horizon.windows import Ratio, Windows, blocks_of, chose
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
 from proxytune.diagnosis.remainder.group_choice import Choice, Sums, choose, sums
 from proxytune.diagnosis.remainder.offers import offered
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects.learnt.effect import Learnt
 from proxytune.effects.learnt.features import GROUPS, LEVEL
 from proxytune.effects.learnt.table import learnt_theta
@@ -24,12 +25,6 @@ FOLDS = 4
 
 ROUNDS = 2
 """It is linearised and its weights are made robust so often."""
-
-HELPS, HARMS = 0.95, 1.02
-"""It is used if it lowers the error beneath the first share at some horizon, and raises it above the second at none."""
-
-FEWEST_PARTS = 6
-"""With fewer blocks nothing is learnt: no held-out error would have an interval."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +56,7 @@ def remainder(drives: Drives, theta: Theta) -> Remainder:
     windows = cut(drives, FITTED_S)
     blocks = len(np.unique(drives.block[windows.begin]))
     before = strays(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
-    if blocks < FEWEST_PARTS:
+    if blocks < RULES.remainder_parts:
         return Remainder(held_out=before)
     whole, folds = _fitted(drives, theta)
     if not whole.gains:
@@ -128,7 +123,7 @@ def _guard(drives: Drives, theta: Theta, folds: list[_Fitted]) -> dict[float, Ra
     for horizon_s in HORIZONS_S:
         windows = cut(drives, horizon_s)
         blocks = blocks_of(drives, windows)
-        if len(np.unique(blocks)) >= FEWEST_PARTS:
+        if len(np.unique(blocks)) >= RULES.remainder_parts:
             before = strays(drives, theta, windows)[:, 0] ** 2
             after = _crossed(drives, theta, folds, windows)
             found[horizon_s] = ratio(after, before, blocks)
@@ -153,5 +148,5 @@ def _parts(drives: Drives) -> int:
 
 
 def _helps(guard: Mapping[float, Ratio]) -> bool:
-    helps = any(one.value < HELPS and one.below for one in guard.values())
-    return helps and all(one.value <= HARMS for one in guard.values())
+    helps = any(one.value < RULES.remainder_helps and one.below for one in guard.values())
+    return helps and all(one.value <= RULES.remainder_harms for one in guard.values())

@@ -3,7 +3,8 @@
 from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.horizon.windows import Ratio
 from proxytune.diagnosis.naming.found import Adopted
-from proxytune.diagnosis.naming.materiality import MATERIAL, Worth
+from proxytune.diagnosis.naming.materiality import Worth
+from proxytune.diagnosis.rules import RULES
 from proxytune.report.diagnosis.clocks import clocks_notes
 from proxytune.report.diagnosis.learnt import learnt_notes
 from proxytune.report.diagnosis.likeness import unlike_notes
@@ -52,7 +53,7 @@ def decisive(worth: Worth) -> float:
 
 def may_matter(worth: Worth) -> bool:
     """Whether these drives leave it open that an effect matters."""
-    return any(one.interval[1] >= MATERIAL for one in worth.values())
+    return any(one.interval[1] >= RULES.material_factor for one in worth.values())
 
 
 def _added(diagnosis: Diagnosis, effect: Adopted) -> str:

@@ -43,9 +43,7 @@ def school(folder, **changes):
         target=Schoolroom(Wobbly(theta=(("trim", 0.12), ("delay", 0.21)))),
         learner=Matrix(),
         learner_identity="matrix",
-        settings=replace(
-            settings, **{key: changes.pop(key) for key in ("proxy_samples", "lesson_s") if key in changes}
-        ),
+        settings=replace(settings, **amounts),
         seed=1,
         starts=3,
         cache=Cache(folder),

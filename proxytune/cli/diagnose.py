@@ -11,8 +11,8 @@ from rich.text import Text
 from proxytune.cli.answer import Answer
 from proxytune.cli.steps import Steps
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.measured.vehicle import robot_of
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.errors import InputError
 from proxytune.logs import read_log
 from proxytune.report.diagnosis.document import document, model_file, shown
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     declared = declared_effects(robot) if given is None else given
     test = read_log(arguments.test) if arguments.test else None
     with Steps(SHARES) as step:
-        found = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=step)
+        found = diagnose(log, robot, declared, test=test, seed=arguments.seed, report=step)
         folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
         step("drawing")
         told = document(found)

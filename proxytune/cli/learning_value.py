@@ -11,7 +11,7 @@ from proxytune.running.progress import Bars
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.lock import locked
 from proxytune.study.study import Study
-from proxytune.teaching.experiment import open_school, points_of
+from proxytune.teaching.experiment import count_points, open_school
 from proxytune.teaching.search import run_plv_study, search_space
 
 
@@ -22,7 +22,7 @@ def taught(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[
     widths = school.settings.widths
     search_space(settings, widths, {})
     space = search_space(settings, widths, by_prpv() if school.settings.narrow else {})
-    with locked(folder), Bars(points_of(school, school.settings.budget), "points of learning curves") as bars:
+    with locked(folder), Bars(count_points(school, school.settings.budget), "points of learning curves") as bars:
         found = run_plv_study(settings, school, make_proposer(settings.engine, settings.initial), space, bars)
     figure = folder / "figures" / "plv.png"
     save(plv_figure(found), figure)

@@ -13,7 +13,7 @@ from proxytune.running.progress import Bars
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
 from proxytune.study.study import open_study
-from proxytune.teaching.experiment import open_school, points_of, run_experiment
+from proxytune.teaching.experiment import count_points, open_school, run_experiment
 from proxytune.teaching.predictivity import predictivity
 
 
@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     school = open_school(study.settings)
     proxies = school.settings.proxies
     with locked(folder), Store.open(folder) as store:
-        with Bars(points_of(school, len(proxies)), "points of learning curves") as bars:
+        with Bars(count_points(school, len(proxies)), "points of learning curves") as bars:
             found = run_experiment(study.settings, school, bars)
         agents = len(study.settings.agents) * study.settings.starts
         with Bars(agents * sum(proxy.fixed for proxy in proxies.values())) as bars:

@@ -34,11 +34,11 @@ def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
         again: What drives from the same commands say.
     """
     lower = min(lower, reached)
-    upper = reached if again is None else _not_repeated(reached, again)
+    upper = reached if again is None else _upper_from_repeats(reached, again)
     return Bracket(lower, max(lower, RULES.lowest_by_chance * upper), reached, again)
 
 
-def _not_repeated(reached: float, again: Repeated) -> float:
+def _upper_from_repeats(reached: float, again: Repeated) -> float:
     """At most so much of an error is noise [m]: all of it in windows that were driven once."""
     most = min(reached, again.apart * again.share.interval[1] / again.share.value)
     return float(np.sqrt((1.0 - again.part) * reached**2 + again.part * most**2))
@@ -53,14 +53,14 @@ def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:
         named: Whether effects were added.
         unnamed: Whether a signal explains more of the rest than any named effect.
     """
-    if at_floor(after, floor, unnamed=unnamed):
+    if is_at_floor(after, floor, unnamed=unnamed):
         return "explained" if named else "nothing missing"
-    if unnamed or _beyond(floor):
+    if unnamed or _repeats_more(floor):
         return "partly explained" if named else "unexplained"
     return "cannot be told"
 
 
-def at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
+def is_at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
     """Whether an error is no more than noise: of poses, or of what drives do not repeat, or nothing lowers it."""
     if after <= RULES.floor_factor * floor.lower:
         return True
@@ -71,6 +71,6 @@ def at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
     return floor.upper < RULES.lowest_by_chance * RULES.narrow_bracket * floor.lower
 
 
-def _beyond(floor: Bracket) -> bool:
+def _repeats_more(floor: Bracket) -> bool:
     """Whether drives repeat more than the model predicts."""
     return floor.again is not None and floor.again.share.interval[1] < 1.0 / RULES.floor_factor

@@ -19,7 +19,7 @@ from proxytune.learning.settings import NONE, TeachingSettings
 from proxytune.running.progress import Watcher
 from proxytune.study.family import check_bounds, import_beside, load_family
 from proxytune.study.settings import StudySettings
-from proxytune.teaching.points import Point, School, examined, prepared
+from proxytune.teaching.points import Point, School, prepare_shared, score_points
 
 CACHE = "teaching"
 """The folder, within a study's, where all that was taught is kept."""
@@ -106,10 +106,10 @@ def run_experiment(settings: StudySettings, school: School, watcher: Watcher) ->
         raise settings.error("teaching.proxies", "is missing; name at least one, as in [teaching.proxies.nominal]")
     check_proxies(settings, school, proxies)
     curves = learning_curves(school, {NONE: None, **proxies}, settings.jobs, watcher)
-    return judged(settings, school, curves)
+    return judge_curves(settings, school, curves)
 
 
-def judged(settings: StudySettings, school: School, curves: Mapping[str, Curve]) -> Experiment:
+def judge_curves(settings: StudySettings, school: School, curves: Mapping[str, Curve]) -> Experiment:
     """What the curves say: a pure function of them and of what counts as converged."""
     taught, without = school.settings, curves[NONE]
     when = convergence(taught, without)
@@ -141,17 +141,17 @@ def learning_curves(
     ]
     missing = [point for point in points if not school.known(point)]
     watcher.begin("demonstrations", len(points) - len(missing))
-    with prepared(school, missing, jobs) as made:
+    with prepare_shared(school, missing, jobs) as made:
         for _ in made:
             pass
     watcher.begin("learning", 0)
-    with examined(school, missing, jobs) as scored:
+    with score_points(school, missing, jobs) as scored:
         for _ in scored:
             watcher.episode()
     return {name: _curve(school, [point for point in points if point.name == name]) for name in proxies}
 
 
-def points_of(school: School, proxies: int) -> int:
+def count_points(school: School, proxies: int) -> int:
     """How many points the learning curves of so many proxies have, with the one of no proxy."""
     return (proxies + 1) * school.settings.seeds * len(school.settings.target_samples)
 

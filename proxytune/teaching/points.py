@@ -13,7 +13,7 @@ from proxytune.domain import Classroom, Demonstration, make_episode
 from proxytune.errors import EpisodeError, LearnerError
 from proxytune.learning.cache import Arrays, Cache, digest
 from proxytune.learning.learner import Learner, Weights
-from proxytune.learning.lessons import Distribution, teach
+from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.learning.settings import TeachingSettings
 from proxytune.running.workers import working
 
@@ -77,13 +77,13 @@ class School:
             LearnerError: If the proxy's expert cannot drive, or the learner cannot use the samples.
             EpisodeError: If a domain or the policy fails.
         """
-        with _told(point), threadpool_limits(limits=1):
+        with _name_proxy_in_errors(point), threadpool_limits(limits=1):
             found = self.cache.get("exam", self.exam_facts(point), lambda: self._examine(point))
             return float(np.mean(found["scores"]))
 
     def prepare(self, point: Point) -> None:
         """Make what other points need as well: the samples of the target, or what the proxy alone has taught."""
-        with _told(point), threadpool_limits(limits=1):
+        with _name_proxy_in_errors(point), threadpool_limits(limits=1):
             if point.proxy is None:
                 self._target_samples(point.repetition)
             else:
@@ -182,13 +182,13 @@ class School:
     def _samples(self, facts: Mapping[str, Any], room: Classroom, where: Distribution) -> Demonstration:
         def make() -> Arrays:
             count, seed = facts["count"], facts["seed"]
-            return teach(room, where, count=count, seed=seed, lesson_s=self.settings.lesson_s)._asdict()
+            return collect_samples(room, where, count=count, seed=seed, lesson_s=self.settings.lesson_s)._asdict()
 
         return Demonstration(**self.cache.get("samples", facts, make))
 
 
 @contextmanager
-def _told(point: Point) -> Iterator[None]:
+def _name_proxy_in_errors(point: Point) -> Iterator[None]:
     """Name the proxy in what goes wrong with it."""
     try:
         yield
@@ -196,7 +196,7 @@ def _told(point: Point) -> Iterator[None]:
         raise type(problem)(f"{point.name}: {problem}") from None
 
 
-def prepared(school: School, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:
+def prepare_shared(school: School, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:
     """Make beforehand what several points share, so that no two processes make the same."""
     shared = [Point("the target", None, repetition, 0) for repetition in sorted({p.repetition for p in points})]
     for point in points:
@@ -206,13 +206,13 @@ def prepared(school: School, points: Sequence[Point], jobs: int) -> AbstractCont
     return working(school.prepare, shared, jobs)
 
 
-def examined(
+def score_points(
     school: School, points: Sequence[Point], jobs: int
 ) -> AbstractContextManager[Iterator[tuple[Point, float]]]:
     """The score of each point as soon as it is there, those that take longest begun first."""
     ordered = sorted(points, key=lambda point: -point.count)
-    return working(functools.partial(_scored, school.score), ordered, jobs)
+    return working(functools.partial(_score, school.score), ordered, jobs)
 
 
-def _scored(score: Callable[[Point], float], point: Point) -> tuple[Point, float]:
+def _score(score: Callable[[Point], float], point: Point) -> tuple[Point, float]:
     return point, score(point)

@@ -26,7 +26,7 @@ from proxytune.driving.family import LaneFollowing, lane_following
 from proxytune.driving.planar import PlanarPlant
 from proxytune.learning.cache import Cache
 from proxytune.learning.cloning import BehaviourCloning
-from proxytune.learning.lessons import Distribution, teach
+from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.settings import Section
 from proxytune.study.settings import read_study_settings
 from proxytune.teaching.experiment import open_school
@@ -44,7 +44,7 @@ def family(plant: str, model: Path | None = None) -> LaneFollowing:
 
 @functools.cache
 def samples(plant: str, count: int) -> Demonstration:
-    return teach(family(plant), Distribution({}), count=count, seed=1, lesson_s=LESSON_S)
+    return collect_samples(family(plant), Distribution({}), count=count, seed=1, lesson_s=LESSON_S)
 
 
 def timed(work: Callable[[], Any]) -> float:

@@ -12,10 +12,10 @@ from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.model.coordinates import at_edge
 from proxytune.diagnosis.model.events import RandomEffect
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.naming.candidates import candidates
-from proxytune.diagnosis.naming.choice import best_of
-from proxytune.diagnosis.naming.round import Round
+from proxytune.diagnosis.naming.choice import choose_best
+from proxytune.diagnosis.naming.evidence import Evidence, FittedLead
 from proxytune.diagnosis.naming.screening import Lead
 from proxytune.driving.robot import read_robot
 
@@ -30,13 +30,13 @@ def drives():
 
 def chosen(drives, *tried, p_value=0.002, random=()):
     """What is chosen of effects, each with its values and its gain."""
-    model = seen(drives, TRUTH, DECLARED, NOISE)
+    model = evaluate(drives, TRUTH, DECLARED, NOISE)
     fits = {}
     for label, values, gain in tried:
         form = FORMS[label]
         lead = Lead(form, form.probes[0], form.probes[0], gain, gain, p_value, np.ones(3))
-        fits[label] = (lead, seen(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
-    best = best_of(model, Round([], fits, random, []), 15.0)
+        fits[label] = FittedLead(lead, evaluate(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
+    best = choose_best(model, Evidence([], fits, random, []), 15.0)
     return best and best.lead.candidate.label
 
 
@@ -87,7 +87,7 @@ def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little
 
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "yaw_scrub"), (40.0, "motor_lag")])
 def test_an_effect_within_its_range_is_preferred_to_one_at_its_end(drives, gain, wanted, monkeypatch):
-    monkeypatch.setattr("proxytune.diagnosis.naming.choice.no_worse", lambda one, other: True)
+    monkeypatch.setattr("proxytune.diagnosis.naming.choice.predicts_no_worse", lambda one, other: True)
     lag = ("motor_lag", {"motor_lag.time_constant": 1.0, "motor_lag.imbalance": 0.0}, 90.0)
     assert chosen(drives, lag, ("yaw_scrub", {"yaw_scrub": 0.1601}, gain)) == wanted
 

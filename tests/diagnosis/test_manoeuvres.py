@@ -10,11 +10,11 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, ROBOT, TRUTH, driven_log, drives_of
 
-from proxytune.diagnosis.manoeuvres import LIBRARY, imagined, next_manoeuvre
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.manoeuvres import LIBRARY, imagine_drive, next_manoeuvre
+from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.model.replay import increments
 from proxytune.diagnosis.naming.candidates import candidates
-from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings
 from proxytune.diagnosis.rules import RULES
 
 SIZES = {
@@ -35,10 +35,12 @@ def found(drives, effect, *rivals):
     theta = {**TRUTH, **SIZES[effect]}
     forms = {form.effect: form for form in candidates(ROBOT.figures, TRUTH, ()) if not form.form}
     own = forms[effect]
-    adopted = Adopted(effect, "", tuple(SIZES[effect]), own.free, 100.0, 0.002, tuple(forms[name] for name in rivals))
-    declared = seen(drives, TRUTH, DECLARED, NOISE)
-    model = seen(drives, theta, (*DECLARED, *own.free), NOISE)
-    return Found(declared, model, (adopted,), (), (), ())
+    adopted = AdoptedEffect(
+        effect, "", tuple(SIZES[effect]), own.free, 100.0, 0.002, tuple(forms[name] for name in rivals)
+    )
+    declared = evaluate(drives, TRUTH, DECLARED, NOISE)
+    model = evaluate(drives, theta, (*DECLARED, *own.free), NOISE)
+    return Findings(declared, model, (adopted,), (), (), ())
 
 
 def test_without_rivals_there_is_nothing_to_tell_apart(drives):
@@ -82,7 +84,7 @@ def test_every_manoeuvre_is_described_and_stays_within_full_duty(name, text, sha
 
 def test_an_imagined_drive_is_one_episode_with_a_pose_at_every_row(drives):
     duties = LIBRARY[0][2](np.arange(200) / 20.0)
-    drive = imagined(drives, duties)
+    drive = imagine_drive(drives, duties)
     assert drive.seconds == pytest.approx(199 / 20.0)
     assert drive.linked.tolist() == [False] + [True] * 198
     np.testing.assert_array_equal(drive.duties[0, ::3], duties)

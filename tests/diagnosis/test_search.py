@@ -12,11 +12,11 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, ROBOT, TRUTH, planted_drives
 
-from proxytune.diagnosis.model.fitting import seen
+from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.naming import search as searching
 from proxytune.diagnosis.naming.candidates import candidates
+from proxytune.diagnosis.naming.evidence import Evidence, FittedLead
 from proxytune.diagnosis.naming.flexible import Curve
-from proxytune.diagnosis.naming.round import Round
 from proxytune.diagnosis.naming.screening import Lead
 from proxytune.effects import CATALOGUE
 
@@ -29,23 +29,24 @@ FORMS = [
 
 @pytest.fixture(scope="module")
 def base():
-    return seen(planted_drives(TRUTH, episodes=4, seconds=12.0), TRUTH, DECLARED, NOISE)
+    return evaluate(planted_drives(TRUTH, episodes=4, seconds=12.0), TRUTH, DECLARED, NOISE)
 
 
 def adopted(base, monkeypatch, *rounds):
     """The gains of the effects adopted in rounds, each with an effect's gain and a curve's; and the remainder's."""
     left = iter(rounds)
 
-    def look(model, taken, seed):
+    def gather_evidence(model, taken, seed):
         gain, curve = next(left, (0.0, 0.0))
         form = next(form for form in FORMS if form.effect not in taken)
         neutral = {name: value for names, value in zip(form.free, form.neutral, strict=True) for name in names}
         lead = Lead(form, form.probes[0], form.probes[0], gain, gain, 0.002, np.ones(3))
         signal = Curve(SimpleNamespace(name="time", effects=()), curve, np.zeros(1))
-        return Round([lead], {form.label: (lead, replace(base, theta={**base.theta, **neutral}), gain)}, (), [signal])
+        fitted = replace(base, theta={**base.theta, **neutral})
+        return Evidence([lead], {form.label: FittedLead(lead, fitted, gain)}, (), [signal])
 
-    monkeypatch.setattr(searching, "look", look)
-    monkeypatch.setattr(searching, "without_idle", lambda model, effects: (model, effects))
+    monkeypatch.setattr(searching, "gather_evidence", gather_evidence)
+    monkeypatch.setattr(searching, "drop_idle", lambda model, effects: (model, effects))
     found = searching.search(base, 1, lambda line: None)
     return [effect.gain for effect in found.adopted], [curve.gain for curve in found.remainder]
 

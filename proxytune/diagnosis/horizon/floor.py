@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import chi2
 
-from proxytune.diagnosis.horizon.windows import Windows, measured_since
+from proxytune.diagnosis.horizon.windows import Windows, measured_motion
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.replay import increments
 from proxytune.space import Theta
@@ -85,6 +85,6 @@ def noise_floor(drives: Drives, windows: Windows, noise: PoseNoise) -> tuple[flo
 
     Both ends of a motion are measured, each with noise in x and y; the heading at its beginning turns all of it.
     """
-    chords = np.square(measured_since(drives, windows)[:, :2]).sum(axis=1).mean()
+    chords = np.square(measured_motion(drives, windows)[:, :2]).sum(axis=1).mean()
     place = 4.0 * noise.place**2 + noise.turn**2 * chords
     return float(np.sqrt(place)), float(np.sqrt(2.0) * noise.turn)

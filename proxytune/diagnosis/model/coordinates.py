@@ -16,7 +16,7 @@ def span(coordinate: Coordinate) -> tuple[float, float]:
     return PARAMETERS[coordinate[0]].low, PARAMETERS[coordinate[0]].high
 
 
-def placed(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:
+def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:
     """θ with its free coordinates at these values."""
     given = {name: float(value) for names, value in zip(free, values, strict=True) for name in names}
     return {**theta, **given}
@@ -36,6 +36,6 @@ def is_stepwise(coordinate: Coordinate) -> bool:
     return trace is not None and trace.stepwise
 
 
-def smooth(free: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
+def smooth_coordinates(free: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
     """Those of the coordinates that do not."""
     return tuple(coordinate for coordinate in free if not is_stepwise(coordinate))

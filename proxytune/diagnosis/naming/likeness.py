@@ -7,8 +7,8 @@ import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.model.coordinates import Coordinate, span
-from proxytune.diagnosis.model.fitting import KEPT_SOLVABLE, Fit, seen, slopes
-from proxytune.diagnosis.model.innovations import HUBER, clipped
+from proxytune.diagnosis.model.fitting import KEPT_SOLVABLE, Fit, evaluate, slopes
+from proxytune.diagnosis.model.innovations import HUBER, clip_outliers
 from proxytune.diagnosis.rules import RULES
 
 GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
@@ -34,7 +34,7 @@ def two_robots(drives: Drives, model: Fit) -> Unlike | None:
     Effects of one robot that a model lacks spread the drives' gains too, but do not leave a gap between two groups.
     """
     neutral = {name: model.theta.get(name, 1.0) for (name,) in GAINS}
-    whole = seen(drives, {**model.theta, **neutral}, (), model.noise)
+    whole = evaluate(drives, {**model.theta, **neutral}, (), model.noise)
     episodes = np.unique(drives.episode)
     if len(episodes) < 2 * RULES.robot_drives:
         return None
@@ -54,10 +54,10 @@ def _own_gains(whole: Fit, episodes: Floats) -> tuple[Floats, Floats]:
     columns = slopes(drives, whole.theta, GAINS, whole.whiten)
     label = np.repeat(np.searchsorted(episodes, drives.episode), 3)
     z = whole.innovations
-    pull = sum_by(label, columns * clipped(z)[:, None], len(episodes))
+    pull = sum_by(label, columns * clip_outliers(z)[:, None], len(episodes))
     inner = columns * (np.abs(z) < HUBER)[:, None]
     curve = sum_by(label, columns[:, :, None] * inner[:, None, :], len(episodes)) + KEPT_SOLVABLE * np.eye(2)
-    loud = np.maximum(1.0, sum_by(label, clipped(z) ** 2, len(episodes)) / np.bincount(label))
+    loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, len(episodes)) / np.bincount(label))
     inverse = np.linalg.inv(curve)
     step = -np.einsum("eij,ej->ei", inverse, pull)
     low, high = np.array([span(coordinate) for coordinate in GAINS]).T

@@ -73,9 +73,9 @@ def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
     mean = given.curve.sum(axis=0).diagonal()
     pulls = {name: FREE for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
-    losses = _left_out(given, *_penalised(groups, pulls, mean))
+    losses = _held_out_losses(given, *_penalise(groups, pulls, mean))
     while True:
-        tried = {name: _tried(given, groups, pulls, name, mean) for name in groups if name not in pulls}
+        tried = {name: _try_group(given, groups, pulls, name, mean) for name in groups if name not in pulls}
         paying = {name: found for name, found in tried.items() if _pays(losses, found[1])}
         if not paying:
             break
@@ -84,18 +84,18 @@ def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
         gains[best] = float((losses - after).sum())
         losses = after
     weights = np.zeros(len(mean))
-    columns, penalty = _penalised(groups, pulls, mean)
+    columns, penalty = _penalise(groups, pulls, mean)
     total = given.curve.sum(axis=0)[np.ix_(columns, columns)]
     weights[columns] = np.linalg.solve(total + np.diag(penalty), given.pull.sum(axis=0)[columns])
     return Choice(weights, gains)
 
 
-def _tried(
+def _try_group(
     given: Sums, groups: Mapping[str, Whole], pulls: Mapping[str, float], name: str, mean: Floats
 ) -> tuple[float, Floats]:
     """The strongest ridge of a group within one standard error of its best, and the losses of the parts with it."""
     ridges = [ridge for ridge in RIDGES if ridge >= FIRMEST_ONLY.get(name, 0.0)]
-    found = [_left_out(given, *_penalised(groups, {**pulls, name: ridge}, mean)) for ridge in ridges]
+    found = [_held_out_losses(given, *_penalise(groups, {**pulls, name: ridge}, mean)) for ridge in ridges]
     best = min(found, key=lambda losses: float(losses.sum()))
     for ridge, losses in zip(reversed(ridges), reversed(found), strict=True):
         worse = losses - best
@@ -110,14 +110,14 @@ def _pays(before: Floats, after: Floats) -> bool:
     return bool(gain.sum() > RULES.group_share * before.sum() and gain.sum() > RULES.group_t * spread)
 
 
-def _penalised(groups: Mapping[str, Whole], pulls: Mapping[str, float], mean: Floats) -> tuple[Whole, Floats]:
+def _penalise(groups: Mapping[str, Whole], pulls: Mapping[str, float], mean: Floats) -> tuple[Whole, Floats]:
     """The columns of the groups that have a pull, and how hard each is pulled: alike within a group."""
     columns = np.concatenate([np.empty(0, int), *(groups[name] for name in pulls)])
     penalty = [np.full(len(groups[name]), pull * mean[groups[name]].mean() + 1e-9) for name, pull in pulls.items()]
     return columns, np.concatenate([np.empty(0), *penalty])
 
 
-def _left_out(given: Sums, columns: Whole, penalty: Floats) -> Floats:
+def _held_out_losses(given: Sums, columns: Whole, penalty: Floats) -> Floats:
     """The squared error of each part with weights from all others (P,)."""
     curve, pull = given.curve[:, columns][:, :, columns], given.pull[:, columns]
     rest = curve.sum(axis=0) - curve + np.diag(penalty)

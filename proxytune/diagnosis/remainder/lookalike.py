@@ -7,9 +7,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from proxytune.diagnosis.horizon.window_slopes import FITTED_S
-from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.measured.drives import Drives, Floats
-from proxytune.diagnosis.model.coordinates import placed, span
+from proxytune.diagnosis.model.coordinates import span, theta_at
 from proxytune.diagnosis.naming.candidates import Candidate, candidates
 from proxytune.diagnosis.remainder.remainder import Remainder
 from proxytune.diagnosis.rules import RULES
@@ -51,23 +51,23 @@ def lookalike(drives: Drives, theta: Theta, beside: Remainder, taken: Iterable[s
 
     def loss(candidate: Candidate, values: Floats) -> float:
         low, high = np.array([span(coordinate) for coordinate in candidate.free]).T
-        moved = placed({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
-        return float(np.mean(strays(drives, moved, windows)[:, 0] ** 2))
+        moved = theta_at({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
+        return float(np.mean(pose_errors(drives, moved, windows)[:, 0] ** 2))
 
-    plain = float(np.mean(strays(drives, theta, windows)[:, 0] ** 2))
+    plain = float(np.mean(pose_errors(drives, theta, windows)[:, 0] ** 2))
     gained = plain - float(beside.held_out.mean())
     if gained <= 0.0:
         return None
     forms = candidates(drives.robot.figures, theta, taken)
     probed = [min((loss(one, np.array(p)), number, p) for p in one.probes) for number, one in enumerate(forms)]
-    tuned = [_tuned(forms[number], np.array(probe), loss) for _, number, probe in sorted(probed)[:PROMISING]]
+    tuned = [_tune(forms[number], np.array(probe), loss) for _, number, probe in sorted(probed)[:PROMISING]]
     least, form, values = min(tuned, key=lambda found: found[0])
     share = (plain - least) / gained
-    found = placed(form.fixed, form.free, values)
+    found = theta_at(form.fixed, form.free, values)
     return Lookalike(form.effect, form.form, found, share) if share >= RULES.lookalike_share else None
 
 
-def _tuned(
+def _tune(
     form: Candidate, probe: Floats, loss: Callable[[Candidate, Floats], float]
 ) -> tuple[float, Candidate, Floats]:
     """The least loss of a form near a probe, and where it is."""

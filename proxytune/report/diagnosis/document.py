@@ -8,11 +8,11 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
 from proxytune.diagnosis.horizon.windows import Ratio
 from proxytune.diagnosis.horizon_error import HorizonError
-from proxytune.diagnosis.naming.found import Adopted
+from proxytune.diagnosis.naming.findings import AdoptedEffect
 from proxytune.diagnosis.naming.materiality import Worth
+from proxytune.diagnosis.result import Diagnosis, Estimate, main_error
 from proxytune.driving.robot import robot_names
 from proxytune.effects import CATALOGUE, Model, model_text, theta_names
 from proxytune.logs import GEOMETRY
@@ -57,7 +57,7 @@ def _estimate(estimate: Estimate) -> dict[str, Any]:
     return {"value": estimate.value, "interval": list(estimate.interval), "unit": estimate.unit}
 
 
-def _effect(effect: Adopted, theta: Mapping[str, Estimate]) -> dict[str, Any]:
+def _effect(effect: AdoptedEffect, theta: Mapping[str, Estimate]) -> dict[str, Any]:
     kind = CATALOGUE[effect.effect]
     names = dict(zip(theta_names(kind), (parameter.name for parameter in kind.parameters), strict=True))
     return {
@@ -70,12 +70,12 @@ def _effect(effect: Adopted, theta: Mapping[str, Estimate]) -> dict[str, Any]:
     }
 
 
-def _added(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
+def _added(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
     worth = _worth(diagnosis.worth.get(effect.effect, {}))
     return _effect(effect, diagnosis.theta) | {"worth": worth, "at_edge": list(diagnosis.at_edge(effect))}
 
 
-def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
+def _immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
     """An effect that was dropped: `changes_error_by` is told at the horizon where it matters most."""
     worth = diagnosis.worth.get(effect.effect, {})
     horizon = decisive(worth) if worth else None

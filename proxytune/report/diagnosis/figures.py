@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.horizon.windows import Rmse
 from proxytune.diagnosis.horizon_error import HorizonError
-from proxytune.diagnosis.naming.found import Tried
+from proxytune.diagnosis.naming.findings import TriedEffect
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.diagnosis.rules import RULES
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.learnt_figure import learnt_figure
@@ -102,7 +102,7 @@ def _scale(axes: Axes, gains: Sequence[float]) -> None:
         axes.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
 
 
-def _role(diagnosis: Diagnosis, tried: Tried) -> _Role:
+def _role(diagnosis: Diagnosis, tried: TriedEffect) -> _Role:
     adopted = diagnosis.found.adopted
     if any((one.effect, one.form) == (tried.effect, tried.form) for one in adopted):
         return ADOPTED

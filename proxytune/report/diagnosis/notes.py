@@ -1,9 +1,9 @@
 """What a diagnosis says in sentences: each effect and its worth, what does not matter, what is left, what to drive."""
 
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.horizon.windows import Ratio
-from proxytune.diagnosis.naming.found import Adopted
+from proxytune.diagnosis.naming.findings import AdoptedEffect
 from proxytune.diagnosis.naming.materiality import Worth
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.diagnosis.rules import RULES
 from proxytune.report.diagnosis.clocks import clocks_notes
 from proxytune.report.diagnosis.learnt import learnt_notes
@@ -56,7 +56,7 @@ def may_matter(worth: Worth) -> bool:
     return any(one.interval[1] >= RULES.material_factor for one in worth.values())
 
 
-def _added(diagnosis: Diagnosis, effect: Adopted) -> str:
+def _added(diagnosis: Diagnosis, effect: AdoptedEffect) -> str:
     rivals = ", ".join(rival.label for rival in effect.rivals)
     beside = f"; these drives cannot tell it from {rivals}" if rivals else ""
     worth = diagnosis.worth.get(effect.effect, {})
@@ -65,7 +65,7 @@ def _added(diagnosis: Diagnosis, effect: Adopted) -> str:
     return f"added {_label(effect)}: {effect.gain:.0f} nats, p = {effect.p_value:.3f}{larger}{beside}"
 
 
-def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> str:
+def _immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
     worth = diagnosis.worth.get(effect.effect, {})
     if not worth:
         return f"not shown to matter: {_label(effect)}, {effect.gain:.0f} nats"
@@ -76,13 +76,13 @@ def _immaterial(effect: Adopted, diagnosis: Diagnosis) -> str:
     return f"{kind}: {_label(effect)}{_values(effect, diagnosis)}, {effect.gain:.0f} nats, {change}"
 
 
-def _values(effect: Adopted, diagnosis: Diagnosis) -> str:
+def _values(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
     """The fitted values of an effect that is no longer in the model."""
     known = {name: estimate for name, estimate in diagnosis.dropped_values.items() if name in effect.names}
     return "".join(f" {estimate.value:.3g} {estimate.unit}".rstrip() for estimate in known.values())
 
 
-def _label(effect: Adopted) -> str:
+def _label(effect: AdoptedEffect) -> str:
     return f"{effect.effect} ({effect.form})" if effect.form else effect.effect
 
 

@@ -11,14 +11,14 @@ from proxytune.running.progress import Bars
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.lock import locked
 from proxytune.study.study import Study
-from proxytune.teaching.experiment import count_points, open_school
+from proxytune.teaching.experiment import count_points, load_setup
 from proxytune.teaching.search import run_plv_study, search_space
 
 
 def taught(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[float, float]]]) -> Answer:
     """Run what is left of a study of learning value, narrowing its box by PRPV first where it asks for that."""
     settings = study.settings
-    school = open_school(settings)
+    school = load_setup(settings)
     widths = school.settings.widths
     search_space(settings, widths, {})
     space = search_space(settings, widths, by_prpv() if school.settings.narrow else {})

@@ -13,7 +13,7 @@ from proxytune.running.progress import Bars
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
 from proxytune.study.study import open_study
-from proxytune.teaching.experiment import count_points, open_school, run_experiment
+from proxytune.teaching.experiment import count_points, load_setup, run_experiment
 from proxytune.teaching.predictivity import predictivity
 
 
@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Run what is left of the experiment; a finished one is summed up again without training or driving."""
     folder = study_folder(arguments.path)
     study = open_study(folder)
-    school = open_school(study.settings)
+    school = load_setup(study.settings)
     proxies = school.settings.proxies
     with locked(folder), Store.open(folder) as store:
         with Bars(count_points(school, len(proxies)), "points of learning curves") as bars:

@@ -21,7 +21,7 @@ PUPIL = "pupil"
 """Who drives in an examination, in place of an agent."""
 
 PROXY, TARGET, EXAM = range(3)
-"""What a seed is for: no two of them have anything in common."""
+"""What a seed is for: each purpose draws from a stream of its own."""
 
 
 @dataclass(frozen=True)
@@ -42,18 +42,18 @@ class Point:
 
 
 @dataclass(frozen=True)
-class School:
-    """Where learners are taught and examined.
+class TeachingSetup:
+    """A learning experiment ready to run: both domains, the learner, how much of what, and the cache.
 
     Attributes:
         proxy: The proxy's domain family.
         target: The target's.
-        learner: Who learns.
+        learner: What is trained.
         learner_identity: A digest of its code and settings.
-        settings: How much of what.
+        settings: Numbers of samples, seeds and seconds.
         seed: The study's.
-        starts: How many starts an examination has.
-        cache: Where all that was made is kept.
+        starts: Number of starts in an examination.
+        cache: Where samples, weights and scores are kept.
     """
 
     proxy: Classroom
@@ -67,7 +67,7 @@ class School:
 
     @functools.cached_property
     def identities(self) -> tuple[str, str]:
-        """Of the proxy's and the target's domain family, once: reading them digests the user's modules."""
+        """Identities of the proxy's and the target's domain family, read once: reading digests the user's modules."""
         return self.proxy.identity, self.target.identity
 
     def score(self, point: Point) -> float:
@@ -82,19 +82,19 @@ class School:
             return float(np.mean(found["scores"]))
 
     def prepare(self, point: Point) -> None:
-        """Make what other points need as well: the samples of the target, or what the proxy alone has taught."""
+        """Make what several points share: the target's samples, or the weights that the proxy alone has taught."""
         with _name_proxy_in_errors(point), threadpool_limits(limits=1):
             if point.proxy is None:
                 self._target_samples(point.repetition)
             else:
                 self._weights(replace(point, count=0))
 
-    def known(self, point: Point) -> bool:
-        """Whether the point is in the cache."""
+    def is_cached(self, point: Point) -> bool:
+        """Whether the point's scores are in the cache."""
         return self.cache.has("exam", self.exam_facts(point))
 
     def exam_facts(self, point: Point) -> dict[str, Any]:
-        """All that determines a point's scores."""
+        """All that determines a point's scores: what is missing here would return stale scores."""
         weights = self._weights_facts(point)
         return {
             "target": self.identities[1],
@@ -104,7 +104,10 @@ class School:
         }
 
     def _weights_facts(self, point: Point) -> dict[str, Any] | None:
-        """What determines the weights after this many target samples; None where nothing has been learnt."""
+        """All that determines the weights after this many target samples; None where nothing has been learnt.
+
+        The facts of what comes before enter as their digest, so that each key is short and complete.
+        """
         start = self._start_facts(point)
         if not point.count:
             return start
@@ -117,6 +120,7 @@ class School:
         }
 
     def _start_facts(self, point: Point) -> dict[str, Any] | None:
+        """All that determines the weights that a proxy alone has taught; None without one."""
         if point.proxy is None:
             return None
         return {
@@ -187,31 +191,38 @@ class School:
         return Demonstration(**self.cache.get("samples", facts, make))
 
 
+School = TeachingSetup
+"""The former name, which `search` still uses."""
+
+
 @contextmanager
 def _name_proxy_in_errors(point: Point) -> Iterator[None]:
-    """Name the proxy in what goes wrong with it."""
+    """Put the proxy's name in front of an error."""
     try:
         yield
     except (LearnerError, EpisodeError) as problem:
         raise type(problem)(f"{point.name}: {problem}") from None
 
 
-def prepare_shared(school: School, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:
-    """Make beforehand what several points share, so that no two processes make the same."""
+def prepare_shared(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:
+    """Make what several points share before they are scored, so that no two processes make the same."""
     shared = [Point("the target", None, repetition, 0) for repetition in sorted({p.repetition for p in points})]
     for point in points:
         before = replace(point, count=0)
         if point.proxy is not None and before not in shared:
             shared.append(before)
-    return working(school.prepare, shared, jobs)
+    return working(setup.prepare, shared, jobs)
 
 
 def score_points(
-    school: School, points: Sequence[Point], jobs: int
+    setup: TeachingSetup, points: Sequence[Point], jobs: int
 ) -> AbstractContextManager[Iterator[tuple[Point, float]]]:
-    """The score of each point as soon as it is there, those that take longest begun first."""
+    """Score the points in parallel, each yielded as soon as it is there.
+
+    Those that take longest begin first: otherwise one of them, begun last, would keep one process busy alone.
+    """
     ordered = sorted(points, key=lambda point: -point.count)
-    return working(functools.partial(_score, school.score), ordered, jobs)
+    return working(functools.partial(_score, setup.score), ordered, jobs)
 
 
 def _score(score: Callable[[Point], float], point: Point) -> tuple[Point, float]:

@@ -29,8 +29,8 @@ from proxytune.learning.cloning import BehaviourCloning
 from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.settings import Section
 from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import open_school
-from proxytune.teaching.points import Point, School
+from proxytune.teaching.experiment import load_setup
+from proxytune.teaching.points import Point, TeachingSetup
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "teacher"
 TWIN = STUDY / "twin.toml"
@@ -138,7 +138,7 @@ def test_examination(capsys, plant, model):
 
 def test_learning_curve(tmp_path, capsys):
     """One proxy, one seed, the eight counts of studies/teacher, with nothing in the cache."""
-    opened = open_school(read_study_settings(STUDY))
+    opened = load_setup(read_study_settings(STUDY))
     school = dataclasses.replace(opened, cache=Cache(tmp_path))
     proxy = school.settings.proxies["pitch 19°"]
     counts = school.settings.target_samples
@@ -147,5 +147,5 @@ def test_learning_curve(tmp_path, capsys):
         capsys,
         f"learning curve of {len(counts)} counts × {school.starts} starts: {stats.total_tt:.1f} s, profiled",
         f"  demonstrate {share(stats, LaneFollowing.demonstrate)}, train {share(stats, BehaviourCloning.train)}, "
-        f"examine {share(stats, LaneFollowing.examine)}, all of it {share(stats, School.score)}",
+        f"examine {share(stats, LaneFollowing.examine)}, all of it {share(stats, TeachingSetup.score)}",
     )

@@ -37,7 +37,7 @@ def searching(answers, asked):
 
 
 def named(base, monkeypatch, *answers, harmful=True):
-    whole = naming.without_immaterial
+    whole = naming.drop_immaterial
 
     def weighed(found, seed):
         kept = whole(found, seed)

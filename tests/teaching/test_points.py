@@ -9,7 +9,7 @@ from wobbly import Wobbly
 from proxytune.learning.cache import Cache
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.settings import TeachingSettings
-from proxytune.teaching.points import Point, School
+from proxytune.teaching.points import Point, TeachingSetup
 
 PROXY = Distribution({"trim": (0.1, 0.2)})
 
@@ -22,7 +22,7 @@ class Timid(Matrix):
         return {"matrix": 0.9 * super().train(samples, start, seed)["matrix"]}
 
 
-def school(folder, **changes):
+def setup(folder, **changes):
     amounts = {key: changes.pop(key) for key in ("proxy_samples", "lesson_s") if key in changes}
     settings = TeachingSettings(
         target=folder / "twin.toml",
@@ -38,7 +38,7 @@ def school(folder, **changes):
         widths={},
         proxies={"near": PROXY},
     )
-    plain = School(
+    plain = TeachingSetup(
         proxy=Schoolroom(Wobbly()),
         target=Schoolroom(Wobbly(theta=(("trim", 0.12), ("delay", 0.21)))),
         learner=Matrix(),
@@ -66,26 +66,26 @@ CHANGES = {
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change, count):
     point = Point("near", PROXY, 0, count)
-    before = school(tmp_path / "used").score(point)
-    fresh = school(tmp_path / "empty", **CHANGES[change]).score(point)
+    before = setup(tmp_path / "used").score(point)
+    fresh = setup(tmp_path / "empty", **CHANGES[change]).score(point)
     assert fresh != before
-    assert school(tmp_path / "used", **CHANGES[change]).score(point) == fresh
+    assert setup(tmp_path / "used", **CHANGES[change]).score(point) == fresh
 
 
 @pytest.mark.parametrize("change", [change for change in CHANGES if "proxy" not in change])
 def test_without_a_proxy_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change):
     point = Point("none", None, 0, 20)
-    before = school(tmp_path / "used").score(point)
-    fresh = school(tmp_path / "empty", **CHANGES[change]).score(point)
+    before = setup(tmp_path / "used").score(point)
+    fresh = setup(tmp_path / "empty", **CHANGES[change]).score(point)
     assert fresh != before
-    assert school(tmp_path / "used", **CHANGES[change]).score(point) == fresh
+    assert setup(tmp_path / "used", **CHANGES[change]).score(point) == fresh
 
 
 def test_what_a_proxy_taught_is_shared_by_all_points_after_it(tmp_path):
-    room = school(tmp_path)
+    one = setup(tmp_path)
     for count in (0, 20, 40):
-        room.score(Point("near", PROXY, 0, count))
+        one.score(Point("near", PROXY, 0, count))
     assert len(list(tmp_path.glob("weights-*.npz"))) == 3
     assert len(list(tmp_path.glob("samples-*.npz"))) == 2
-    assert room.known(Point("renamed", PROXY, 0, 40))
-    assert not room.known(Point("near", PROXY, 1, 40))
+    assert one.is_cached(Point("renamed", PROXY, 0, 40))
+    assert not one.is_cached(Point("near", PROXY, 1, 40))

@@ -7,7 +7,7 @@ from proxytune.errors import RunError, SettingsError
 from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import open_school
+from proxytune.teaching.experiment import load_setup
 from proxytune.teaching.search import distribution, run_plv_study, search_space
 
 BOX = {"trim": "[-0.3, 0.3]"}
@@ -15,7 +15,7 @@ BOX = {"trim": "[-0.3, 0.3]"}
 
 def run(folder, left=None):
     settings = read_study_settings(folder)
-    school = open_school(settings)
+    school = load_setup(settings)
     space = search_space(settings, school.settings.widths, left or {})
     return run_plv_study(settings, school, make_proposer("gp", settings.initial), space, Silent())
 
@@ -55,7 +55,7 @@ def test_the_width_of_a_parameter_is_searched_beside_its_centre(make_study):
 
 
 def test_a_distribution_is_cut_off_at_what_a_parameter_can_be(make_study):
-    school = open_school(read_study_settings(make_taught(make_study)))
+    school = load_setup(read_study_settings(make_taught(make_study)))
     bounds = distribution(school, {"trim": 0.25, "trim width": 0.2, "delay": 0.1}).bounds
     assert bounds["trim"] == pytest.approx((0.15, 0.3))
     assert bounds["delay"] == (0.1, 0.1)

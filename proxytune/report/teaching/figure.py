@@ -32,7 +32,7 @@ def teach_figure(found: Experiment) -> Figure:
     figure = Figure(figsize=(5.2, 3.6), layout="constrained")
     axes = figure.subplots()
     _curve(axes, found.without, NONE, ("black", ":", "x"))
-    for lesson, look in zip(found.lessons, LOOKS * len(found.lessons), strict=False):
+    for lesson, look in zip(found.teachers, LOOKS * len(found.teachers), strict=False):
         _curve(axes, lesson.curve, lesson.name, look)
     axes.axhline(found.when.threshold, color=GREY, linewidth=0.8, linestyle="--", label="converged")
     smallest = found.without.counts[1]

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from proxytune.learning.plv import Estimate
 from proxytune.learning.settings import NONE
-from proxytune.teaching.experiment import Experiment, Lesson
+from proxytune.teaching.experiment import Experiment, TeacherResult
 
 COLUMNS = ("proxy", "PRPV", "zero-shot", "target samples", "PLV", "reduction")
 NOT_REACHED = "not reached"
@@ -28,12 +28,12 @@ def teach_table(found: Experiment, prpv: Mapping[str, float | None], files: Mapp
 
 def table_rows(found: Experiment, prpv: Mapping[str, float | None]) -> list[tuple[str, ...]]:
     """The rows of table 1 as texts: the learner without a proxy, then one per proxy."""
-    worth = next((lesson.worth for lesson in found.lessons if lesson.worth), None)
+    worth = next((lesson.worth for lesson in found.teachers if lesson.worth), None)
     alone = (NONE, "", "", count(worth.without) if worth else NOT_REACHED, "", "")
-    return [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in found.lessons)]
+    return [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in found.teachers)]
 
 
-def _row(lesson: Lesson, prpv: float | None) -> tuple[str, ...]:
+def _row(lesson: TeacherResult, prpv: float | None) -> tuple[str, ...]:
     worth, zero_shot = lesson.worth, f"{lesson.curve.mean[0]:.1f}"
     predicts = "" if prpv is None else f"{prpv:g}"
     if worth is None:
@@ -46,7 +46,7 @@ def convergence_lines(found: Experiment) -> list[str]:
     when, last = found.when, found.without.counts[-1]
     said = f"converged: a mean score of at least {when.threshold:.1f} of {found.best_score:g}, from there on"
     if found.settled:
-        return [said, *(line for lesson in found.lessons for line in _told(lesson))]
+        return [said, *(line for lesson in found.teachers for line in _told(lesson))]
     return [
         said,
         f"without a proxy the score still rises by more than {when.tolerance:g} up to {last} target samples, so it has "
@@ -54,7 +54,7 @@ def convergence_lines(found: Experiment) -> list[str]:
     ]
 
 
-def _told(lesson: Lesson) -> list[str]:
+def _told(lesson: TeacherResult) -> list[str]:
     """The factor by which a proxy divides the target samples that are needed."""
     worth = lesson.worth
     if worth is None or worth.factor.value is None:

@@ -63,6 +63,7 @@ def diagnose(
     log, test = cut_out_long_rests(log), cut_out_long_rests(test) if test is not None else None
     own = read_clocks(log, robot)
     clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
+    # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.
     if any(one.offset.value for one in clocks) and "delay" not in names:
         names, start = (*names, "delay"), {**start, "delay": own.assumed_delay_s}
     parts = split(log, robot, test, clocks)
@@ -105,7 +106,7 @@ def diagnose(
 
 
 def declared_effects(robot: Robot) -> tuple[str, ...]:
-    """The effects that are declared where nobody says: those of θ that act on motion and that the robot has."""
+    """The effects that are declared by default: those of θ that act on motion and that the robot has."""
     return tuple(name for name in DECLARED if name in MOTION_EFFECTS and name in robot.theta)
 
 
@@ -124,7 +125,7 @@ def declared_parameters(effects: Iterable[str]) -> tuple[str, ...]:
 
 
 def estimates(fitted: Fit, adopted: Iterable[AdoptedEffect], polish: Polish | None) -> dict[str, Estimate]:
-    """Every value of a fitted model with its interval; fixed ones have none to speak of."""
+    """The values of a fitted model with their intervals; the interval of a fixed value has no width."""
     known = intervals(fitted) | (dict(polish.intervals) if polish else {})
     for effect in adopted:
         if effect.interval is not None:
@@ -136,7 +137,7 @@ def estimates(fitted: Fit, adopted: Iterable[AdoptedEffect], polish: Polish | No
 
 
 def _polish_models(found: Findings) -> tuple[Findings, tuple[Polish | None, Polish | None]]:
-    """Both models with parameters fitted to windows, where that helps: before and after are compared on equal terms."""
+    """Fit both models to windows, where that helps: before and after are compared on equal terms."""
     declared, before = polish_fit(found.declared)
     if not found.adopted and not found.immaterial:
         return replace(found, declared=declared, model=declared), (before, before)
@@ -167,7 +168,7 @@ def _confirm_on_bullet(found: Findings, tested: KeptAside, report: Report) -> Ho
 
 
 def _weigh_effects(found: Findings, parts: Parts, seed: int) -> dict[str, Worth]:
-    """What every effect is worth on the drives kept aside, those that were dropped again too."""
+    """Weigh every effect on the drives kept aside, the dropped ones too."""
     model = Variant(found.model.theta, found.model.free)
     weighed = [DroppedEffect(effect, model) for effect in found.adopted] + list(found.immaterial)
     return {effect.effect: worth(parts.fitted, parts.tested, beside, effect, seed) for effect, beside, _ in weighed}

@@ -51,7 +51,7 @@ class HorizonError:
 
 
 class KeptAside(NamedTuple):
-    """What errors are told of.
+    """The drives kept aside, on which errors are measured.
 
     Attributes:
         drives: Drives that nothing was fitted to.

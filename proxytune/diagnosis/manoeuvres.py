@@ -141,7 +141,7 @@ def _nats_apart(model: Fit, shape: Callable[[Floats], Floats], effect: AdoptedEf
 
 
 def imagine_drive(drives: Drives, duties: Floats) -> Drives:
-    """A drive that has not been driven: one episode of duties (rows, 2), a pose at every row."""
+    """Make up a drive that was never driven: one episode of duties (rows, 2), a pose at every row."""
     ticks = round(drives.tick_hz / drives.rate_hz)
     rows = len(duties)
     first = np.arange(rows - 1) * ticks

@@ -1,4 +1,4 @@
-"""What a log says of a model: the whole answer of a diagnosis."""
+"""The result of a diagnosis: everything that a log says of a model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -103,5 +103,5 @@ class Diagnosis:
 
 
 def main_error(errors: Sequence[HorizonError]) -> HorizonError:
-    """The one error that stands for all."""
+    """The error at the main horizon, which stands for all."""
     return min(errors, key=lambda error: abs(error.horizon_s - MAIN_S))

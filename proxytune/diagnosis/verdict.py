@@ -1,4 +1,4 @@
-"""The verdict: what the error that is left says, against what noise alone would leave."""
+"""The verdict: the error that is left, against what noise alone would leave."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from proxytune.diagnosis.rules import RULES
 
 
 class Bracket(NamedTuple):
-    """Between which errors that of a model that is right lies.
+    """The two errors between which that of a right model lies.
 
     Attributes:
         lower: What the noise of measured poses alone makes [m].
@@ -26,7 +26,7 @@ class Bracket(NamedTuple):
 
 
 def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
-    """The bracket; its lower end is an estimate too, and never above what a model reached.
+    """Bracket the error of a right model; the lower end is an estimate too, and never above what a model reached.
 
     Args:
         lower: What the noise of poses makes [m].
@@ -39,13 +39,13 @@ def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
 
 
 def _upper_from_repeats(reached: float, again: Repeated) -> float:
-    """At most so much of an error is noise [m]: all of it in windows that were driven once."""
+    """The most of an error that can be noise [m]: all of it in windows that were driven once."""
     most = min(reached, again.apart * again.share.interval[1] / again.share.value)
     return float(np.sqrt((1.0 - again.part) * reached**2 + again.part * most**2))
 
 
 def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:
-    """One of five answers; none says that all is explained where the error is beyond the floor.
+    """Give one of five answers; none says that all is explained where the error is beyond the floor.
 
     Args:
         after: The error that is left [m].

@@ -1,4 +1,4 @@
-"""What is taught: θ drawn from a distribution per lesson, and the expert's samples of many lessons."""
+"""Demonstrations: θ drawn from p(θ) for each lesson, and the expert's samples of many lessons."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Distribution:
 def collect_samples(
     classroom: Classroom, where: Distribution, *, count: int, seed: int, lesson_s: float
 ) -> Demonstration:
-    """Collect so many samples, lesson by lesson: a longer answer begins with every shorter one.
+    """Collect this many samples from the expert, lesson by lesson; more samples begin with the same ones.
 
     Args:
         classroom: Where the expert drives.

@@ -16,7 +16,7 @@ LEVELS = (2.5, 97.5)
 
 @dataclass(frozen=True)
 class Curve:
-    """A learning curve: what is scored in the target after so many target samples.
+    """A learning curve: scores in the target by number of target samples.
 
     Attributes:
         counts: Numbers of target samples, rising, the first 0.

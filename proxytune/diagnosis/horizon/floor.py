@@ -51,7 +51,7 @@ def pose_noise(drives: Drives, theta: Theta) -> PoseNoise:
 
 
 def _third_differences(drives: Drives, steps: Floats, lag: int) -> Floats:
-    """Of the path that these steps make, over runs of unbroken poses (rows, 3)."""
+    """Third differences of the path that these steps make, over runs of unbroken poses (rows, 3)."""
     path = np.concatenate((np.zeros((1, 3)), np.cumsum(steps, axis=0)))
     start = np.arange(len(steps) - 3 * lag + 1)
     run = np.cumsum(~drives.linked)

@@ -45,7 +45,7 @@ MOST_TRIALS = 20
 
 
 class Polish(NamedTuple):
-    """What fitting to windows came to.
+    """The result of fitting parameters to windows.
 
     Attributes:
         horizon_s: Length of the windows [s].
@@ -64,7 +64,7 @@ def horizons(drives: Drives) -> tuple[float, ...]:
 
 
 def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
-    """θ with its free coordinates where the model misses the poses in these windows least.
+    """Fit the free coordinates of θ to these windows: where the model misses their poses least.
 
     Args:
         drives: The measured drives.
@@ -126,7 +126,7 @@ class _Problem(NamedTuple):
 
 
 def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows) -> _Problem:
-    """Headings count as the way that they lead astray over the median chord."""
+    """The least-squares problem of these windows; a heading error counts as the way it makes over the median chord."""
     chord = float(np.median(np.hypot(*measured_motion(drives, windows)[:, :2].T)))
     return _Problem(drives, theta, free, windows, np.array((1.0, 1.0, max(chord, 1e-3))))
 
@@ -171,7 +171,7 @@ def compare_errors(drives: Drives, one: Mapping[float, Floats], other: Mapping[f
 
 
 def polish_fit(fitted: Fit) -> tuple[Fit, Polish | None]:
-    """The model with its parameters fitted to windows, if held-out windows show that this helps and nowhere harms."""
+    """Fit the parameters to windows, and keep that if held-out windows show that it helps and nowhere harms."""
     drives = fitted.drives
     plain = {h: pose_errors(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
     best: tuple[float, float, dict[float, Ratio]] | None = None

@@ -16,7 +16,7 @@ ALIKE = 1e-6
 
 
 class Repeated(NamedTuple):
-    """What drives from the same commands say of a model.
+    """The scatter of drives from the same commands, beside the error of a model.
 
     Attributes:
         share: What they do not repeat, by the model's error over the same windows: at 1 it predicts all that repeats.
@@ -30,7 +30,7 @@ class Repeated(NamedTuple):
 
 
 def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
-    """What drives do not repeat, and a model's error over the same windows; None where too little was driven twice.
+    """Compare a model's error with what drives do not repeat; None where too little was driven twice.
 
     Of windows driven n times the mean is taken off, and n/(n − 1) gives back
     what that takes: for two drives, √(½ mean square of their difference).
@@ -55,7 +55,7 @@ def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated 
 
 
 def _label_repeats(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
-    """For each compared pose what it is a repeat of (M,), and how often each of those was driven.
+    """Label each compared pose by what it repeats (M,), and count how often each of those was driven.
 
     A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero.
     """

@@ -1,4 +1,4 @@
-"""How far windows stray, and how each weight of a learnt effect would move them."""
+"""The errors of windows, and how each weight of a learnt effect would move them."""
 
 from typing import NamedTuple
 
@@ -37,7 +37,7 @@ class Slopes(NamedTuple):
 
 
 def choose_windows(drives: Drives) -> Windows:
-    """The windows and poses that are fitted."""
+    """Choose the windows and poses that are fitted: few enough, and evenly spread."""
     windows = cut(drives, FITTED_S)
     step = int(np.ceil(len(windows.begin) / MOST_WINDOWS))
     windows = select_windows(windows, np.arange(len(windows.begin)) % step == 0)
@@ -48,7 +48,7 @@ def choose_windows(drives: Drives) -> Windows:
 
 
 def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
-    """Linearised round a model, which may have a learnt effect itself.
+    """Linearise windows in the weights of learnt curves, around a model that may have a learnt effect itself.
 
     Args:
         drives: What is fitted.
@@ -62,15 +62,15 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
     named = {name: value for name, value in theta.items() if not is_learnt(name)}
     twists = window_twists(drives, theta, begin, length)
     walked = tracked_paths(drives, theta, twists)
-    said = relative(walked[window, 0], walked[window, tick])
-    seen = relative(drives.poses[begin[window], 0], drives.poses[windows.increment, 1])
-    way = float(np.median(np.hypot(seen[:, 0], seen[:, 1])))
+    predicted = relative(walked[window, 0], walked[window, tick])
+    measured = relative(drives.poses[begin[window], 0], drives.poses[windows.increment, 1])
+    way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
     features = window_features(drives, named, offered, begin, length)
     parts = [_pose_slopes(drives, twists, walked, basis, unit)[window, tick - 1] for basis, unit in features]
     turn = walked[window, 0, 2]
     columns = _turn_frames(np.concatenate(parts, axis=-1), -turn)
     scale = np.array((1.0, 1.0, way))
-    return Slopes((seen - said) * scale, columns * scale[:, None], drives.block[begin[window]])
+    return Slopes((measured - predicted) * scale, columns * scale[:, None], drives.block[begin[window]])
 
 
 def _pose_slopes(drives: Drives, twists: Floats, walked: Floats, basis: Floats, unit: Floats) -> Floats:

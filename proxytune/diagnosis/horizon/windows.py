@@ -1,4 +1,4 @@
-"""Windows of prediction: how far a model that starts from a measured pose strays from what was measured."""
+"""Windows of prediction: the errors of a model that starts each window from the measured pose."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ class Windows(NamedTuple):
 
 
 def cut(drives: Drives, horizon_s: float) -> Windows:
-    """Windows one after another, each within an unbroken run of poses."""
+    """Cut drives into windows one after another, each within an unbroken run of poses."""
     ticks = horizon_s * drives.tick_hz
     run = np.cumsum(~drives.linked) - 1
     start = drives.first[np.flatnonzero(~drives.linked)][run]
@@ -44,7 +44,7 @@ def cut(drives: Drives, horizon_s: float) -> Windows:
 
 
 def select_windows(windows: Windows, kept: NDArray[np.bool_]) -> Windows:
-    """Some of the windows (W,)."""
+    """Keep some of the windows (W,), renumbered."""
     entries = kept[windows.window]
     renumbered = np.cumsum(kept) - 1
     return Windows(windows.begin[kept], renumbered[windows.window[entries]], windows.increment[entries])
@@ -56,7 +56,7 @@ def blocks_of(drives: Drives, windows: Windows) -> Whole:
 
 
 def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    """By how much the model's motion since each window's beginning misses the measured one (M, 3): [m], [m], [rad]."""
+    """The model's motion since each window's beginning less the measured one (M, 3): [m], [m], [rad]."""
     begin = windows.begin
     tick = drives.last[windows.increment] - drives.first[begin][windows.window]
     walked = window_paths(drives, theta, begin, int(tick.max()))
@@ -69,7 +69,7 @@ def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
 
 
 def pose_errors_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
-    """The same for paths that were driven in one go (E, T + 1, 3)."""
+    """The errors (M, 2) of paths that were driven in one go (E, T + 1, 3)."""
     return _size(motion_along(drives, walked, windows) - measured_motion(drives, windows))
 
 
@@ -99,7 +99,7 @@ class Rmse(NamedTuple):
 
 
 class Ratio(NamedTuple):
-    """One error by another over the same windows.
+    """The ratio of two errors over the same windows.
 
     Attributes:
         value: The ratio of the two root mean squares.

@@ -1,4 +1,4 @@
-"""Do commands and poses share one clock? What shows that they do not, and drives put right.
+"""Whether commands and poses share one clock, and drives put right where they do not.
 
 Motion before its command is proof of two clocks; so is motion so late that no delay accounts for it, a drive that
 answers at another time than the others, and a drive that changes its time to answer in the middle. A constant offset
@@ -94,7 +94,7 @@ class Clocks:
 
     @property
     def differ(self) -> bool:
-        """Whether there is anything to tell."""
+        """Whether any clock differs from another."""
         return bool(self.offset.value or self.drives or self.jumps)
 
 
@@ -149,13 +149,13 @@ def _is_rare(count: int, drives: int) -> bool:
 
 
 def _one_clock(episodes: int) -> Clocks:
-    """What is said of drives too short to tell."""
+    """The clocks of drives too short to tell: taken as one."""
     kept = np.tile((0.0, np.inf), (episodes, 1))
     return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), np.zeros(episodes), kept)
 
 
 def _squares(log: Log, drives: Drives, speeds: Speeds) -> tuple[Blocks, Floats, bool]:
-    """What the best reaction leaves of blocks at each latency, these, and whether its own is one that no delay has."""
+    """What the best reaction leaves of blocks, the latencies that is given at, and whether its own is impossible."""
     best, apart = _reaction(drives, speeds)
     latencies = best.latency_s + _grid(_reach(drives))
     ends = np.array([len(e.times) for e in log.episodes]) * round(drives.tick_hz / log.rate_hz)
@@ -198,7 +198,7 @@ def _reaction(drives: Drives, speeds: Speeds) -> tuple[Reaction, bool]:
 
 
 def put_in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
-    """Drives on one clock: poses put later, jumping stretches left out.
+    """Put drives on one clock: poses later, jumping stretches left out.
 
     Poses move by whole ticks, and commands by the fraction of a tick that is left.
 

@@ -87,7 +87,7 @@ def measured_speeds(drives: Drives) -> Speeds:
 
 
 def reaction(drives: Drives, speeds: Speeds, reach_s: float) -> Reaction:
-    """The best reaction with a latency of so much at most, either way: a rough look at all, a close one at the best."""
+    """The best reaction with a latency of at most `reach_s` either way: a rough look at all, then a close one."""
     commanded = _CommandedSpeeds(drives, reach_s + 1.0)
     few = Speeds(*(part[::THINNED] for part in speeds))
     looks = [

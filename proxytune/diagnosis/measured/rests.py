@@ -19,7 +19,7 @@ REST = 1e-3
 
 
 def cut_out_long_rests(log: Log) -> Log:
-    """The log with a drive of its own for each stretch between long rests; the same log where there are none."""
+    """Cut a log at its long rests into drives of their own; the same log where there are none."""
     if log.command == "none":
         return log
     pieces = tuple(piece for episode in log.episodes for piece in _pieces(episode, log.rate_hz))

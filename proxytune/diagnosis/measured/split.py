@@ -38,7 +38,7 @@ class Parts(NamedTuple):
 
 
 def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = ()) -> Parts:
-    """Every third episode, or the second half of few, is kept to test on; or another log is.
+    """Keep every third episode to test on, or the second half of each where there are few, or another log.
 
     Args:
         log: What to fit, and to test on.
@@ -72,7 +72,7 @@ def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = (
 
 
 def _choose_some(log: Log, chosen: Sequence[int]) -> list[int]:
-    """So many of these drives, spread evenly, that MOST_S are fitted; what is left over is not needed."""
+    """Choose some of these drives, spread evenly, so that MOST_S are fitted; the rest is not needed."""
     seconds = sum(float(log.episodes[i].times[-1] - log.episodes[i].times[0]) for i in chosen)
     wanted = max(FEWEST_EPISODES, math.ceil(len(chosen) * min(1.0, MOST_S / max(seconds, 1.0))))
     count = min(len(chosen), wanted)
@@ -85,7 +85,7 @@ def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:
 
 
 def _gather_on_one_clock(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:
-    """Some of a log's drives, on one clock."""
+    """Gather some of a log's drives, on one clock."""
     drives = gather(log, robot, [log.episodes[i] for i in chosen])
     return put_in_step(drives, clocks[0], chosen) if clocks else drives
 
@@ -100,7 +100,7 @@ def _halve(drives: Drives) -> Parts:
 
 
 def cut_into_blocks(drives: Drives) -> Drives:
-    """Drives whose episodes are cut into blocks until there are enough of them."""
+    """Cut the episodes of drives into blocks until there are enough of them."""
     wanted = max(BLOCK_S, drives.seconds / BLOCKS)
     block = np.zeros(len(drives.episode), dtype=int)
     total = 0

@@ -20,7 +20,7 @@ JOINED_S = 0.1
 
 
 def thin(drives: Drives) -> Drives:
-    """Drives with at most about MOST increments: joined, then a stretch of each block, then fewer blocks."""
+    """Thin drives to about MOST increments: join them, then keep a stretch of each block, then fewer blocks."""
     count = len(drives.episode)
     if count <= MOST:
         return drives
@@ -31,7 +31,7 @@ def thin(drives: Drives) -> Drives:
 
 
 def join_increments(drives: Drives, times: int) -> Drives:
-    """Every so many increments in a row as one, within unbroken runs of poses and blocks."""
+    """Join every `times` increments in a row, within unbroken runs of poses and blocks."""
     if times == 1:
         return drives
     run = np.cumsum(~drives.linked | np.concatenate(([True], drives.block[1:] != drives.block[:-1])))
@@ -49,6 +49,7 @@ def _choose_stretches(block: Whole, share: float, least: int) -> NDArray[np.bool
     number = number_of(block)
     size = np.bincount(number)
     kept = np.minimum(size, np.maximum(np.ceil(min(1.0, share) * size).astype(int), least))
+    # Multiples of the golden ratio spread stretches evenly, in step with nothing that drives repeat.
     spread = np.arange(len(size)) * 0.6180339887 % 1.0
     begin = (spread * (size - kept)).astype(int)
     chosen = spread < max(MOST / kept.sum(), FEWEST_BLOCKS / len(size))

@@ -31,11 +31,11 @@ def at_edge(name: str, value: float, figures: Mapping[str, float]) -> bool:
 
 
 def is_stepwise(coordinate: Coordinate) -> bool:
-    """Whether it changes the motion by steps: no slope leads to its best value, so that is scanned for."""
+    """Whether a coordinate changes the motion by steps: no slope leads to its best value, so that is scanned for."""
     trace = CATALOGUE[effect_of(coordinate[0])].trace
     return trace is not None and trace.stepwise
 
 
 def smooth_coordinates(free: Sequence[Coordinate]) -> tuple[Coordinate, ...]:
-    """Those of the coordinates that do not."""
+    """The coordinates that change the motion smoothly, so that a slope leads to their best values."""
     return tuple(coordinate for coordinate in free if not is_stepwise(coordinate))

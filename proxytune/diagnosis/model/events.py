@@ -46,7 +46,7 @@ class RandomEffect(NamedTuple):
         effect: Its name in the catalogue.
         parameter: The name of its parameter in θ.
         value: Its likeliest size.
-        interval: Where the size lies; all sizes that are looked for, until `sized` has told.
+        interval: Where the size lies; all sizes that are looked for, until `size_random_effect` narrows them.
         gain: Its gain in log-likelihood beyond what chance gives on average [nats].
         p_value: How often chance gains as much.
     """

@@ -71,14 +71,14 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
 
 
 def evaluate(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise) -> Fit:
-    """A model with its noise as these drives show it, nothing fitted."""
+    """Evaluate a model with its noise on these drives: innovations and slopes; nothing is fitted."""
     whiten = whitener(drives, noise)
     left = whiten.whiten(drives.measured - increments(drives, theta))
     return Fit(drives, theta, free, noise, whiten, left, slopes(drives, theta, free, whiten))
 
 
 def replace_noise(fitted: Fit, noise: Noise) -> Fit:
-    """The same model with another noise."""
+    """Evaluate the same model with another noise."""
     return evaluate(fitted.drives, fitted.theta, fitted.free, noise)
 
 
@@ -102,7 +102,7 @@ def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], white
 
 
 def _scan(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats) -> Theta:
-    """The best value of each coordinate in which the motion changes by steps, all others held.
+    """Scan for the best value of each coordinate in which the motion changes by steps, all others held.
 
     Round numbers near by are looked at first: people set thresholds and steps to them, and a duty that lies just on one
     goes the other way at a value a hair beside it.

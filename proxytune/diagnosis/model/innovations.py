@@ -157,6 +157,7 @@ def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
 
 def _choose_part(count: int) -> NDArray[np.bool_]:
     """Runs of increments, spread evenly but in step with nothing that drives repeat."""
+    # Multiples of the golden ratio are spread evenly whatever their number.
     number = np.arange(count) // RUN
     return np.asarray(number * 0.6180339887 % 1.0 < THINNED / max(count, 1))
 

@@ -1,4 +1,4 @@
-"""What a model says of the recorded commands: the planar plant over whole batches of drives."""
+"""Replaying recorded commands through a model: the planar plant over whole batches of drives."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -132,7 +132,7 @@ def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:
 
 
 def _window_setting(drives: Drives, begin: Whole, before: Floats) -> Setting:
-    """What the motion effects of windows are told: the motion before each one, where it is, and how its wheels are."""
+    """The setting of motion effects in windows: the motion before each, its place, and the angles of its wheels."""
     episode, start = drives.episode[begin], drives.first[begin]
     return replace(
         _setting(drives),
@@ -152,12 +152,12 @@ def _twists_before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:
 
 
 def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
-    """The wheel speeds that a model says (E, T, 2), as fractions of full speed."""
+    """The wheel speeds of a model (E, T, 2), as fractions of full speed."""
     return _wheel_speeds(drives, _model(drives, theta)[0], _setting(drives))
 
 
 def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
-    """The same with random effects as one seed draws them, instead of as expected."""
+    """The wheel speeds (E, T, 2) with random effects as one seed draws them, instead of as expected."""
     robot = drives.robot
     train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures))
     return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))

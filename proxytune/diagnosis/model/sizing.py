@@ -42,15 +42,15 @@ def size_random_effect(model: Fit, effect: RandomEffect, seed: int) -> RandomEff
     sizes = np.geomspace(SMALLEST * effect.value, min(LARGEST * effect.value, draws.sizes[1]), SIZES)
     simulated = [_simulate_innovations(model, effect, size, seed + n) for n in range(DRAWS) for size in sizes]
     answered = responses(model, np.stack(simulated, axis=1))
-    said = np.log([likeliest_size(draws, rate, pull, answered.size)[0] for pull in answered.others])
-    value, low, high = _invert(sizes, said.reshape(DRAWS, SIZES), float(np.log(effect.value)))
+    likeliest = np.log([likeliest_size(draws, rate, pull, answered.size)[0] for pull in answered.others])
+    value, low, high = _invert(sizes, likeliest.reshape(DRAWS, SIZES), float(np.log(effect.value)))
     return effect._replace(value=value, interval=(low, high))
 
 
-def _invert(sizes: Floats, said: Floats, measured: float) -> Sequence[float]:
+def _invert(sizes: Floats, likeliest: Floats, measured: float) -> Sequence[float]:
     """The size of which drives say what is measured, and the least and greatest of which they still might."""
-    means = np.maximum.accumulate(said.mean(axis=0)) + 1e-9 * np.arange(len(sizes))
-    spread = WIDE * float(np.sqrt(np.mean(np.var(said, axis=0, ddof=1))))
+    means = np.maximum.accumulate(likeliest.mean(axis=0)) + 1e-9 * np.arange(len(sizes))
+    spread = WIDE * float(np.sqrt(np.mean(np.var(likeliest, axis=0, ddof=1))))
     return [
         float(np.exp(np.interp(one, means, np.log(sizes)))) for one in (measured, measured - spread, measured + spread)
     ]

@@ -48,7 +48,7 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _dense_along(form: Candidate) -> str | None:
-    """Why an effect needs more probes: for its `steps`, or its `place`."""
+    """What further probes of an effect lie along: its `steps`, or its `place`; None where it needs none."""
     trace = CATALOGUE[form.effect].trace
     if trace is None:
         return None
@@ -56,10 +56,10 @@ def _dense_along(form: Candidate) -> str | None:
 
 
 class _Residual(NamedTuple):
-    """What a model leaves over: its increments, which innovations count, and how free parameters answer to columns."""
+    """A model, its increments, which of its innovations count, and how its free parameters answer columns."""
 
     model: Fit
-    said: Floats
+    predicted: Floats
     weight: Floats
     answer: Floats
 
@@ -99,7 +99,7 @@ def _gain(left: _Residual, form: Candidate, values: Values) -> float:
     """What one step towards a probe gains, the free parameters having done what they can [nats]."""
     model = left.model
     theta = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
-    column = model.whiten.whiten(left.said - increments(model.drives, theta))
+    column = model.whiten.whiten(left.predicted - increments(model.drives, theta))
     column = column - model.slopes @ (left.answer @ column)
     pull, size = float(column @ clip_outliers(model.innovations)), float(column**2 @ left.weight)
     step = min(max(-pull / size, 0.0), FURTHEST) if size > 1e-9 else 0.0
@@ -107,7 +107,7 @@ def _gain(left: _Residual, form: Candidate, values: Values) -> float:
 
 
 def cut_part(drives: Drives) -> Drives:
-    """Stretches of the drives, evenly spread, each an episode of its own that goes on from the commands before it."""
+    """Cut stretches out of drives, evenly spread, each an episode that goes on from the commands before it."""
     ticks, warm = round(STRETCH_S * drives.tick_hz), round(WARM_UP_S * drives.tick_hz)
     every = max(ticks, round(ticks * drives.seconds / PART_S))
     length = drives.duties.shape[1]

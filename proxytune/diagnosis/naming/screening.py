@@ -115,7 +115,7 @@ def _begin(form: Candidate, values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def project_out(slopes: Floats, columns: Floats, weight: Floats) -> Floats:
-    """Columns with everything that the free parameters can do projected out."""
+    """Project out of columns everything that the free parameters can do."""
     if slopes.shape[1] == 0:
         return columns
     weighted = slopes * weight[:, None]
@@ -124,7 +124,7 @@ def project_out(slopes: Floats, columns: Floats, weight: Floats) -> Floats:
 
 
 def number_stretches(drives: Drives) -> Whole:
-    """The number of the stretch of FLIP_S that each increment is in (N,)."""
+    """Number the stretches of FLIP_S that the increments are in (N,)."""
     second = np.floor(drives.first / drives.tick_hz / FLIP_S).astype(int)
     _, number = np.unique(drives.episode * (second.max() + 1) + second, return_inverse=True)
     return number
@@ -155,6 +155,6 @@ def _gains(pulls: Floats, curve: Floats) -> Floats:
 
 
 def _values_after(probe: _Probe, step: Floats) -> tuple[float, ...]:
-    """Where a step from the beginning ends, the probes being one step long."""
+    """The values at which a step ends; to a probe is one step."""
     pairs = zip(probe.begin, probe.values, step, strict=True)
     return tuple(float(begin + m * (value - begin)) for begin, value, m in pairs)

@@ -1,4 +1,4 @@
-"""What these drives could have shown: effects whose usual sizes would have left too little trace."""
+"""The effects that these drives could not have shown: their usual sizes leave too little trace."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Which groups of curves are worth having: ridge regression, one scale a group, judged on blocks that are left out."""
+"""The choice of groups of curves by ridge regression, one scale a group, on blocks that are left out."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -43,7 +43,7 @@ class Choice(NamedTuple):
 
 
 def sums(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
-    """Sums over the poses of each part, whose errors are counted from weights of 0.
+    """Sum over the poses of each part; errors are counted from weights of 0.
 
     Args:
         slopes: Linearised round the weights.

@@ -34,7 +34,7 @@ class LearntError(NamedTuple):
 
 @dataclass(frozen=True)
 class Learning:
-    """What was learnt.
+    """The learnt remainder and what it is worth.
 
     Attributes:
         remainder: The curves, beside all named effects.

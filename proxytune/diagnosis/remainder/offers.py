@@ -39,7 +39,7 @@ APART = 0.02
 
 
 def offer_curves(drives: Drives, theta: Theta) -> Learnt:
-    """Every group with knots for these drives, all weights 0."""
+    """Offer every group of curves with knots for these drives, all weights 0."""
     asked = twists_of(drives, theta)
     used = _ticks_in_motion(drives)
     forward, yaw = asked[..., 0][used], asked[..., 2][used]
@@ -72,7 +72,7 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
 
 
 def _ticks_in_motion(drives: Drives) -> Floats:
-    """Which ticks (E, T) lie within measured motion."""
+    """The ticks (E, T) that lie within measured motion."""
     episodes, length = drives.duties.shape[:2]
     edges = np.zeros((episodes, length + 1))
     np.add.at(edges, (drives.episode, drives.first), 1.0)
@@ -113,5 +113,5 @@ def _steps(last: float) -> tuple[float, ...]:
 
 
 def _round_knot(value: float) -> float:
-    """Three digits are enough for a knot."""
+    """Round a knot to three digits: more say nothing."""
     return float(f"{value:.3g}")

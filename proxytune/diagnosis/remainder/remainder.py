@@ -77,7 +77,7 @@ class _CurveFit:
 
 
 def _fit_curves(drives: Drives, theta: Theta) -> tuple[_CurveFit, list[_CurveFit]]:
-    """The fit to all parts, and those without each fold."""
+    """Fit the curves to all parts, and without each fold in turn."""
     offer, parts = offer_curves(drives, theta), _parts(drives)
     groups = _columns(offer)
     weights = np.zeros(sum(len(curve.knots) for curve in offer.curves))

@@ -14,9 +14,10 @@ import pytest
 from floors import floor
 
 from proxytune.cli.compare_objective import STAND_INS
-from proxytune.cli.interruption import INTERRUPTED, TERMINATED
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
+from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
 from proxytune.driving.agents import AGENTS
+from proxytune.driving.road.reading import map_names
 from proxytune.driving.robot import UNITS
 from proxytune.driving.task import METRICS
 from proxytune.effects import CATALOGUE
@@ -24,6 +25,8 @@ from proxytune.effects.learnt.features import GROUPS
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
 from proxytune.report.diagnosis.notes import MEANINGS
 from proxytune.search.engines.registry import ENGINES
+from proxytune.settings import read_settings
+from proxytune.shipped import shipped
 from proxytune.study.settings import KEYS
 from proxytune.usefulness import MEASURES, PODS
 
@@ -136,6 +139,15 @@ def test_every_metric_is_documented(metric):
 @pytest.mark.parametrize("figure", UNITS)
 def test_every_figure_of_a_robot_is_documented(figure):
     assert f"`{figure}`" in ROBOTS
+
+
+@pytest.mark.parametrize("name", map_names())
+def test_every_map_and_its_keys_are_documented(name):
+    maps = ROBOTS.split("## Maps")[1]
+    assert re.search(rf"^\| `{name}` ", maps, flags=re.MULTILINE)
+    settings = read_settings(shipped("robots") / "maps" / f"{name}.toml").values
+    for key in {*settings, *settings["road"], *settings["paint"]} - {"road", "paint"}:
+        assert f"`{key}`" in maps, key
 
 
 def test_every_agent_is_listed_with_how_it_drives(capsys):

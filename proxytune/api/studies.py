@@ -21,13 +21,13 @@ from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Theta
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
-from proxytune.study import confirmation, preflight
 from proxytune.study.evaluation import Spent
 from proxytune.study.knowledge import goal_of
 from proxytune.study.provenance import note_search
 from proxytune.study.result import Best, StudyResult, result_of
 from proxytune.study.run import as_stored, check_facts, run_study
 from proxytune.study.settings import StudySettings
+from proxytune.study.stages import confirmation, preflight
 from proxytune.study.study import Study, open_study
 from proxytune.study.study_run import StudyRun
 

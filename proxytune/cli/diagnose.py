@@ -8,8 +8,8 @@ from typing import Any
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.cli.answer import Answer
-from proxytune.cli.steps import Steps
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.steps import Steps
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.diagnosis.result import Diagnosis

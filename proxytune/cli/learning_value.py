@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from proxytune.cli.answer import Answer
+from proxytune.cli.terminal.answer import Answer
 from proxytune.report.teaching.plv_document import plv_document, plv_table
 from proxytune.report.teaching.plv_figure import plv_figure
 from proxytune.report.writing import save

@@ -1,4 +1,4 @@
-"""`list`: the known robots, effects, agents, metrics, engines and measures of usefulness."""
+"""`list`: the known robots, maps, effects, agents, metrics, engines and measures of usefulness."""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -6,9 +6,11 @@ from pathlib import Path
 
 from rich.table import Table
 
-from proxytune.cli.answer import Answer
+from proxytune.cli.terminal.answer import Answer
 from proxytune.driving.agents import AGENTS
 from proxytune.driving.agents.loading import load_agent
+from proxytune.driving.road.lane import lane_length
+from proxytune.driving.road.reading import map_names, shipped_map
 from proxytune.driving.robot import read_robot, robot_names
 from proxytune.driving.task import METRICS
 from proxytune.effects import DECLARED, SHIPPED
@@ -44,6 +46,19 @@ def _robots() -> list[Row]:
     return [
         {"name": robot.name, "description": robot.description, "mass_kg": robot.figures.get("mass", "")}
         for robot in robots
+    ]
+
+
+def _maps() -> list[Row]:
+    return [
+        {
+            "name": road.name,
+            "description": road.description,
+            "outer_lap_m": float(lane_length(road, True)),
+            "inner_lap_m": float(lane_length(road, False)),
+            "starts": len(road.starts),
+        }
+        for road in map(shipped_map, map_names())
     ]
 
 
@@ -97,6 +112,7 @@ def _measures() -> list[Row]:
 
 _KINDS: Mapping[str, Callable[[], list[Row]]] = {
     "robots": _robots,
+    "maps": _maps,
     "effects": _effects,
     "agents": _agents,
     "metrics": _metrics,

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from proxytune.cli.answer import Answer
-from proxytune.cli.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
 from proxytune.errors import InputError, ProxytuneError, RunError
 
 
@@ -49,7 +49,7 @@ COMMANDS: dict[str, Command] = {
     "predict": Command("predict", "predict the poses of a log with a fitted model"),
     "compare": Command("compare", "compare how fast each search engine finds a good θ", resumes=True),
     "plot": Command("plot", "draw a study's figures and report again, without simulating"),
-    "list": Command("listing", "list robots, effects, agents, metrics, engines or measures"),
+    "list": Command("listing", "list robots, maps, effects, agents, metrics, engines or measures"),
 }
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2

@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from proxytune.cli.answer import Answer
-from proxytune.cli.study_folder import study_folder
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.report.teaching.document import teach_document
 from proxytune.report.teaching.figure import teach_figure
 from proxytune.report.teaching.table import teach_table

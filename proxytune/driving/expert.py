@@ -9,7 +9,7 @@ from proxytune.driving.agents.agent import Command, Picture
 from proxytune.driving.agents.pilots import duties
 from proxytune.driving.episode import Sight
 from proxytune.driving.road.lane import lane_point, lane_pose
-from proxytune.driving.road.maps import LoopMap
+from proxytune.driving.road.maps import Road
 from proxytune.driving.robot import Robot
 from proxytune.effects import Signal
 from proxytune.seeds import expert_generator
@@ -52,7 +52,7 @@ class Expert:
         seed: Seed of the disturbance.
     """
 
-    road: LoopMap
+    road: Road
     look_ahead_m: float
     speed: float
     gain: float

@@ -25,7 +25,8 @@ from proxytune.driving.identity import earlier_identities, identity_of
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
 from proxytune.driving.road.lane import off_map
-from proxytune.driving.road.maps import MAPS
+from proxytune.driving.road.maps import Road
+from proxytune.driving.road.reading import chosen_map, shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import Robot, read_robot, robot_home, robot_names
 from proxytune.effects import (
@@ -68,7 +69,7 @@ class LaneFollowing:
         robot: Name of the robot.
         plant: One of PLANTS.
         camera: One of CAMERAS.
-        map: One of MAPS.
+        map: The road, whether the package's or the user's own.
         seconds: Longest time an episode takes [s].
         position_noise_m: Standard deviation of where the robot is put down [m].
         heading_noise_deg: Standard deviation of how it is turned [deg].
@@ -79,7 +80,7 @@ class LaneFollowing:
     robot: str
     plant: str
     camera: str
-    map: str
+    map: Road
     seconds: float
     position_noise_m: float
     heading_noise_deg: float
@@ -95,7 +96,9 @@ class LaneFollowing:
     @property
     def earlier_identities(self) -> tuple[str, ...]:
         """Identities under which earlier code kept episodes that are the very same."""
-        world = (self.robot, self.plant, self.camera, self.map, self.seconds)
+        # Maps were known by their names: one of another name, or changed since, has no earlier episodes.
+        name = self.map.name if self.map == shipped_map("small_loop") else "none of then"
+        world = (self.robot, self.plant, self.camera, name, self.seconds)
         settings = (*world, self.position_noise_m, self.heading_noise_deg, self.effects)
         return earlier_identities(settings, robot_home(self.robot, self.folder), self.folder)
 
@@ -118,7 +121,7 @@ class LaneFollowing:
     @property
     def starts(self) -> int:
         """How many starting poses the map has."""
-        return len(MAPS[self.map].starts)
+        return len(self.map.starts)
 
     def check_agent(self, name: str) -> None:
         """Load the agent once.
@@ -134,9 +137,7 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        return task.score_trajectory(
-            MAPS[self.map], self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds
-        )
+        return task.score_trajectory(self.map, self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
 
     def drive(self, episode: Episode) -> Drive:
         """Drive one episode.
@@ -158,7 +159,7 @@ class LaneFollowing:
             SettingsError: If the robot has no expert.
         """
         robot = read_robot(self.robot, self.folder)
-        expert = Expert(MAPS[self.map], *robot.expert_figures(), seed=episode.seed)
+        expert = Expert(self.map, *robot.expert_figures(), seed=episode.seed)
         shown = self._drive(episode, expert, self._course(episode, seconds), Sight).memory
         kept = np.array(shown.on_road)
         samples = Demonstration(np.stack(shown.pictures)[kept], np.stack(shown.commands)[kept])
@@ -174,7 +175,7 @@ class LaneFollowing:
         wheel_distance = read_robot(self.robot, self.folder).wheel_distance()
         driven = self._drive(episode, Pupil(policy), self._course(episode, self.seconds))
         return task.driving_score(
-            MAPS[self.map],
+            self.map,
             driven.poses,
             wheel_distance=wheel_distance,
             tick_s=1.0 / TICK_HZ,
@@ -197,10 +198,10 @@ class LaneFollowing:
 
     def _start(self, episode: Episode) -> Signal:
         noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
-        return np.asarray(task.start_pose(MAPS[self.map], episode.start, seed=episode.seed, **noise))
+        return np.asarray(task.start_pose(self.map, episode.start, seed=episode.seed, **noise))
 
     def _course(self, episode: Episode, seconds: float) -> Course:
-        return Course(self._start(episode), seconds, episode.seed, functools.partial(off_map, MAPS[self.map]))
+        return Course(self._start(episode), seconds, episode.seed, functools.partial(off_map, self.map))
 
     def _drive(
         self, episode: Episode, driver: Driver, course: Course, sees: Callable[[Picture, Signal], Any] = picture_only
@@ -233,7 +234,7 @@ def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) ->
     nominal = figures.channels()
     memory = mounting.begin(Setting(TICK_HZ, nominal, robot.figures))
     mounted = figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
-    floor = draw_floor(MAPS[family.map])
+    floor = draw_floor(family.map)
     return GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)
 
 
@@ -259,7 +260,7 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
         robot=robot,
         plant=plant,
         camera=section.text("camera", "ground_plane", choices=CAMERAS),
-        map=section.text("map", "small_loop", choices=MAPS),
+        map=chosen_map(section),
         seconds=section.number("seconds", 60.0, low=1.0, high=3600.0),
         position_noise_m=section.number("position_noise_m", 0.01, low=0.0, high=0.1),
         heading_noise_deg=section.number("heading_noise_deg", 2.0, low=0.0, high=30.0),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.driving.road.lane import LanePose, lane_length, lane_pose
-from proxytune.driving.road.maps import LoopMap
+from proxytune.driving.road.maps import Road
 from proxytune.errors import EpisodeError
 from proxytune.seeds import placement_generator
 
@@ -37,7 +37,7 @@ EARLY_S = 5.0
 
 
 def start_pose(
-    road: LoopMap, index: int, *, seed: int, position_noise_m: float, heading_noise_deg: float
+    road: Road, index: int, *, seed: int, position_noise_m: float, heading_noise_deg: float
 ) -> tuple[float, float, float]:
     """Put the robot down at one of the map's starts, as exactly as a hand does.
 
@@ -57,7 +57,7 @@ def start_pose(
     return x + position_noise_m * float(noise[0]), y + position_noise_m * float(noise[1]), heading
 
 
-def score_trajectory(road: LoopMap, poses: Values, *, tick_s: float, seconds: float) -> dict[str, float]:
+def score_trajectory(road: Road, poses: Values, *, tick_s: float, seconds: float) -> dict[str, float]:
     """Score a drive by the task's metrics.
 
     - distance [m]: net way along the lane's centre line in its direction, counted while in the lane; a step against it
@@ -98,7 +98,7 @@ def score_trajectory(road: LoopMap, poses: Values, *, tick_s: float, seconds: fl
     }
 
 
-def driving_score(road: LoopMap, poses: Values, *, wheel_distance: float, tick_s: float, seconds: float) -> float:
+def driving_score(road: Road, poses: Values, *, wheel_distance: float, tick_s: float, seconds: float) -> float:
     """Score a drive as the paper's learning experiment does: seconds driven, less those with a wheel out of the lane.
 
     Each second with one wheel outside the lane takes one off, each with both wheels two, so 60 s are worth −60 to 60.
@@ -122,10 +122,10 @@ def driving_score(road: LoopMap, poses: Values, *, wheel_distance: float, tick_s
     return tick_s * float(np.sum(1.0 - _over_steps(out.sum(axis=0).astype(float))))
 
 
-def _driven(road: LoopMap, poses: Values, *, tick_s: float, seconds: float) -> Values:
+def _driven(road: Road, poses: Values, *, tick_s: float, seconds: float) -> Values:
     """The poses until time is over or the first one is off the map, that one included."""
     in_time = poses[: math.floor(seconds / tick_s + 1e-9) + 1]  # 1e-9: a whole number of ticks may divide to just less
-    off = np.any((in_time[:, :2] < 0.0) | (in_time[:, :2] > road.side), axis=1)
+    off = np.any((in_time[:, :2] < 0.0) | (in_time[:, :2] > road.size), axis=1)
     driven = in_time[: int(np.argmax(off)) + 1] if off.any() else in_time
     if not np.isfinite(driven).all():
         step = int(np.argmin(np.isfinite(driven).all(axis=1)))
@@ -133,7 +133,7 @@ def _driven(road: LoopMap, poses: Values, *, tick_s: float, seconds: float) -> V
     return driven
 
 
-def _steps_along(road: LoopMap, pose: LanePose) -> Values:
+def _steps_along(road: Road, pose: LanePose) -> Values:
     """Way along the lane from each pose to the next [m], the short way round the loop."""
     lap = lane_length(road, pose.counter_clockwise[:-1])
     way = np.mod(np.diff(pose.along) + lap / 2.0, lap) - lap / 2.0

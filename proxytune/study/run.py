@@ -9,10 +9,10 @@ from proxytune.search.loop import Propose, Search
 from proxytune.search.proposer import Proposer, Trial
 from proxytune.storage.records import State, TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.cutting import Cut, reference, run_or_cut
 from proxytune.study.evaluation import Evaluation
 from proxytune.study.provenance import CODE, SEARCH, adopt, differ
-from proxytune.study.stopping import stopped
+from proxytune.study.stages.cutting import Cut, reference, run_or_cut
+from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study, changes, facts
 from proxytune.study.study_run import StudyRun
 

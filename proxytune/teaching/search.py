@@ -24,7 +24,7 @@ from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.outputs import score_trials
 from proxytune.study.settings import StudySettings
-from proxytune.study.stopping import nothing_to_gain, out_of_time
+from proxytune.study.stages.stopping import nothing_to_gain, out_of_time
 from proxytune.teaching.experiment import convergence, learning_curves, teaching_settings
 from proxytune.teaching.points import TeachingSetup
 

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 from proxytune.cli import listing
-from proxytune.cli.answer import Answer
 from proxytune.cli.main import COMMANDS, main
+from proxytune.cli.terminal.answer import Answer
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
 
 
@@ -33,7 +33,7 @@ def failing(monkeypatch):
     return make
 
 
-@pytest.mark.parametrize("kind", ["robots", "effects", "agents", "metrics", "engines", "measures"])
+@pytest.mark.parametrize("kind", ["robots", "maps", "effects", "agents", "metrics", "engines", "measures"])
 def test_json_is_one_document_and_nothing_else(kind, capsys):
     assert main(["list", kind, "--json"]) == 0
     out = capsys.readouterr()

@@ -19,7 +19,7 @@ from proxytune.diagnosis.naming.evidence import Evidence, FittedLead
 from proxytune.diagnosis.naming.findings import AdoptedEffect
 from proxytune.diagnosis.naming.screening import Lead
 
-FORMS = {form.effect: form for form in candidates(ROBOT.figures, TRUTH, ()) if not form.form}
+FORMS = {form.effect: form for form in candidates(ROBOT, TRUTH, ()) if not form.form}
 AS_GOOD, WORSE = {"lateral_slip": 1e-4}, {"lateral_slip": 0.2}
 ACROSS, ALONG = (0.0, 1.0, 0.0), (0.99, 0.1, 0.0)
 

@@ -22,7 +22,7 @@ from proxytune.effects import CATALOGUE
 
 FORMS = [
     form
-    for form in candidates(ROBOT.figures, TRUTH, ("trim", "delay"))
+    for form in candidates(ROBOT, TRUTH, ("trim", "delay"))
     if not form.form and not CATALOGUE[form.effect].trace.placed
 ]
 

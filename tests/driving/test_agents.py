@@ -8,14 +8,15 @@ from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.agents.perception import fit_lane, open_eye, white_pixels, yellow_pixels
 from proxytune.driving.agents.pilots import HALF_LANE_M, duties
 from proxytune.driving.cameras import GroundPlaneCamera
-from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import read_robot
 from proxytune.errors import ExtensionError
 
+SMALL_LOOP = shipped_map("small_loop")
 ROBOT = read_robot("duckiebot")
 CAMERA = GroundPlaneCamera(ROBOT.camera_figures(), draw_floor(SMALL_LOOP))
-EAST_LANE_X = 2.5 * SMALL_LOOP.tile + SMALL_LOOP.lane_offset
+EAST_LANE_X = 2.5 * SMALL_LOOP.width + SMALL_LOOP.lane_offset
 
 
 def pictures():

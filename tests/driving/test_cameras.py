@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from proxytune.driving import cameras
 from proxytune.driving.cameras import CAMERA_CHANNELS, SKY, CameraFigures, GroundPlaneCamera, ground_points
-from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import COLOURS, Floor, draw_floor
 from proxytune.effects import PARAMETERS
 from proxytune.errors import SettingsError
@@ -20,6 +20,7 @@ NOMINAL = CameraFigures(
     columns=64, rows=48, forward_m=0.066, pitch_deg=19.15, height_m=0.108, field_of_view_deg=75.0, **LEVEL
 )
 ONE_PIXEL = replace(NOMINAL, columns=1, rows=1)
+SMALL_LOOP = shipped_map("small_loop")
 FLOOR = draw_floor(SMALL_LOOP)
 POSES = st.tuples(st.floats(0.2, 1.5), st.floats(0.2, 1.5), st.floats(-7.0, 7.0))
 
@@ -47,7 +48,7 @@ def on_map(points, pose):
 def loop_poses(count):
     angles = np.linspace(0.0, 2 * np.pi, count, endpoint=False)
     radius = np.where(np.arange(count) % 2, 0.72, 0.45)
-    middle = SMALL_LOOP.side / 2
+    middle = SMALL_LOOP.size[0] / 2
     heading = angles + np.where(np.arange(count) % 2, np.pi / 2, -np.pi / 2)
     return np.stack((middle + radius * np.cos(angles), middle + radius * np.sin(angles), heading), axis=1)
 

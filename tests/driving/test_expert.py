@@ -12,12 +12,13 @@ from proxytune.driving.expert import MEMORY, Expert
 from proxytune.driving.family import lane_following
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.road.lane import lane_point, off_map
-from proxytune.driving.road.maps import SMALL_LOOP as ROAD
+from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.robot import read_robot
 from proxytune.driving.task import driving_score, start_pose
 from proxytune.effects import Stage, stage_chain
 from proxytune.settings import Section
 
+ROAD = shipped_map("small_loop")
 ROBOT = read_robot("duckiebot")
 LOOK_AHEAD, SPEED, GAIN, DISTURBANCE = ROBOT.expert_figures()
 FAMILY = lane_following(Section(Path("study.toml"), "domain.", {"plant": "planar"}), model=None)
@@ -175,16 +176,16 @@ def test_a_picture_a_shown_command_and_whether_on_the_road_belong_to_every_step(
 @pytest.mark.parametrize("heading", [np.pi / 2, -np.pi / 2], ids=("outer", "inner"))
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_road_ends_with_the_outer_edges_of_its_two_lanes(heading, side):
-    edge, middle = ROAD.lane_offset + ROAD.lane_width / 2, ROAD.side - ROAD.tile / 2
+    edge, middle = ROAD.lane_offset + ROAD.lane_width / 2, ROAD.size[0] - ROAD.width / 2
     aside = (0.0, edge - 0.001, edge + 0.001)
-    poses = [np.array((middle + side * way, ROAD.side / 2, heading)) for way in aside]
+    poses = [np.array((middle + side * way, ROAD.size[0] / 2, heading)) for way in aside]
     assert shown(expert(), poses)[1].on_road == (True, True, False)
 
 
 def test_a_lesson_that_leaves_the_road_says_at_which_steps():
     driven = lesson(1, (("trim", 0.5),))
     middles = driven.poses[:-1:3, :2]
-    inside = np.abs(middles - ROAD.side / 2).max(axis=1)
+    inside = np.abs(middles - ROAD.size[0] / 2).max(axis=1)
     assert len(driven.memory.on_road) == len(driven.commands)
     assert not all(driven.memory.on_road)
     assert not any(driven.memory.on_road[step] for step in np.flatnonzero(inside < 0.2))

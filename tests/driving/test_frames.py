@@ -24,7 +24,7 @@ import pandas as pd
 import pytest
 
 from proxytune.driving.cameras import CameraFigures, GroundPlaneCamera, ground_points
-from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 
 LOG = Path(__file__).resolve().parents[2] / "../shared/data/logs/gym_duckietown_frames"
@@ -39,7 +39,8 @@ CAMERA = CameraFigures(
     field_of_view_deg=75.0,
     k1=0.0,
 )
-TILE, MIDDLE = SMALL_LOOP.tile, SMALL_LOOP.side / 2
+SMALL_LOOP = shipped_map("small_loop")
+TILE, MIDDLE = SMALL_LOOP.size[0] / 3, SMALL_LOOP.size[0] / 2
 
 pytestmark = pytest.mark.skipif(not LOG.is_dir(), reason=f"needs measured data in {LOG.parent.name}/{LOG.name}")
 
@@ -57,6 +58,10 @@ def theirs():
 
 def ours(road=SMALL_LOOP, **figures):
     return GroundPlaneCamera(replace(CAMERA, **figures), draw_floor(road)).render(poses()).astype(int)
+
+
+def repainted(**figures):
+    return replace(SMALL_LOOP, paint=replace(SMALL_LOOP.paint, **figures))
 
 
 def markings(pictures):
@@ -109,7 +114,7 @@ def test_straight_tiles_overlap_better_than_hand_taped_corners(colour, bound):
 
 def test_corners_are_bent_more_tightly_than_an_arc_of_half_a_tile():
     """IoU of both colours with arcs about the inner corner 0.44, with the map's corner radius 0.68."""
-    arcs = overlap(ours(replace(SMALL_LOOP, corner_radius=TILE / 2)), "both")
+    arcs = overlap(ours(repainted(bend_radius=TILE / 2)), "both")
     assert arcs < 0.5
     assert overlap(ours(), "both") > arcs + 0.15
 
@@ -117,8 +122,10 @@ def test_corners_are_bent_more_tightly_than_an_arc_of_half_a_tile():
 def test_nine_dashes_fit_a_straight_tile_better_than_any_other_number():
     far, near = from_middle()
     straight = (far < MIDDLE) & (near < TILE / 2)
-    fits = {n: overlap(ours(replace(SMALL_LOOP, straight_dashes=n)), "yellow", straight) for n in (7, 8, 9, 10)}
-    assert max(fits, key=fits.__getitem__) == SMALL_LOOP.straight_dashes
+    fits = {
+        n: overlap(ours(repainted(straight_dash=2 * TILE / (3 * n + 1))), "yellow", straight) for n in (7, 8, 9, 10)
+    }
+    assert max(fits, key=fits.__getitem__) == 9
 
 
 @pytest.mark.parametrize(

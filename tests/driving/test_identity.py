@@ -7,6 +7,7 @@ import pytest
 
 from proxytune.driving import identity, lineage
 from proxytune.driving.family import LaneFollowing
+from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.robot import robot_home
 from proxytune.shipped import shipped
 
@@ -18,7 +19,9 @@ OF_THEN = {
 
 
 def family(folder, plant="planar", camera="ground_plane"):
-    return LaneFollowing("duckiebot", plant, camera, "small_loop", 2.0, 0.01, 2.0, (("trim.trim", 0.1),), folder)
+    return LaneFollowing(
+        "duckiebot", plant, camera, shipped_map("small_loop"), 2.0, 0.01, 2.0, (("trim.trim", 0.1),), folder
+    )
 
 
 @pytest.fixture

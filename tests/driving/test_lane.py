@@ -9,12 +9,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from proxytune.driving.road.lane import lane_length, lane_point, lane_pose, off_map
-from proxytune.driving.road.maps import SMALL_LOOP as ROAD
+from proxytune.driving.road.reading import shipped_map
 
-TILE = ROAD.tile
-MIDDLE = np.array([ROAD.side / 2, ROAD.side / 2])
+ROAD = shipped_map("small_loop")
+SIDE, TILE = ROAD.size[0], ROAD.width
+MIDDLE = np.array([SIDE / 2, SIDE / 2])
 quick = settings(derandomize=True, max_examples=50, deadline=None)
-coordinates = st.floats(-0.5, ROAD.side + 0.5)
+coordinates = st.floats(-0.5, SIDE + 0.5)
 points = st.tuples(coordinates, coordinates)
 headings = st.floats(-10, 10)
 
@@ -216,11 +217,11 @@ def test_poses_may_have_any_shape():
     ("x", "y", "off"),
     [
         (0.0, 0.0, False),
-        (ROAD.side, ROAD.side, False),
+        (SIDE, SIDE, False),
         (-1e-9, 0.5, True),
         (0.5, -1e-9, True),
-        (ROAD.side + 1e-9, 0.5, True),
-        (0.5, ROAD.side + 1e-9, True),
+        (SIDE + 1e-9, 0.5, True),
+        (0.5, SIDE + 1e-9, True),
         (float("nan"), 0.5, True),
         (0.5, float("nan"), True),
     ],

@@ -9,7 +9,7 @@ import pytest
 from proxytune.driving.bullet import renderer
 from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import SKY, CameraFigures, GroundPlaneCamera, ground_points
-from proxytune.driving.road.maps import SMALL_LOOP
+from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import Floor, draw_floor
 from proxytune.errors import SettingsError
 
@@ -17,6 +17,7 @@ LEVEL = {"roll_deg": 0.0, "yaw_deg": 0.0, "k1": 0.0}
 NOMINAL = CameraFigures(
     columns=64, rows=48, forward_m=0.066, pitch_deg=19.15, height_m=0.108, field_of_view_deg=75.0, **LEVEL
 )
+SMALL_LOOP = shipped_map("small_loop")
 FLOOR = draw_floor(SMALL_LOOP)
 
 
@@ -24,7 +25,7 @@ def loop_poses(count):
     """Poses along both lanes, in their directions, curves and straights."""
     angles = np.linspace(0.0, 2 * np.pi, count, endpoint=False)
     outer = np.arange(count) % 2 == 0
-    radius, middle = np.where(outer, 0.72, 0.46), SMALL_LOOP.side / 2
+    radius, middle = np.where(outer, 0.72, 0.46), SMALL_LOOP.size[0] / 2
     heading = angles + np.where(outer, np.pi / 2, -np.pi / 2)
     return np.stack((middle + radius * np.cos(angles), middle + radius * np.sin(angles), heading), axis=1)
 

@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxytune.driving.road.lane import lane_length, lane_pose, off_map
-from proxytune.driving.road.maps import SMALL_LOOP as ROAD
+from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.task import METRICS, driving_score, score_trajectory, start_pose
 from proxytune.errors import EpisodeError
 
-TILE, OFFSET, MIDDLE = ROAD.tile, ROAD.lane_offset, ROAD.side / 2
-OUTER = (ROAD.side - TILE / 2 + OFFSET, TILE, pi / 2)  # lower end of the right side's straight, going up
-INNER = (ROAD.side - TILE / 2 - OFFSET, 2 * TILE, -pi / 2)  # its upper end, going down
+ROAD = shipped_map("small_loop")
+SIDE, TILE, OFFSET, MIDDLE = ROAD.size[0], ROAD.width, ROAD.lane_offset, ROAD.size[0] / 2
+OUTER = (SIDE - TILE / 2 + OFFSET, TILE, pi / 2)  # lower end of the right side's straight, going up
+INNER = (SIDE - TILE / 2 - OFFSET, 2 * TILE, -pi / 2)  # its upper end, going down
 OUTER_RADIUS, INNER_RADIUS = TILE / 2 + OFFSET, TILE / 2 - OFFSET
 OUTER_LAP = ((TILE, 0.0), (OUTER_RADIUS * pi / 2, 1 / OUTER_RADIUS)) * 4
 INNER_LAP = ((TILE, 0.0), (INNER_RADIUS * pi / 2, -1 / INNER_RADIUS)) * 4
@@ -149,7 +150,7 @@ def test_survival_ends_at_the_first_pose_off_the_map():
     first = next(k for k, pose in enumerate(out) if off_map(ROAD, pose[0], pose[1]))
     result = score(out)
     assert result["survival_time"] == pytest.approx(first / 60)
-    assert result["survival_time"] == pytest.approx((ROAD.side - x) / SPEED, abs=1.5 / 60)
+    assert result["survival_time"] == pytest.approx((SIDE - x) / SPEED, abs=1.5 / 60)
 
 
 @pytest.mark.parametrize("heading", [0.0, pi / 2, pi, -pi / 2])

@@ -13,12 +13,13 @@ from proxytune.driving.episode import TICK_HZ, Course, Sight, drive
 from proxytune.driving.expert import Expert
 from proxytune.driving.family import LaneFollowing, lane_following
 from proxytune.driving.road.lane import off_map
-from proxytune.driving.road.maps import SMALL_LOOP as ROAD
+from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.robot import read_robot
 from proxytune.driving.task import driving_score, start_pose
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.settings import Section
 
+ROAD = shipped_map("small_loop")
 ROBOT = read_robot("duckiebot")
 RATE = int(ROBOT.figures["control_rate"])
 both_plants = pytest.mark.parametrize("plant", ["bullet", "planar"])
@@ -127,7 +128,7 @@ def test_steps_off_the_road_are_not_shown_but_counted_among_those_asked_for(thet
 
 
 def test_a_robot_without_an_expert_is_refused_in_one_line(tmp_path):
-    room = LaneFollowing("irobot_create", "planar", "ground_plane", "small_loop", 2.0, 0.01, 2.0, (), tmp_path)
+    room = LaneFollowing("irobot_create", "planar", "ground_plane", ROAD, 2.0, 0.01, 2.0, (), tmp_path)
     with pytest.raises(SettingsError) as caught:
         room.demonstrate(episode(), 1.0)
     assert str(caught.value) == (

@@ -17,10 +17,10 @@ from proxytune.report.study.verdict import sentence
 from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
 from proxytune.storage.store import Store
-from proxytune.study.movement import Movement
-from proxytune.study.preflight import Preflight
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
+from proxytune.study.stages.movement import Movement
+from proxytune.study.stages.preflight import Preflight
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

@@ -13,11 +13,11 @@ from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import STUDY_ENGINES, make_proposer
 from proxytune.search.proposer import propose_batch
 from proxytune.storage.store import Store
-from proxytune.study.cutting import reference
 from proxytune.study.knowledge import goal_of
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
-from proxytune.study.stopping import stopped
+from proxytune.study.stages.cutting import reference
+from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import facts, open_study
 from proxytune.study.study_run import StudyRun
 

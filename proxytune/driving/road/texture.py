@@ -1,4 +1,4 @@
-"""The floor of a map as a picture seen from above, drawn from the map's figures."""
+"""The floor of a map as a picture seen from above, drawn from the map's road."""
 
 import functools
 import math
@@ -8,7 +8,10 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.road.maps import LoopMap
+from proxytune.driving.road.centre_line import find_nearest, way_round
+from proxytune.driving.road.layout import lay_out
+from proxytune.driving.road.maps import Paint, Road
+from proxytune.driving.road.segments import Segment, Straight, length, tightened
 
 PIXELS_PER_METRE = 400
 """2.5 mm a pixel: a twentieth of a white line, finer than what 64 × 48 pixels see at the robot's wheels."""
@@ -25,6 +28,12 @@ COLOURS = MappingProxyType(
     }
 )
 """Red, green, blue, 0 to 255: means over the frames of gym-duckietown's photographed tiles."""
+
+STRIP = 8
+"""Rows that are drawn at once, to stay small in memory; divides MARGIN."""
+
+DASH_PER_GAP = 2.0
+"""Length of a yellow dash over the length of a gap."""
 
 Metres = NDArray[np.float64]
 
@@ -45,66 +54,68 @@ class Floor:
 
 
 @functools.lru_cache
-def draw_floor(road: LoopMap) -> Floor:
-    """Draw a loop road: asphalt with white edge lines and a dashed yellow centre line, OFF_MAP around it.
+def draw_floor(road: Road) -> Floor:
+    """Draw a map: asphalt with the road's white edge lines and dashed yellow centre line, OFF_MAP around it.
 
-    Every edge is anti-aliased over one pixel. The same figures give the same bytes.
+    Every edge is anti-aliased over one pixel. The same figures give the same bytes. The picture of a map that is not
+    square is, with OFF_MAP beside the map.
     """
-    side = MARGIN * math.ceil(road.side * PIXELS_PER_METRE / MARGIN + 2.0)
-    origin = (road.side - side / PIXELS_PER_METRE) / 2.0
-    off_middle = np.abs(origin + (np.arange(side) + 0.5) / PIXELS_PER_METRE - road.side / 2.0)
-    x, y = np.meshgrid(off_middle, off_middle)
-    picture = np.tile(np.array(COLOURS["off_map"], dtype=float), (side, side, 1))
-    for colour, distance in _shapes(road, np.maximum(x, y), np.minimum(x, y)).items():
+    longest = max(road.size)
+    side = MARGIN * math.ceil(longest * PIXELS_PER_METRE / MARGIN + 2.0)
+    origin = (longest - side / PIXELS_PER_METRE) / 2.0
+    places = origin + (np.arange(side) + 0.5) / PIXELS_PER_METRE
+    paint = functools.partial(_paint, road, _stretches(road))
+    strips = [paint(np.stack(np.meshgrid(places, rows), axis=-1)) for rows in places.reshape(-1, STRIP)]
+    return Floor(np.concatenate(strips), PIXELS_PER_METRE, origin)
+
+
+def _stretches(road: Road) -> list[tuple[Segment, ...]]:
+    """What is painted for each segment of the road, its bends as tight as the paint's."""
+    return [tightened(segment, road.paint.bend_radius) for segment in road.segments]
+
+
+def _paint(road: Road, stretches: list[tuple[Segment, ...]], positions: Metres) -> NDArray[np.uint8]:
+    """The colours (rows, columns, 3) of positions (rows, columns, 2) [m]."""
+    picture = np.tile(np.array(COLOURS["off_map"], dtype=float), (*positions.shape[:-1], 1))
+    for colour, distance in _shapes(road, stretches, positions).items():
         cover = np.clip(0.5 - distance * PIXELS_PER_METRE, 0.0, 1.0)[..., None]
         picture += cover * (np.array(COLOURS[colour]) - picture)
-    return Floor(np.rint(picture).astype(np.uint8), PIXELS_PER_METRE, origin)
+    return np.asarray(np.rint(picture), dtype=np.uint8)
 
 
-def _shapes(road: LoopMap, far: Metres, near: Metres) -> dict[str, Metres]:
-    """Signed distance from what is painted in each colour, inside negative [m], the lowest layer first.
-
-    All eight octants look alike: `far` and `near` are the larger and the smaller of |x| and |y| from the map's middle.
-    """
-    off_centre = _centre_line_distance(road, far, near)
-    beside_yellow = np.abs(off_centre) - road.yellow_width / 2.0
+def _shapes(road: Road, stretches: list[tuple[Segment, ...]], positions: Metres) -> dict[str, Metres]:
+    """Signed distance from what is painted in each colour, inside negative [m], the lowest layer first."""
+    layout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
+    near = find_nearest(layout, positions)
+    aside, half = np.abs(near.outside), np.array(road.size) / 2.0
+    along = way_round(layout, near.section, near.straight, near.turned, np.zeros(()))
+    middle = (road.width - road.paint.white_width) / 2.0
     return {
-        "asphalt": far - road.side / 2.0,
-        "white": _white_distance(road, off_centre),
-        "yellow": np.maximum(beside_yellow, _dash_distance(road, far, near)),
+        "asphalt": (np.abs(positions - half) - half).max(axis=-1),
+        "white": np.abs(aside - middle) - road.paint.white_width / 2.0,
+        "yellow": np.maximum(aside - road.paint.yellow_width / 2.0, _dash_distance(road, stretches, along)),
     }
 
 
-def _centre_line_distance(road: LoopMap, far: Metres, near: Metres) -> Metres:
-    """Signed distance from the road's centre line, a square with rounded corners; outside positive [m]."""
-    straight = (road.tiles - 1) * road.tile / 2.0 - road.corner_radius
-    past_far, past_near = far - straight, near - straight
-    outside = np.hypot(np.maximum(past_far, 0.0), np.maximum(past_near, 0.0))
-    return outside + np.minimum(np.maximum(past_far, past_near), 0.0) - road.corner_radius
-
-
-def _white_distance(road: LoopMap, off_centre: Metres) -> Metres:
-    """Signed distance from the edge lines, whose outer edges are the road's, half a tile from its centre line."""
-    middle = road.tile / 2.0 - road.white_width / 2.0
-    return np.abs(np.abs(off_centre) - middle) - road.white_width / 2.0
-
-
-def _dash_distance(road: LoopMap, far: Metres, near: Metres) -> Metres:
+def _dash_distance(road: Road, stretches: list[tuple[Segment, ...]], along: Metres) -> Metres:
     """Signed distance along the centre line from the nearest dash [m]."""
-    corner = (road.tiles - 2) * road.tile / 2.0
-    lead = road.tile / 2.0 - road.corner_radius
-    beyond = near - corner
-    bend = lead + road.corner_radius * np.arctan2(beyond - lead, far - corner - lead)
-    in_corner = np.where(beyond < lead, beyond, bend)
-    corner_length = 2.0 * lead + road.corner_radius * np.pi / 2.0
-    on_straight = _from_dash(road, np.mod(near + corner, road.tile), road.tile, road.straight_dashes)
-    return np.where(beyond < 0.0, on_straight, _from_dash(road, in_corner, corner_length, road.corner_dashes))
+    sizes = np.array([length(stretch) for stretch in stretches])
+    dashes = np.array([_dashes(road.paint, segment, size) for segment, size in zip(road.segments, sizes, strict=True)])
+    ends = np.cumsum(sizes)
+    stretch = np.clip(np.searchsorted(ends, along, side="right"), 0, len(ends) - 1)
+    return _from_dash(along - (ends - sizes)[stretch], sizes[stretch], dashes[stretch])
 
 
-def _from_dash(road: LoopMap, along: Metres, length: float, dashes: int) -> Metres:
-    """Signed distance from the nearest of the dashes that share a tile's length evenly, a gap at either end."""
-    gap = length / (dashes * (road.dash_per_gap + 1.0) + 1.0)
-    period = gap * (road.dash_per_gap + 1.0)
-    first = gap + gap * road.dash_per_gap / 2.0
+def _dashes(paint: Paint, segment: Segment, size: float) -> int:
+    """How many dashes are painted on a segment whose centre line is painted so long [m]."""
+    dash = paint.straight_dash if isinstance(segment, Straight) else paint.bend_dash
+    return max(1, round((size / dash * DASH_PER_GAP - 1.0) / (DASH_PER_GAP + 1.0)))
+
+
+def _from_dash(along: Metres, size: Metres, dashes: NDArray[np.int_]) -> Metres:
+    """Signed distance from the nearest of the dashes that share a stretch's length evenly, a gap at either end."""
+    gap = size / (dashes * (DASH_PER_GAP + 1.0) + 1.0)
+    period = gap * (DASH_PER_GAP + 1.0)
+    first = gap + gap * DASH_PER_GAP / 2.0
     nearest = np.clip(np.rint((along - first) / period), 0, dashes - 1)
-    return np.abs(along - first - nearest * period) - gap * road.dash_per_gap / 2.0
+    return np.abs(along - first - nearest * period) - gap * DASH_PER_GAP / 2.0

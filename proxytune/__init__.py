@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from proxytune.api.studies import read as read_study
     from proxytune.api.studies import run as run_study
     from proxytune.api.tables import score
-    from proxytune.diagnosis.diagnosis import Diagnosis
+    from proxytune.diagnosis.result import Diagnosis
     from proxytune.domain import DomainFamily, Episode
     from proxytune.driving.agents import Agent
     from proxytune.effects import Effect
@@ -65,7 +65,7 @@ __all__ = [
 
 _HOMES = {
     "Agent": "driving.agents",
-    "Diagnosis": "diagnosis.diagnosis",
+    "Diagnosis": "diagnosis.result",
     "DomainFamily": "domain",
     "Effect": "effects",
     "Episode": "domain",

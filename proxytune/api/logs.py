@@ -9,8 +9,8 @@ import pandas as pd
 
 from proxytune.diagnosis.diagnose import declared_effects
 from proxytune.diagnosis.diagnose import diagnose as diagnose_log
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.measured.vehicle import robot_of
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.errors import LogError
 from proxytune.logs import Log, read_log
 

@@ -11,8 +11,8 @@ from rich.text import Text
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.steps import Steps
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.measured.vehicle import robot_of
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.logs import read_log
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     declared = declared_effects(robot) if arguments.declared is None else _names(arguments.declared)
     test = read_log(arguments.test) if arguments.test else None
     with Steps(SHARES) as step:
-        diagnosis = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=step)
+        diagnosis = diagnose(log, robot, declared, test=test, seed=arguments.seed, report=step)
         folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
         step("drawing")
         findings = document(diagnosis)

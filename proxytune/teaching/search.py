@@ -26,7 +26,7 @@ from proxytune.study.outputs import score_trials
 from proxytune.study.settings import StudySettings
 from proxytune.study.stages.stopping import nothing_to_gain, out_of_time
 from proxytune.teaching.experiment import convergence, learning_curves, teaching_settings
-from proxytune.teaching.points import School
+from proxytune.teaching.points import TeachingSetup
 
 OBJECTIVE = "plv"
 WIDTH = " width"
@@ -126,14 +126,14 @@ class PlvSearch:
 
     Attributes:
         settings: Of the study.
-        school: Where learners are taught and examined.
+        setup: Where learners are taught and examined.
         store: Where trials are kept.
         space: The box that is searched.
         watcher: Hears of every point of a learning curve.
     """
 
     settings: StudySettings
-    school: School
+    setup: TeachingSetup
     store: Store
     space: Space
     watcher: Watcher
@@ -145,8 +145,8 @@ class PlvSearch:
             RunError: If the learner does not converge without a proxy, so that no PLV is known.
             LearnerError: If an expert cannot drive somewhere in the box.
         """
-        settings, taught = self.settings, self.school.settings
-        without = learning_curves(self.school, {NONE: None}, settings.jobs, self.watcher)[NONE]
+        settings, taught = self.settings, self.setup.settings
+        without = learning_curves(self.setup, {NONE: None}, settings.jobs, self.watcher)[NONE]
         if not settled(without, taught.tolerance):
             raise RunError(
                 f"{settings.path}: without a proxy the score still rises by more than {taught.tolerance:g} up to "
@@ -159,11 +159,11 @@ class PlvSearch:
 
     def facts(self) -> dict[str, Any]:
         """All that a trial depends on; if it changes, trials lose their meaning."""
-        settings, taught = self.settings, self.school.settings
+        settings, taught = self.settings, self.setup.settings
         named = ("proxy_samples", "target_samples", "seeds", "lesson_s", "level", "tolerance")
         return {
-            "domains": list(self.school.identities),
-            "learner": self.school.learner_identity,
+            "domains": list(self.setup.identities),
+            "learner": self.setup.learner_identity,
             **{name: json.loads(json.dumps(getattr(taught, name))) for name in named},
             **{name: getattr(settings, name) for name in ("starts", "seed", "initial", "batch", "engine")},
             "box": {box.name: [box.low, box.high] for box in self.space.intervals},
@@ -191,8 +191,8 @@ class ProxyTrials:
     def ended(self) -> str:
         """Why no further proxy is tried; empty while one is."""
         search, done = self._search, self._records
-        if len(done) >= search.school.settings.budget:
-            return f"the budget of {search.school.settings.budget} proxies is spent"
+        if len(done) >= search.setup.settings.budget:
+            return f"the budget of {search.setup.settings.budget} proxies is spent"
         rules = search.settings.stop
         late = out_of_time(sum(record.seconds for record in done), rules)
         if late or rules.no_improvement is None or len(done) < search.settings.initial:
@@ -218,12 +218,12 @@ class ProxyTrials:
 
     @property
     def _identity(self) -> str:
-        return self._search.school.identities[0]
+        return self._search.setup.identities[0]
 
     def _tried(self, thetas: Mapping[int, Theta]) -> list[PlvTrial]:
         search = self._search
-        proxies = {f"trial {number}": distribution(search.school, theta) for number, theta in thetas.items()}
-        curves = learning_curves(search.school, proxies, search.settings.jobs, search.watcher)
+        proxies = {f"trial {number}": distribution(search.setup, theta) for number, theta in thetas.items()}
+        curves = learning_curves(search.setup, proxies, search.settings.jobs, search.watcher)
         return [
             PlvTrial(number, theta, proxies[name], curves[name], self._worth(curves[name]))
             for (number, theta), name in zip(thetas.items(), proxies, strict=True)
@@ -247,11 +247,11 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def distribution(school: School, theta: Theta) -> Distribution:
+def distribution(setup: TeachingSetup, theta: Theta) -> Distribution:
     """p(θ) with these centres and widths, cut off at what each parameter can be."""
     bounds = {}
     for name, centre in theta.items():
         if not name.endswith(WIDTH):
-            half, known = theta.get(name + WIDTH, 0.0) / 2.0, school.proxy.parameters[name]
+            half, known = theta.get(name + WIDTH, 0.0) / 2.0, setup.proxy.parameters[name]
             bounds[name] = (max(known.low, centre - half), min(known.high, centre + half))
     return Distribution(bounds)

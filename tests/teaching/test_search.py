@@ -10,7 +10,7 @@ from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.store import Store
 from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import open_school
+from proxytune.teaching.experiment import load_setup
 from proxytune.teaching.search import OBJECTIVE, PlvSearch, distribution, search_space
 
 BOX = {"trim": "[-0.3, 0.3]"}
@@ -18,10 +18,10 @@ BOX = {"trim": "[-0.3, 0.3]"}
 
 def run(folder, left=None):
     settings = read_study_settings(folder)
-    school = open_school(settings)
-    space = search_space(settings, school.settings.widths, left or {})
+    setup = load_setup(settings)
+    space = search_space(settings, setup.settings.widths, left or {})
     with Store.open(folder) as store:
-        return PlvSearch(settings, school, store, space, Silent()).run(make_proposer("gp", settings.initial))
+        return PlvSearch(settings, setup, store, space, Silent()).run(make_proposer("gp", settings.initial))
 
 
 def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(make_study):
@@ -111,8 +111,8 @@ def test_the_width_of_a_parameter_is_searched_beside_its_centre(make_study):
 
 
 def test_a_distribution_is_cut_off_at_what_a_parameter_can_be(make_study):
-    school = open_school(read_study_settings(make_taught(make_study)))
-    bounds = distribution(school, {"trim": 0.25, "trim width": 0.2, "delay": 0.1}).bounds
+    setup = load_setup(read_study_settings(make_taught(make_study)))
+    bounds = distribution(setup, {"trim": 0.25, "trim width": 0.2, "delay": 0.1}).bounds
     assert bounds["trim"] == pytest.approx((0.15, 0.3))
     assert bounds["delay"] == (0.1, 0.1)
 

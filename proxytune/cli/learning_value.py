@@ -12,8 +12,9 @@ from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
 from proxytune.study.study import Study
+from proxytune.teaching.box import search_space
 from proxytune.teaching.experiment import count_points, load_setup
-from proxytune.teaching.search import PlvSearch, search_space
+from proxytune.teaching.search import PlvSearch
 
 
 def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[float, float]]]) -> Answer:

@@ -10,8 +10,9 @@ from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.store import Store
 from proxytune.study.settings import read_study_settings
+from proxytune.teaching.box import distribution, search_space
 from proxytune.teaching.experiment import load_setup
-from proxytune.teaching.search import OBJECTIVE, PlvSearch, distribution, search_space
+from proxytune.teaching.search import OBJECTIVE, PlvSearch
 
 BOX = {"trim": "[-0.3, 0.3]"}
 

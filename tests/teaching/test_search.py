@@ -76,7 +76,7 @@ def test_a_batch_of_proxies_is_proposed_together_and_resumed_exactly(make_study)
 
 @pytest.mark.parametrize(
     ("rule", "reason"),
-    [("wall_time_s = 1e-9", "episodes have taken"), ("no_improvement = 1e9", "no θ is expected to improve PLV")],
+    [("wall_time_s = 1e-9", "episodes took"), ("no_improvement = 1e9", "no θ is expected to improve PLV")],
 )
 def test_a_rule_stops_it_and_without_the_rule_it_goes_on(make_study, rule, reason):
     folder = make_taught(make_study, parameters=BOX, more="budget = 4", initial="2")

@@ -141,7 +141,7 @@ def test_rules_to_stop_are_asked_where_a_batch_has_ended(make_study):
     study = changed(folder, **hurried)
     with Store.read(folder) as store:
         assert stopped(StudyRun(study, store), trials) == ""
-        assert stopped(StudyRun(study, store), trials[:BATCH]).startswith("episodes have taken")
+        assert stopped(StudyRun(study, store), trials[:BATCH]).startswith("episodes took")
 
 
 class Listening(Silent):

@@ -93,7 +93,8 @@ class SearchBox:
 
     def trials(self) -> pd.DataFrame:
         """One row per θ told, in the order in which they were asked for, with its score."""
-        rows = [{**self._space.theta(self._asked[place]), "score": self._scores[place]} for place in sorted(self._scores)]
+        told = sorted(self._scores)
+        rows = [{**self._space.theta(self._asked[place]), "score": self._scores[place]} for place in told]
         return pd.DataFrame(rows, columns=[*self._space.names, "score"])
 
     def _trial(self, place: int) -> Trial:

@@ -15,7 +15,7 @@ LABELS = ("agent", "episode", "time")
 
 
 @contextmanager
-def written(frames: Mapping[str, pd.DataFrame]) -> Iterator[Path]:
+def as_files(frames: Mapping[str, pd.DataFrame]) -> Iterator[Path]:
     """A folder with each DataFrame as NAME.csv, while a reader reads it.
 
     Raises:

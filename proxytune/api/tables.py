@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from proxytune.api.frames import written
+from proxytune.api.frames import as_files
 from proxytune.errors import InputError, ScoresError
 from proxytune.scores import Metric, ScoreTable, read_scores
 from proxytune.usefulness import Assessment, assess
@@ -53,7 +53,7 @@ def _table(scores: Scores, side: str, names: Sequence[str]) -> ScoreTable:
     if isinstance(scores, str | Path):
         return read_scores(scores, names)
     _check_columns(scores, side)
-    with written({side: scores}) as folder:
+    with as_files({side: scores}) as folder:
         return read_scores(folder / f"{side}.csv", names)
 
 
@@ -72,6 +72,6 @@ def _check_columns(scores: pd.DataFrame, side: str) -> None:
     if "agent" not in (*scores.columns, *scores.index.names):
         found = ", ".join(map(str, scores.columns))[:60]
         raise ScoresError(f"{side}: no column 'agent'; columns are {found}; name the column or index of agents 'agent'")
-    domains = scores["domain"].unique() if "domain" in scores else ()
+    domains = list(scores["domain"].unique()) if "domain" in scores else []
     if len(domains) > 1:
         raise ScoresError(f"{side}: has several domains; select one, as in scores[scores.domain == {domains[0]!r}]")

@@ -1,0 +1,165 @@
+"""A log from DataFrames is the log of the same files, its faults are told by row and column, and it is diagnosed."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+sys.path.append(str(Path(__file__).parent.parent / "diagnosis"))
+
+from planted import CALM, TRUTH, planted_log, write_log
+
+from proxytune import InputError, diagnose, log_of, read_log
+from proxytune.effects import read_model
+from proxytune.errors import LogError
+
+DESCRIPTION = {"robot": "duckiebot", "command": "duty", "rate_hz": 20}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A log in a folder, of a robot whose effective baseline nobody declared."""
+    scrubbing = planted_log({**TRUTH, "yaw_scrub": 0.12}, episodes=6, seconds=12.0, noise=CALM)
+    return write_log(scrubbing, tmp_path_factory.mktemp("logs") / "scrubbing")
+
+
+@pytest.fixture(scope="module")
+def samples(folder):
+    return pd.read_csv(folder / "samples.csv", dtype={"episode": str})
+
+
+@pytest.fixture(scope="module")
+def report(samples):
+    return diagnose(log_of(samples, {**DESCRIPTION, "name": "planted"}))
+
+
+def same(one, other):
+    fields = ("times", "commands", "poses")
+    return (one.name, one.robot, one.command, one.rate_hz) == (
+        other.name,
+        other.robot,
+        other.command,
+        other.rate_hz,
+    ) and all(
+        np.array_equal(getattr(a, field), getattr(b, field), equal_nan=True)
+        for a, b in zip(one.episodes, other.episodes, strict=True)
+        for field in fields
+    )
+
+
+def test_a_log_of_dataframes_is_the_log_of_the_files(folder, samples):
+    assert same(log_of(samples, {**DESCRIPTION, "name": "planted"}), read_log(str(folder)))
+
+
+def test_a_log_without_a_name_has_one(samples):
+    assert log_of(samples, DESCRIPTION).name == "log"
+
+
+def test_episode_and_time_may_be_the_index_and_numbers_may_be_numpy_s(samples):
+    description = {**DESCRIPTION, "rate_hz": np.int64(20)}
+    assert same(log_of(samples.set_index(["episode", "time"]), description), log_of(samples, DESCRIPTION))
+
+
+def test_commands_may_have_times_of_their_own(samples):
+    poses, commands = samples.drop(columns=["left", "right"]), samples[["episode", "time", "left", "right"]]
+    log = log_of(poses, DESCRIPTION, commands.assign(time=commands.time + 0.01))
+    assert np.allclose(log.episodes[0].issued, log.episodes[0].times + 0.01)
+
+
+def spoilt(row, column, value):
+    def spoil(samples):
+        frame = samples.astype({column: object})
+        frame.loc[row, column] = value
+        return frame
+
+    return spoil
+
+
+WRONG = {
+    "a word": (spoilt(7, "x", "far"), {}, "samples: row 7, column 'x': must be a finite number, or empty .* got 'far'"),
+    "a duty": (spoilt(0, "left", 50.0), {}, "samples: row 0, column 'left': a duty must be between -1 and 1, got 50"),
+    "time": (spoilt(3, "time", 0.0), {}, "samples: row 3, column 'time': 0 s does not come after 0.1 s"),
+    "a column more": (lambda samples: samples.assign(z=0), {}, "samples: unknown column 'z'"),
+    "a column less": (lambda samples: samples.drop(columns="y"), {}, "samples: no column 'y'"),
+    "no rows": (lambda samples: samples.head(0), {}, "samples: has no rows; add one per sample"),
+    "no table": (lambda samples: [1, 2], {}, "samples: must be a DataFrame, got list"),
+    "a key": (lambda samples: samples, {"rate": 20}, "log.toml: rate: unknown key; did you mean 'rate_hz'"),
+    "a command": (lambda samples: samples, {"command": "duties"}, "log.toml: command: unknown value 'duties'"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_no_log_is_one_line_with_row_and_column(samples, name):
+    spoil, keys, words = WRONG[name]
+    with pytest.raises(InputError, match=f"^{words}") as problem:
+        log_of(spoil(samples), {**DESCRIPTION, **keys})
+    assert "\n" not in str(problem.value)
+
+
+def test_a_fault_of_the_commands_names_the_commands(samples):
+    commands = samples[["episode", "time", "left", "right"]]
+    with pytest.raises(LogError, match="^commands: row 5, column 'left': a duty must be"):
+        log_of(samples.drop(columns=["left", "right"]), DESCRIPTION, spoilt(5, "left", 2.0)(commands))
+    with pytest.raises(LogError, match="'05' is not in commands; add its commands"):
+        log_of(samples.drop(columns=["left", "right"]), DESCRIPTION, commands[commands.episode != "05"])
+
+
+def test_the_planted_effect_is_found_with_its_value(report):
+    assert (report.verdict, report.effects) == ("explained", ("yaw_scrub",))
+    row = report.parameters().loc["yaw_scrub"]
+    assert row.low < row.value < row.high
+    assert abs(row.value - 0.12) < row.high - row.low
+    assert row.unit == "m"
+    assert np.isnan(row.before)
+    assert repr(report) == "DiagnosisReport of planted: explained: with the effects added, only noise is left"
+
+
+def test_errors_fall_to_the_noise_floor_at_every_horizon(report):
+    errors = report.errors()
+    assert errors.index.name == "horizon"
+    assert (errors.after < errors.before).all()
+    assert (errors.after < 1.2 * errors.noise_floor).all()
+
+
+def test_what_is_found_is_drawn_and_written_as_the_command_does(report, tmp_path):
+    assert all(isinstance(figure, Figure) for figure in report.figures().values())
+    paths = report.write(str(tmp_path / "found"))
+    assert [path.name for path in paths] == [
+        "diagnosis.json",
+        "model.toml",
+        *(f"{name}.png" for name in report.figures()),
+    ]
+    assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report.document()))
+    assert read_model(paths[1]).theta["yaw_scrub"] == pytest.approx(report.parameters().value["yaw_scrub"])
+    assert any("yaw_scrub" in note for note in report.notes)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"declared": ["trimm"]}, "^declared: trimm: no effect on motion has this name; did you mean 'trim'"),
+        ({"robot": "duckybot"}, "robot 'duckybot'.* did you mean 'duckiebot'|'duckybot'"),
+        ({"effects": ["mine:Slip"]}, "effect 'mine:Slip': no module 'mine'"),
+        ({"seed": -1}, "seed must be at least 0, got -1"),
+    ],
+)
+def test_options_that_cannot_be_used_are_one_line_in_python_s_words(samples, options, words):
+    with pytest.raises(InputError, match=words) as problem:
+        diagnose(log_of(samples, DESCRIPTION), **options)
+    assert "\n" not in str(problem.value)
+    assert "--" not in str(problem.value)
+
+
+def test_a_robot_that_nobody_knows_is_asked_for_by_its_argument(samples):
+    with pytest.raises(LogError, match="state wheel_radius_m and baseline_m.*or name a robot with robot=") as problem:
+        diagnose(log_of(samples, {**DESCRIPTION, "robot": "unheard_of"}))
+    assert "--robot" not in str(problem.value)
+
+
+def test_a_folder_that_is_no_log_is_refused(tmp_path):
+    with pytest.raises(LogError, match="no such folder; check the path"):
+        diagnose(str(tmp_path / "nowhere"))

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from proxytune.api.asking import SearchBox
+    from proxytune.api.diagnosing import DiagnosisReport, diagnose
     from proxytune.api.driving import DrivenEpisode, drive
-    from proxytune.api.logs import DiagnosisReport, diagnose, log_of
+    from proxytune.api.logs import log_of
     from proxytune.api.studies import StudyReport, read_study, run_study
     from proxytune.api.tables import score
     from proxytune.domain import DomainFamily, Episode
@@ -68,7 +69,7 @@ __all__ = [
 _HOMES = {
     "Agent": "driving.agents",
     "Assessment": "usefulness",
-    "DiagnosisReport": "api.logs",
+    "DiagnosisReport": "api.diagnosing",
     "DomainFamily": "domain",
     "DrivenEpisode": "api.driving",
     "Effect": "effects",
@@ -86,7 +87,7 @@ _HOMES = {
     "ScoreTable": "scores",
     "SearchBox": "api.asking",
     "StudyReport": "api.studies",
-    "diagnose": "api.logs",
+    "diagnose": "api.diagnosing",
     "drive": "api.driving",
     "log_of": "api.logs",
     "read_log": "logs",

@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.api.logs import DiagnosisReport
+from proxytune.api.diagnosing import DiagnosisReport
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.steps import Steps
 from proxytune.diagnosis.diagnose import declared_effects, diagnose

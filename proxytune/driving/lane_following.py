@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.domain import Demonstration, Episode, Policy
+from proxytune.domain import Demonstration, Episode, Policy, Recording
 from proxytune.driving import task
 from proxytune.driving.agents import Picture
 from proxytune.driving.agents.loading import load_agent
@@ -134,6 +134,16 @@ class LaneFollowing:
             EpisodeError: With the time at which the agent failed.
         """
         return task.score_trajectory(self.map, self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+
+    def record(self, episode: Episode) -> Recording:
+        """Drive one episode; its scores, the true pose at every tick, and the duties of both wheels.
+
+        Raises:
+            EpisodeError: With the time at which the agent failed.
+        """
+        driven, control_hz = self.drive(episode), read_robot(self.robot, self.folder).figures["control_rate"]
+        metrics = task.score_trajectory(self.map, driven.poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        return Recording(metrics, *driven.columns(control_hz))
 
     def drive(self, episode: Episode) -> Drive:
         """Drive one episode.

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 from proxytune.errors import ExtensionError, InputError
 from proxytune.extensions import load, plugins
@@ -70,15 +70,28 @@ def objective_of(settings: StudySettings) -> Objective:
         if ":" not in name and name not in shipped and name not in plugins("measure", shipped):
             known = (*shipped, LEARNING)
             raise InputError(f"unknown measure '{name}' (your own is written module:attribute); {nearest(name, known)}")
-        measure = load(name, kind="measure", beside=settings.folder, shipped=shipped)
-        return _as_objective(name, measure)
+        return _as_objective(name, shipped[name] if name in shipped else measure_of(name, settings.folder))
     except InputError as problem:
         raise settings.error("objective", str(problem)) from None
 
 
-def _as_objective(name: str, measure: Any) -> Objective:
+def measure_of(name: str, beside: Path | None = None) -> Measure:
+    """The measure that is not shipped: `module:attribute`, or the name of a plug-in.
+
+    Args:
+        name: Of the measure.
+        beside: The folder whose modules come before the installed ones.
+
+    Raises:
+        ExtensionError: If there is none.
+    """
+    measure = load(name, kind="measure", beside=beside)
     if not isinstance(measure, Measure):
         raise ExtensionError(f"measure '{name}' is a {type(measure).__name__}; make it a proxytune.Measure")
+    return measure
+
+
+def _as_objective(name: str, measure: Measure) -> Objective:
     if measure.on_means is None or measure.per_metric:
         raise ExtensionError(
             f"measure '{name}' is no single number of mean scores: it needs on_means, without per_metric"

@@ -63,7 +63,9 @@ def _pictures(robot: Robot) -> list[Picture]:
 
 
 def _act(agent: Agent, what: str, picture: Picture, memory: Any) -> tuple[NDArray[np.float64], Any]:
-    answer: Any = ask(what, lambda: agent.act(picture, memory))
+    kept = picture.copy()
+    answer: Any = ask(what, lambda: agent.act(kept, memory))
+    claim(np.array_equal(picture, kept), f"{what} changes the picture in place; copy it first")
     pair = isinstance(answer, tuple) and len(answer) == 2
     claim(pair, f"{what} answers with {type(answer).__name__}; act must give a tuple: the command and its memory")
     return ask(f"the command of {what}", lambda: np.array(answer[0], dtype=float)), answer[1]
@@ -91,11 +93,9 @@ def _claim_apart(agent: Agent, what: str, robot: Robot, seen: Sequence[Picture],
 def _claim_nothing_in_place(agent: Agent, what: str, robot: Robot, seen: Sequence[Picture]) -> None:
     memory = agent.begin(robot)
     for picture in seen:
-        kept = picture.copy()
         before = copy.deepcopy(memory)
         first, later = _act(agent, what, picture, memory)
         later = copy.deepcopy(later)
-        claim(np.array_equal(picture, kept), f"{what} changes the picture in place; copy it first")
         second, _ = _act(agent, what, picture, memory)
         third, _ = _act(agent, what, picture, before)
         same = np.array_equal(first, second) and np.array_equal(first, third)

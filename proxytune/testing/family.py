@@ -87,15 +87,16 @@ def _scores(family: DomainFamily, what: str, episode: Episode) -> Scores:
 
 
 def _claim_moves(family: DomainFamily, what: str, agents: Sequence[str], name: str, *, may_rest: bool) -> None:
-    """A parameter makes a difference between the ends of its range, for some agent from some start."""
+    """A parameter makes a difference at one end of its range, for some agent from some start."""
     parameter = family.parameters[name]
-    ends: tuple[Theta, Theta] = {name: parameter.low}, {name: parameter.high}
+    instances: tuple[Theta, ...] = {}, {name: parameter.low}, {name: parameter.high}
     for start in range(min(family.starts, STARTS)):
         for agent in agents:
-            low, high = (make_episode(theta, agent=agent, start=start, seed=1) for theta in ends)
-            if _scores(family, what, low) != _scores(family, what, high):
+            episodes = (make_episode(theta, agent=agent, start=start, seed=1) for theta in instances)
+            nominal, *moved = (_scores(family, what, episode) for episode in episodes)
+            if any(scores != nominal for scores in moved):
                 return
-    line = f"scores all the same with '{name}' {parameter.low:g} and {parameter.high:g}"
+    line = f"scores all the same with '{name}' left out, {parameter.low:g} and {parameter.high:g}"
     claim(may_rest, f"{what} {line}; use it, or name it in without_effect")
 
 

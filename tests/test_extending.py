@@ -117,7 +117,8 @@ def test_the_engine_runs_in_a_comparison_and_in_a_study(follow, tmp_path):
 
 def test_the_learner_is_taught(follow):
     taught = follow("A learner")["teach ."]
-    assert np.isfinite([point["mean"] for curve in taught["curves"] for point in curve["points"]]).all()
+    assert list(taught["proxies"]) == ["nominal"]
+    assert np.isfinite(taught["proxies"]["nominal"]["zero_shot"])
 
 
 def test_the_other_simulator_is_tuned(follow):

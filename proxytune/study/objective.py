@@ -5,8 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from proxytune.errors import ExtensionError, InputError
-from proxytune.extensions import load, plugins
+import numpy as np
+
+from proxytune.errors import ExtensionError, InputError, ProxytuneError
+from proxytune.extensions import describe, load, plugins
 from proxytune.scores import Array, Metric, ScoreTable
 from proxytune.settings import nearest
 from proxytune.study.settings import LEARNING, StudySettings
@@ -53,6 +55,9 @@ class Objective:
         }
 
 
+TRIED = (4, 3, 2)
+"""Tables, agents and metrics that a user's own measure is tried on."""
+
 PRPV = Objective("prpv", "PRPV", False, prpv_of_means)
 
 
@@ -96,4 +101,34 @@ def _as_objective(name: str, measure: Measure) -> Objective:
         raise ExtensionError(
             f"measure '{name}' is no single number of mean scores: it needs on_means, without per_metric"
         )
-    return Objective(name, measure.name, not measure.lower_is_better, measure.on_means)
+    of_means = measure.on_means if measure in MEASURES else _outside(name, measure.on_means)
+    return Objective(name, measure.name, not measure.lower_is_better, of_means)
+
+
+@dataclass(frozen=True)
+class _Outside:
+    """A measure of mean scores that is not ours: what it does wrong is told in one line."""
+
+    name: str
+    on_means: OfMeans
+
+    def __call__(self, proxy: Array, target: Array, metrics: Sequence[Metric]) -> Array:
+        try:
+            values = np.asarray(self.on_means(proxy, target, metrics), dtype=float)
+        except ProxytuneError:
+            raise
+        except Exception as problem:
+            told = f"measure '{self.name}' raised {describe(problem)}"
+            raise ExtensionError(f"{told} for means {proxy.shape} against {target.shape}; correct it") from problem
+        if values.shape != proxy.shape[:-2]:
+            told = f"measure '{self.name}' gives values {values.shape} of means {proxy.shape}"
+            raise ExtensionError(f"{told}; give one for each table, {proxy.shape[:-2]}")
+        return values
+
+
+def _outside(name: str, on_means: OfMeans) -> OfMeans:
+    """The measure, tried as a search calls it: several proxies against one target, before any episode is run."""
+    checked = _Outside(name, on_means)
+    means = np.random.default_rng(0).uniform(1.0, 2.0, TRIED)
+    checked(means, means[0], [Metric("one"), Metric("other", "min")])
+    return checked

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-from proxytune.errors import ConformanceError
+from proxytune.errors import ConformanceError, ProxytuneError
 from proxytune.extensions import describe
 
 Answer = TypeVar("Answer")
@@ -39,5 +39,7 @@ def ask(what: str, question: Callable[[], Answer]) -> Answer:
         return question()
     except ConformanceError:
         raise
+    except ProxytuneError as problem:
+        raise ConformanceError(str(problem)) from problem
     except Exception as problem:
         raise ConformanceError(f"{what} raised {describe(problem)}; it must not") from problem

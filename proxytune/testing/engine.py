@@ -92,12 +92,9 @@ def _proposed(proposer: Proposer, what: str, box: Space, trials: Sequence[Trial]
 
 
 def _claim_inside(what: str, box: Space, values: Values) -> None:
-    told = f"{what} proposes {values!r}"
-    shaped = isinstance(values, tuple) and len(values) == len(box.intervals)
-    claim(shaped, f"{told}; give a tuple of one number per parameter, {len(box.intervals)}")
-    for value, interval in zip(values, box.intervals, strict=True):
-        number = isinstance(value, float | int | np.floating)
-        claim(number and interval.low <= value <= interval.high, f"{told}; stay in [{interval.low}, {interval.high}]")
+    sides = [f"{side.name} in [{side.low:g}, {side.high:g}]" for side in box.intervals]
+    inside = len(values) == len(sides) and all(i.low <= v <= i.high for i, v in zip(box.intervals, values, strict=True))
+    claim(inside, f"{what} proposes {values}; give one value for each of {', '.join(sides)}")
 
 
 def _trial(values: Values, score: float | None) -> Trial:

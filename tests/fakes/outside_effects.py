@@ -81,7 +81,7 @@ WRONG = {
     "chance": (
         "cues=(Cue.DIRECTION,),",
         "cues=(Cue.DIRECTION,), draws=Draws(lambda value, rate: None, (0.1, 1.0)),",
-        "draws at random, which only shipped effects may",
+        "draws at random, which only shipped ones may",
     ),
     "no class": ("class WeakReverse:", "class Other:", "weak_reverse has no 'WeakReverse'"),
 }

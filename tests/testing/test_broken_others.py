@@ -142,7 +142,7 @@ FAMILIES = {
     "a metric that is no number": (Wobbly(faults=("agent0:*:nan",)), "gives 'distance' nan; it must be finite"),
     "an idle parameter": (
         Altered(idle="trim"),
-        "scores all the same with 'trim' left out, -0.3 and 0.3; use it, or name it",
+        "scores all the same with 'trim' left out, -0.3 and 0.3; use it",
     ),
     "chance": (Altered(chance=True), "scores an episode otherwise after others; keep no state"),
     "an identity of the process": (ByProcess(), "has the identity 'of .*' in another process, 'of .*' here"),
@@ -208,11 +208,11 @@ class NeedsScores(Proposer):
 
 
 PROPOSERS = {
-    Outside: r"'mine' proposes \(1.3, 1.3\); stay in \[0.0, 0.3\]",
-    Short: "give a tuple of one number per parameter, 2",
+    Outside: r"'mine' proposed \(1.3, 1.3\); give one value for each of delay in \[0, 0.3\], trim in",
+    Short: "give one value for each of delay",
     Remembering: "proposes otherwise when asked again; remember nothing",
     Random: "proposes otherwise when asked again; remember nothing",
-    NeedsScores: "'mine' raised TypeError: unsupported operand .*; it must not",
+    NeedsScores: "'mine' raised TypeError: unsupported operand .*; correct it",
 }
 
 

@@ -64,6 +64,8 @@ def _wrong_parameter(parameter: Parameter) -> Iterator[str]:
         yield f"has a parameter '{name}' from {low} to {high}; give a finite range, the lower end first"
     if not isinstance(neutral, str) and not low <= neutral <= high:
         yield f"has a parameter '{name}' whose neutral value {neutral} is not within [{low:g}, {high:g}]; widen that"
+    if beyond := [probe for probe in parameter.probes if not low <= probe <= high]:
+        yield f"has a parameter '{name}' with a probe {beyond[0]} that is not within [{low:g}, {high:g}]; move it"
 
 
 def _wrong_trace(kind: Any) -> Iterator[str]:
@@ -112,11 +114,11 @@ def _wrong_fields(kind: Any) -> Iterator[str]:
 
 
 def _wrong_filter(kind: Any) -> Iterator[str]:
-    """Try it on a short signal, in the middle of its range and where it is to change nothing."""
-    middle = [0.5 * (one.low + one.high) for one in kind.parameters]
+    """Try it on a short signal, in the middle of its range, at both ends, and where it is to change nothing."""
+    tried = [[one.low + share * (one.high - one.low) for one in kind.parameters] for share in (0.5, 0.0, 1.0)]
     neutral = [one.neutral for one in kind.parameters]
     signal = _signal(kind.stage)
-    for values in (middle, neutral):
+    for values in (*tried, neutral):
         if any(isinstance(value, str) for value in values):
             continue
         try:

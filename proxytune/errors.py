@@ -6,7 +6,8 @@
     │   ├── SettingsError    a study.toml, model.toml or robot.toml
     │   ├── LogError         a log of commands and poses
     │   ├── LearnerError     samples or weights that a learner cannot use
-    │   └── ExtensionError   code named by the user, or a plug-in
+    │   ├── ExtensionError   code named by the user, or a plug-in
+    │   └── ConformanceError an extension breaks a promise (proxytune.testing)
     └── RunError             something failed on the way (exit status 1)
         ├── EpisodeError     an agent or a domain failed in one episode
         ├── StoreError       study.db cannot be read or written
@@ -17,6 +18,7 @@ The command line turns each into one line on standard error and the exit status 
 
 __all__ = [
     "BusyError",
+    "ConformanceError",
     "EpisodeError",
     "ExtensionError",
     "InputError",
@@ -56,6 +58,10 @@ class LearnerError(InputError):
 
 class ExtensionError(InputError):
     """Code that a user names, or a plug-in, cannot be found, imported, or is not what it should be."""
+
+
+class ConformanceError(InputError, AssertionError):
+    """An extension does not keep what its protocol promises; to a test runner, an assertion that failed."""
 
 
 class RunError(ProxytuneError):

@@ -15,7 +15,8 @@ from proxytune.driving.robot import read_robot, robot_names
 from proxytune.driving.task import METRICS
 from proxytune.effects import DECLARED, SHIPPED
 from proxytune.extensions import plugins
-from proxytune.search.engines.registry import ENGINES, installed
+from proxytune.search.engines.registry import ENGINES, NAMES, engine_of, installed
+from proxytune.study.objective import measure_of
 from proxytune.usefulness import MEASURES, PODS
 
 Row = dict[str, object]
@@ -42,7 +43,8 @@ def _cell(value: object) -> str:
 
 
 def _robots() -> list[Row]:
-    robots = [read_robot(name) for name in robot_names()]
+    here = Path.cwd()
+    robots = [read_robot(name, here) for name in robot_names(here)]
     return [
         {"name": robot.name, "description": robot.description, "mass_kg": robot.figures.get("mass", "")}
         for robot in robots
@@ -83,6 +85,7 @@ def _metrics() -> list[Row]:
 
 
 def _engines() -> list[Row]:
+    own = [engine_of(name) for name in plugins("engine", NAMES)]
     return [
         {
             "name": engine.name,
@@ -92,21 +95,23 @@ def _engines() -> list[Row]:
             "install": "" if installed(engine) or not engine.needs else f"proxytune[{engine.needs.extra}]",
             "what_it_proposes": engine.summary,
         }
-        for engine in ENGINES
+        for engine in (*ENGINES, *own)
     ]
 
 
 def _measures() -> list[Row]:
+    shipped = {measure.key: measure for measure in (*MEASURES, *PODS)}
+    own = {name: measure_of(name) for name in plugins("measure", shipped)}
     return [
         {
             "name": measure.name,
-            "key": measure.key,
+            "key": key,
             "spelt_out": measure.title,
             "better": measure.better,
             "unit": measure.unit,
             "per_metric": "yes" if measure.per_metric else "",
         }
-        for measure in (*MEASURES, *PODS)
+        for key, measure in {**shipped, **own}.items()
     ]
 
 

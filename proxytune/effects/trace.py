@@ -25,13 +25,20 @@ class Cue(StrEnum):
     DIRECTION = "direction of travel"
 
 
+MOTIONS = ("forward", "sideways", "turn", "left", "right")
+"""What a panel can show of the motion: of the body, or the speed of a wheel."""
+
+SIGNALS = ("", "x", "y", "heading", "left angle", "right angle", "bend", *MOTIONS)
+"""What a panel can have along its axis: the signal of the cue, or one of these."""
+
+
 class Panel(NamedTuple):
     """What is drawn against what.
 
     Attributes:
-        signal: Along the axis; empty for that of the cue.
+        signal: Along the axis, one of SIGNALS; empty for that of the cue.
         label: Its label.
-        motion: Which motion is added: forward, sideways, turn, or the speed of the left or right wheel.
+        motion: Which motion is added, one of MOTIONS.
         share: Whether as a share of that motion instead of in its unit.
     """
 

@@ -12,6 +12,7 @@ from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import read_robot
 from proxytune.errors import ExtensionError
+from proxytune.testing import check_agent
 
 SMALL_LOOP = shipped_map("small_loop")
 ROBOT = read_robot("duckiebot")
@@ -31,6 +32,11 @@ def pictures():
 def seen_from(left=0.0, turned=0.0):
     """The picture from the outer lane of the eastern straight, shifted to the left [m] and turned left [rad]."""
     return CAMERA.render(np.array([(EAST_LANE_X - left, 0.62, np.pi / 2 + turned)]))[0]
+
+
+@pytest.mark.parametrize("name", AGENTS)
+def test_every_agent_keeps_what_agents_promise(name):
+    check_agent(AGENTS[name], robot=ROBOT)
 
 
 @pytest.mark.parametrize("name", AGENTS)

@@ -11,7 +11,7 @@ FLOORS = (
     {"study"},
     {"sweep", "teaching", "comparison", "diagnosis"},
     {"report"},
-    {"api"},
+    {"api", "testing"},
     {"cli"},
     {"__main__", "__init__"},
 )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from proxytune.effects import Cue, Means, Panel, Setting, Signal, Stage, Trace
+from proxytune.effects import Cue, Form, Means, Panel, Setting, Signal, Stage, Trace
 from proxytune.effects.trace import Draws
 from proxytune.space import Parameter
 
@@ -81,7 +81,35 @@ WRONG = {
     "chance": (
         "cues=(Cue.DIRECTION,),",
         "cues=(Cue.DIRECTION,), draws=Draws(lambda value, rate: None, (0.1, 1.0)),",
-        "draws at random, which only shipped effects may",
+        "draws at random, which only shipped ones may",
+    ),
+    "a probe out of its range": ("0.4, 0.8)", "0.4, 1.8)", r"parameter 'loss' with a probe 1.8 that is not within"),
+    "a bug at one end": (
+        "forward = signal[..., :1]\n",
+        "forward = signal[..., :1] if self.loss < 0.9 else None\n",
+        r"raised TypeError: .* at \[0.9\]; correct its begin and apply",
+    ),
+    "no cue": (
+        "cues=(Cue.DIRECTION,),",
+        "cues=(),",
+        r"has a trace with the cues \(\); give a tuple of at least one Cue",
+    ),
+    "no figure": ("shown=Means(", "shown=(", "is to be shown by .*; give its trace a WheelCurve, or Means with panels"),
+    "a panel of no motion": ('"forward"),))', '"speed"),))', "has a panel of the motion 'speed'; take one of forward,"),
+    "a panel of no signal": (
+        '(Panel("forward"',
+        '(Panel("speed"',
+        "has a panel of the signal 'speed'; leave it empty,",
+    ),
+    "no panel": (
+        '(Panel("forward", "forward speed [m/s]", "forward"),)',
+        "()",
+        "Means take a Cue and at least one Panel",
+    ),
+    "a form of another": (
+        "cues=(Cue.DIRECTION,),",
+        'cues=(Cue.DIRECTION,), forms=(Form((("lost",),)),),',
+        "has a form with the parameter 'lost'; its parameters are loss",
     ),
     "no class": ("class WeakReverse:", "class Other:", "weak_reverse has no 'WeakReverse'"),
 }

@@ -20,6 +20,7 @@ from proxytune.search.engines.registry import (
     why_not,
 )
 from proxytune.search.proposer import Trial
+from proxytune.testing import check_engine
 
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
 HERE = [pytest.param(name, marks=pytest.mark.skipif(bool(lacking(name)), reason=lacking(name))) for name in NAMES]
@@ -36,20 +37,15 @@ def test_every_engine_begins_with_the_same_design(engine):
 
 
 @pytest.mark.parametrize("engine", HERE)
-def test_resuming_anywhere_with_a_new_proposer_proposes_what_an_uninterrupted_search_does(engine):
-    whole = search(made(engine, 3), 8, seed=3)
-    for stop in (0, 3, 5, 7):
-        assert made(engine, 3).propose(SPACE, whole[:stop], 3) == whole[stop].values
+def test_every_engine_keeps_what_engines_promise(engine):
+    check_engine(engine_of(engine))
 
 
 @pytest.mark.parametrize("engine", HERE)
-def test_every_proposal_lies_in_the_box_and_is_a_new_one(engine):
-    """Also where the best is at its corner; only Optuna's sampler goes there more than once."""
+def test_every_proposal_is_a_new_one(engine):
+    """Also where the best is at a corner of the box; only Optuna's sampler goes there more than once."""
     trials = search(made(engine, 3), 8, seed=1, score=lambda values: -100 * values[0] - values[1])
     assert len({trial.values for trial in trials}) == 8 or engine == "gpsampler"
-    for trial in trials:
-        assert 0.0 <= trial.values[0] <= 0.3
-        assert -0.3 <= trial.values[1] <= 0.3
 
 
 @pytest.mark.parametrize("engine", HERE)

@@ -6,6 +6,7 @@ import pytest
 from proxytune.errors import InputError
 from proxytune.scores import Metric, ScoreTable
 from proxytune.sweep.discrepancy import METRICS
+from proxytune.testing import check_measure
 from proxytune.usefulness import MEASURES, PODS, Measure, assess
 from proxytune.usefulness.catalogue import PPV, PRPV, SRCC
 from proxytune.usefulness.measure import ALL
@@ -31,6 +32,11 @@ def largest(proxy, target, metrics):
 BIAS = Measure("bias", "bias", "mean error", "lower", "in the metric's unit", ".2f", per_metric=True, on_means=bias)
 LARGEST = Measure("largest", "largest bias", "largest mean error", "lower", "any", ".2f", on_means=largest)
 FOUND = assess(proxy=table(1), target=table(2), metrics=M)
+
+
+@pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.key)
+def test_every_measure_keeps_what_measures_promise_and_knows_a_perfect_proxy(measure):
+    check_measure(measure, perfect=0.0 if measure.lower_is_better else 1.0)
 
 
 @pytest.mark.parametrize("measure", [*MEASURES, BIAS, LARGEST], ids=lambda measure: measure.key)

@@ -23,6 +23,7 @@ from proxytune.search.engines import (
 )
 from proxytune.search.engines.after_design import AfterDesign
 from proxytune.search.engines.engine import Engine
+from proxytune.search.engines.outside import outside_proposer
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Proposer
 from proxytune.settings import nearest
@@ -118,6 +119,8 @@ def make_proposer(engine: str | Engine, initial: int, goal: Goal | None = None) 
     reason = why_not_engine(engine, composed=goal is not None)
     if reason:
         raise InputError(reason)
+    if engine.name not in NAMES:
+        return AfterDesign(outside_proposer(engine, goal), initial)
     return AfterDesign(engine.make(goal) if engine.learns_from == "outputs" else engine.make(), initial)
 
 

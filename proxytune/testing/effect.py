@@ -1,0 +1,170 @@
+"""What every effect promises."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from proxytune.driving.robot import Robot, read_robot
+from proxytune.effects import Effect, Signal, Stage
+from proxytune.effects.claims import MEMBERS, problems
+from proxytune.space import Parameter
+from proxytune.testing.claim import ask, claim, claim_members
+from proxytune.testing.signals import ROBOT, Candidate
+
+CUTTINGS, STEPS = 8, 9
+DRIFT = 1e-11
+
+
+def check_effect(effect: type[Effect], *, robot: Robot | None = None, least: float = 1e-3) -> None:
+    """Refuse an effect that breaks a promise.
+
+    The same seed gives the same result; cutting a signal into chunks changes nothing; what is filtered does not depend
+    on what comes later; memories and signals are never changed in place; a batch is filtered like its members; neutral
+    values change nothing; each parameter changes something all along its range; and the result is finite everywhere.
+
+    Args:
+        effect: Its class.
+        robot: Whose nominal figures it is told; the Duckiebot if not given.
+        least: The smallest change of a signal that counts as one.
+
+    Raises:
+        ConformanceError: With the promise that is broken.
+    """
+    name = str(getattr(effect, "name", getattr(effect, "__name__", effect)))
+    claim_members(effect, f"effect '{name}'", MEMBERS)
+    for problem in problems(effect):
+        claim(False, f"effect '{name}' {problem}")
+    candidate = Candidate(effect, robot or read_robot(ROBOT), name)
+    ask(f"effect '{name}'", lambda: _check(candidate, least))
+
+
+def _check(candidate: Candidate, least: float) -> None:
+    _claim_vanishes(candidate)
+    for parameter in candidate.parameters:
+        _claim_moves(candidate, parameter, least)
+        for value in dict.fromkeys((*parameter.probes, parameter.low, parameter.high)):
+            effect = candidate.moved(parameter, value)
+            what = f"effect '{candidate.name}' at {parameter.name} {value:g}"
+            _claim_filter(candidate, effect, what)
+            _claim_chunks(candidate, effect, what)
+    if candidate.kind.trace is not None:
+        _claim_seed(candidate, bool(candidate.kind.trace.draws))
+        _claim_no_drift(candidate)
+
+
+def _claim_vanishes(candidate: Candidate) -> None:
+    """At its neutral values it changes nothing, or is what the robot has in any case."""
+    signal, still = candidate.signal(1), candidate.at({})
+    filtered = candidate.filtered(still, signal)
+    told = ", ".join(f"{name} {value:g}" for name, value in candidate.neutral.items())
+    own = _of_the_robot(candidate)
+    if own is not None:
+        same = np.array_equal(filtered, candidate.filtered(own, signal))
+        claim(same, f"effect '{candidate.name}' at its neutral {told} is not the robot's own; it must be")
+    else:
+        same = np.array_equal(filtered, signal)
+        claim(same, f"effect '{candidate.name}' changes the signal at its neutral {told}; it must vanish there")
+
+
+def _of_the_robot(candidate: Candidate) -> Effect | None:
+    """The robot's own effect of this kind, where the neutral value is a nominal figure that it follows in any case."""
+    single = len(candidate.parameters) == 1
+    theta = candidate.robot.theta
+    names = {p.name: candidate.name if single else f"{candidate.name}.{p.name}" for p in candidate.parameters}
+    own = {parameter: theta[name] for parameter, name in names.items() if name in theta}
+    nominal = any(isinstance(parameter.neutral, str) for parameter in candidate.parameters)
+    return candidate.at(own) if own and nominal and candidate.kind.stage is not Stage.CAMERA else None
+
+
+def _claim_moves(candidate: Candidate, parameter: Parameter, least: float) -> None:
+    """Each step over its range changes the signal, and so does each probe."""
+    signal = candidate.signal(6, 2700)
+    steps = np.linspace(parameter.low, parameter.high, STEPS)
+    filtered = [candidate.filtered(candidate.moved(parameter, float(value)), signal) for value in steps]
+    for (low, earlier), (high, later) in pairwise(zip(steps, filtered, strict=True)):
+        line = f"is the same at {parameter.name} {low:g} and {high:g}; a parameter must matter all along its range"
+        claim(_apart(earlier, later) > least, f"effect '{candidate.name}' {line}")
+    signal, neutral = candidate.signal(2, 900), candidate.neutral[parameter.name]
+    still = candidate.filtered(candidate.moved(parameter, neutral), signal)
+    for probe in parameter.probes:
+        moved = _apart(candidate.filtered(candidate.moved(parameter, probe), signal), still)
+        holds = moved == 0.0 if probe == neutral else moved > least
+        line = f"does nothing at its probe {parameter.name} {probe:g}; a search must be able to see it there"
+        claim(holds, f"effect '{candidate.name}' {line}")
+
+
+def _claim_filter(candidate: Candidate, effect: Effect, what: str) -> None:
+    """It keeps shapes, is finite, repeats itself and looks at the past alone."""
+    signal = candidate.signal(3)
+    filtered = candidate.filtered(effect, signal)
+    claim(filtered.shape == signal.shape, f"{what} makes a signal {filtered.shape} of {signal.shape}; keep the shape")
+    claim(np.isfinite(filtered).all(), f"{what} is not finite; it must be, up to both ends of its range")
+    again = candidate.filtered(effect, signal)
+    claim(np.array_equal(filtered, again), f"{what} gives two results for one seed; draw from setting.seed alone")
+    other = np.concatenate((signal[:45], signal[45:] * 0.5 + 0.1))
+    causal = np.array_equal(filtered[:45], candidate.filtered(effect, other.astype(signal.dtype))[:45])
+    claim(causal, f"{what} depends on samples that come later; a filter knows the past alone")
+
+
+def _claim_chunks(candidate: Candidate, effect: Effect, what: str) -> None:
+    """Neither cutting nor batching changes the result, and nothing is changed in place."""
+    random = np.random.default_rng(0)
+    for seed in range(CUTTINGS):
+        signal, cuts = candidate.signal(seed), random.integers(1, 90, seed % 7)
+        apart = _apart(candidate.filtered(effect, signal, cuts), candidate.filtered(effect, signal))
+        where = ", ".join(map(str, sorted(cuts)))
+        claim(
+            apart <= _tolerance(candidate),
+            f"{what} changes by {apart:.2g} if the signal is cut at {where}; keep memory",
+        )
+    _claim_nothing_in_place(candidate, effect, what)
+    if candidate.kind.stage not in (Stage.CAMERA, Stage.IMAGE):
+        batch = np.stack([candidate.signal(seed) for seed in range(6)]).reshape(2, 3, 90, -1)
+        alone = np.array([[candidate.filtered(effect, one) for one in row] for row in batch])
+        together = candidate.filtered(effect, batch, (50,))
+        claim(
+            _apart(together, alone) <= 1e-12,
+            f"{what} filters a batch unlike its members; use leading axes (…, time, 2)",
+        )
+
+
+def _claim_nothing_in_place(candidate: Candidate, effect: Effect, what: str) -> None:
+    signal = candidate.signal(4)
+    kept, memory = signal.copy(), effect.begin(candidate.setting(candidate.rest(signal)))
+    first, middle = effect.apply(signal, memory)
+    first = first.copy()
+    second = effect.apply(signal, middle)[0].copy()
+    same = np.array_equal(effect.apply(signal, memory)[0], first)
+    same &= np.array_equal(effect.apply(signal, middle)[0], second)
+    claim(same, f"{what} changes a memory in place; make a new one")
+    claim(np.array_equal(signal, kept), f"{what} changes the signal in place; make a new one")
+
+
+def _claim_seed(candidate: Candidate, draws: bool) -> None:
+    """An effect that a diagnosis may fit depends on the seed only if its trace says that it draws."""
+    effect, signal = _strongest(candidate), candidate.signal(4)
+    differ = _apart(candidate.filtered(effect, signal, seed=7), candidate.filtered(effect, signal, seed=8)) > 0.0
+    line = "depends on the seed" if differ else "does not depend on the seed"
+    claim(differ == draws, f"effect '{candidate.name}' {line}, and its trace says otherwise; correct one of them")
+
+
+def _claim_no_drift(candidate: Candidate) -> None:
+    """A long signal told a control step at a time is filtered as a whole one."""
+    effect, signal = _strongest(candidate), candidate.signal(5, 1800)
+    apart = _apart(candidate.filtered(effect, signal, range(3, 1800, 3)), candidate.filtered(effect, signal))
+    line = f"changes by {apart:.2g} if it is told a control step at a time; a memory must not drift"
+    claim(apart <= DRIFT, f"effect '{candidate.name}' {line}")
+
+
+def _strongest(candidate: Candidate) -> Effect:
+    first = candidate.parameters[0]
+    return candidate.moved(first, first.probes[-1])
+
+
+def _tolerance(candidate: Candidate) -> float:
+    """Pictures are of single precision."""
+    return 2e-4 if candidate.kind.stage is Stage.IMAGE else 1e-12
+
+
+def _apart(one: Signal, other: Signal) -> float:
+    return float(np.abs(np.asarray(one) - np.asarray(other)).max())

@@ -1,0 +1,162 @@
+"""docs/extending.md works as it stands: its files are written, its commands run, in a folder for each section."""
+
+import json
+import re
+import shlex
+import sys
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from proxytune.cli.main import main
+from proxytune.driving.family import lane_following
+from proxytune.effects import Catalogue, read_model
+from proxytune.extensions import GROUP, load
+from proxytune.settings import read_settings
+from proxytune.study.study import open_study
+
+PAGE = (Path(__file__).resolve().parent.parent / "docs" / "extending.md").read_text(encoding="utf-8")
+INTRODUCTION, *CHAPTERS = re.split(r"^## ", PAGE, flags=re.MULTILINE)
+SECTIONS = {chapter.partition("\n")[0]: chapter for chapter in CHAPTERS}
+PLUGINS = "Plug-ins"
+COMMAND = "python -m proxytune "
+
+
+class Block(NamedTuple):
+    """A file of the page, or the lines of one that are changed or added."""
+
+    path: str
+    change: str
+    text: str
+
+
+def blocks(text):
+    found = re.findall(
+        r"^```(?:python|toml)\n# (\S+?)(?:, (changed|added))?\n(.*?)^```", text, re.DOTALL | re.MULTILINE
+    )
+    return [Block(*one) for one in found]
+
+
+def put(block, folder):
+    """Write a file; of one that is changed, replace the lines of the same keys, or add the lines at its end."""
+    path = folder / block.path
+    path.parent.mkdir(exist_ok=True)
+    before = path.read_text(encoding="utf-8") if block.change else ""
+    path.write_text(changed(before, block.text) if block.change == "changed" else before + block.text, encoding="utf-8")
+
+
+def changed(text, lines):
+    for line in lines.splitlines():
+        key = line.split(" = ")[0]
+        text, count = re.subn(rf"^{key} = .*$", line, text, flags=re.MULTILINE)
+        assert count == 1, f"the page changes {key}, which is there {count} times"
+    return text
+
+
+@pytest.fixture
+def follow(tmp_path, monkeypatch, capsys):
+    """Writes the files of the introduction and of a section, runs its commands, and gives what each printed."""
+
+    def followed(section):
+        for block in (*blocks(INTRODUCTION), *blocks(SECTIONS[section])):
+            put(block, tmp_path)
+        monkeypatch.chdir(tmp_path)
+        answers = {}
+        for line in re.findall(rf"^{COMMAND}(.*)$", SECTIONS[section], flags=re.MULTILINE):
+            assert main([*shlex.split(line), "--json"]) == 0, f"{line}: {capsys.readouterr().err}"
+            answers[line] = json.loads(capsys.readouterr().out)
+        return answers
+
+    return followed
+
+
+def test_the_study_of_the_introduction_reads(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for block in blocks(INTRODUCTION):
+        put(block, tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"study.toml", "truth.toml"}
+    assert main(["measure", ".", "--model", "truth.toml", "--output", "target.csv"]) == 0
+    assert open_study(tmp_path).settings.agents == ("steady", "braitenberg", "daredevil")
+
+
+def test_the_effect_is_found_by_diagnose_and_written_to_its_model(follow, tmp_path):
+    found = follow("An effect")["diagnose log --effects weak_reverse:WeakReverse --output found"]
+    assert [effect["name"] for effect in found["effects"]] == ["weak_reverse:WeakReverse"]
+    model = read_model(tmp_path / "found" / "model.toml", Catalogue(tmp_path))
+    assert model.theta["weak_reverse:WeakReverse"] == pytest.approx(0.3, abs=0.02)
+
+
+def test_the_agent_drives_in_a_study(follow, tmp_path):
+    assert len(follow("An agent")["study ."]["trials"]) == 4
+    assert "grey:Grey,0," in (tmp_path / "target.csv").read_text()
+
+
+def test_the_robot_is_listed_and_drives_on_the_map(follow, tmp_path):
+    answers = follow("A robot and a map")
+    assert "my_robot" in [row["name"] for row in answers["list robots"]["robots"]]
+    assert len(answers["study ."]["trials"]) == 4
+    family = lane_following(read_settings(tmp_path / "study.toml").section("domain"), model=None)
+    assert (family.robot, family.map.size, family.starts) == ("my_robot", (2.4, 1.755), 2)
+
+
+def test_the_measure_is_the_objective_of_a_study(follow, tmp_path):
+    assert len(follow("A measure, also as the objective")["study ."]["trials"]) == 4
+    assert open_study(tmp_path).objective.label == "Worst"
+
+
+def test_the_engine_runs_in_a_comparison_and_in_a_study(follow, tmp_path):
+    answers = follow("A search engine")
+    (compared,) = [answer for line, answer in answers.items() if line.startswith("compare")]
+    assert [row["engine"] for row in compared["engines"]] == ["my_engine:HALTON", "sobol"]
+    assert len(answers["study ."]["trials"]) == 4
+    assert open_study(tmp_path).engine.label == "Halton sequence"
+
+
+def test_the_learner_is_taught(follow):
+    taught = follow("A learner")["teach ."]
+    assert list(taught["proxies"]) == ["nominal"]
+    assert np.isfinite(taught["proxies"]["nominal"]["zero_shot"])
+
+
+def test_the_other_simulator_is_tuned(follow):
+    answered = follow("Another simulator")["study swing"]
+    assert len(answered["trials"]) == 10
+    assert set(answered["best"]["theta"]) == {"mass", "damping"}
+
+
+@pytest.fixture
+def everything(tmp_path, monkeypatch):
+    """A folder with every module of the page, on the path; they are forgotten afterwards."""
+    modules = [block for text in SECTIONS.values() for block in blocks(text) if block.path.endswith(".py")]
+    for block in modules:
+        put(block, tmp_path)
+    for folder in (tmp_path, tmp_path / "swing"):
+        monkeypatch.syspath_prepend(str(folder))
+    yield tmp_path
+    for block in modules:
+        sys.modules.pop(Path(block.path).stem, None)
+
+
+def test_what_the_page_makes_keeps_the_promises_that_its_tests_check(everything):
+    mine = load("test_mine:__dict__", kind="test")
+    tests = {name: test for name, test in mine.items() if name.startswith("test_")}
+    assert len(tests) == 5
+    for test in tests.values():
+        test()
+
+
+def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, monkeypatch, capsys):
+    (block,) = blocks(SECTIONS[PLUGINS])
+    points = tomllib.loads(block.text)["project"]["entry-points"][GROUP]
+    info = everything / "mine-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    lines = [f"{name} = {value}" for name, value in points.items() if not name.startswith("robot")]
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\n" + "\n".join(lines) + "\n")
+    for kind, name in {"effect": "weak_reverse", "agent": "grey", "engine": "halton", "measure": "worst"}.items():
+        assert main(["list", f"{kind}s", "--json"]) == 0
+        rows = json.loads(capsys.readouterr().out)[f"{kind}s"]
+        assert name in [row.get(kind, row.get("key" if kind == "measure" else "name")) for row in rows]

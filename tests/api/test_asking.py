@@ -60,12 +60,29 @@ def test_several_asks_before_a_tell_are_a_batch_of_different_theta():
     ], "trials are in the order in which they were asked for"
 
 
-def test_what_is_asked_next_does_not_depend_on_the_order_of_the_tells():
-    boxes = [SearchBox(BOX, initial=4) for _ in range(2)]
-    for box, order in zip(boxes, (1, -1), strict=True):
-        for theta in [box.ask() for _ in range(6)][::order]:
-            box.tell(theta, bowl(theta))
-    assert boxes[0].ask() == boxes[1].ask()
+class Eavesdropper:
+    """A proposer that keeps what it was shown."""
+
+    def __init__(self):
+        self.shown = []
+
+    def propose(self, space, trials, seed):
+        self.shown.append([(trial.values, trial.score, trial.pending) for trial in trials])
+        return (0.01 * len(trials),)
+
+
+def test_an_engine_sees_what_was_told_in_the_order_of_asking_and_then_what_is_pending():
+    proposer = Eavesdropper()
+    box = SearchBox({"x": (0.0, 1.0)}, engine=Engine("own", "", "", lambda: proposer), initial=1, maximise=True)
+    asked = [box.ask() for _ in range(2)]
+    box.tell(asked[0], 5.0)
+    asked += [box.ask() for _ in range(3)]
+    for place, score in ((3, 7.0), (2, 6.0)):
+        box.tell(asked[place], score)
+    box.ask()
+    values = [tuple(theta.values()) for theta in asked]
+    told = [(values[0], -5.0, False), (values[2], -6.0, False), (values[3], -7.0, False)]
+    assert proposer.shown[-1] == [*told, (values[1], None, True), (values[4], None, True)]
 
 
 def test_a_failed_simulation_is_kept_and_the_search_goes_on_elsewhere():

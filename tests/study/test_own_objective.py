@@ -6,7 +6,7 @@ from proxytune.errors import SettingsError
 from proxytune.study.study import open_study
 
 WRONG = {
-    "np.abs(proxy - target).mean(axis=-1)": r"gives values \(4, 3\) of means \(4, 3, 2\); give one for each table, \(4,\)",
+    "np.abs(proxy - target).mean(axis=-1)": r"gives values \(4, 3\) of means \(4, 3, 2\); give one for each table",
     "1 / 0": r"raised ZeroDivisionError: division by zero for means \(4, 3, 2\) against \(3, 2\); correct it",
     "'high'": "raised ValueError: could not convert string to float",
 }

@@ -1,28 +1,25 @@
 """Find out how useful a robot simulator is, tune it to the robot, and learn what it still lacks.
 
     study        run_study, read_study, StudyReport
-    scores       score, Metric, ScoreTable, read_scores
+    scores       score, Assessment, Metric, ScoreTable, read_scores
     search       SearchBox: ask for a θ, tell its score
-    logs         diagnose, read_log, log_of, Log, Diagnosis
-    driving      drive: one episode of a study's proxy
-    to extend    DomainFamily, Episode, Agent, Effect, Parameter, Proposer, Learner, Measure
+    logs         diagnose, DiagnosisReport, read_log, log_of, Log
+    driving      drive, DrivenEpisode: one episode of a study's proxy
+    to extend    DomainFamily, Episode, Parameter, Agent, Effect, Engine, Proposer, Learner, Measure
     errors       ProxytuneError, InputError, RunError
 
-A name is loaded when it is first used, so that `import proxytune` costs nothing.
+A name is loaded when it is first used, so that `import proxytune` costs nothing. docs/python.md shows all of them.
 """
 
-from importlib import import_module, metadata
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from proxytune.api.asking import SearchBox
-    from proxytune.api.driving import drive
-    from proxytune.api.logs import diagnose, log_of
-    from proxytune.api.studies import StudyReport
-    from proxytune.api.studies import read as read_study
-    from proxytune.api.studies import run as run_study
+    from proxytune.api.diagnosing import DiagnosisReport, diagnose
+    from proxytune.api.driving import DrivenEpisode, drive
+    from proxytune.api.logs import log_of
+    from proxytune.api.studies import StudyReport, read_study, run_study
     from proxytune.api.tables import score
-    from proxytune.diagnosis.diagnosis import Diagnosis
     from proxytune.domain import DomainFamily, Episode
     from proxytune.driving.agents import Agent
     from proxytune.effects import Effect
@@ -30,15 +27,21 @@ if TYPE_CHECKING:
     from proxytune.learning.learner import Learner
     from proxytune.logs import Log, read_log
     from proxytune.scores import Metric, ScoreTable, read_scores
+    from proxytune.search.engines.engine import Engine
     from proxytune.search.proposer import Proposer
     from proxytune.space import Parameter
-    from proxytune.usefulness.measure import Measure
+    from proxytune.usefulness import Assessment, Measure
+
+__version__ = "0.1.0"
 
 __all__ = [
     "Agent",
-    "Diagnosis",
+    "Assessment",
+    "DiagnosisReport",
     "DomainFamily",
+    "DrivenEpisode",
     "Effect",
+    "Engine",
     "Episode",
     "InputError",
     "Learner",
@@ -65,14 +68,17 @@ __all__ = [
 
 _HOMES = {
     "Agent": "driving.agents",
-    "Diagnosis": "diagnosis.diagnosis",
+    "Assessment": "usefulness",
+    "DiagnosisReport": "api.diagnosing",
     "DomainFamily": "domain",
+    "DrivenEpisode": "api.driving",
     "Effect": "effects",
+    "Engine": "search.engines.engine",
     "Episode": "domain",
     "InputError": "errors",
     "Learner": "learning.learner",
     "Log": "logs",
-    "Measure": "usefulness.measure",
+    "Measure": "usefulness",
     "Metric": "scores",
     "Parameter": "space",
     "Proposer": "search.proposer",
@@ -81,24 +87,26 @@ _HOMES = {
     "ScoreTable": "scores",
     "SearchBox": "api.asking",
     "StudyReport": "api.studies",
-    "diagnose": "api.logs",
+    "diagnose": "api.diagnosing",
     "drive": "api.driving",
     "log_of": "api.logs",
     "read_log": "logs",
     "read_scores": "scores",
-    "read_study": "api.studies:read",
-    "run_study": "api.studies:run",
+    "read_study": "api.studies",
+    "run_study": "api.studies",
     "score": "api.tables",
 }
 
+if not TYPE_CHECKING:  # A type checker would take any name for known.
 
-def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        return metadata.version("proxytune")
-    if name not in _HOMES:
-        raise AttributeError(f"module 'proxytune' has no attribute {name!r}")
-    home, _, attribute = _HOMES[name].partition(":")
-    return getattr(import_module(f"proxytune.{home}"), attribute or name)
+    def __getattr__(name):
+        from importlib import import_module
+
+        if name in _HOMES:
+            return getattr(import_module(f"proxytune.{_HOMES[name]}"), name)
+        from proxytune.settings import nearest
+
+        raise AttributeError(f"module 'proxytune' has no attribute '{name}'; {nearest(name, __all__)}")
 
 
 def __dir__() -> list[str]:

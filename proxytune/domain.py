@@ -98,6 +98,32 @@ class DomainFamily(Protocol):
         ...
 
 
+class Recording(NamedTuple):
+    """One episode to look at.
+
+    Attributes:
+        metrics: Its scores, as `run` gives them.
+        poses: Columns by name: `time` [s], and where the robot was then, as in x, y [m] and heading [rad].
+        commands: Columns by name: `time` [s] at which a command was issued, and its channels, as in left and right.
+    """
+
+    metrics: Mapping[str, float]
+    poses: Mapping[str, NDArray[np.float64]]
+    commands: Mapping[str, NDArray[np.float64]]
+
+
+class Recorder(DomainFamily, Protocol):
+    """A domain family whose episodes can be looked at: `proxytune.drive` shows more of it than scores."""
+
+    def record(self, episode: Episode) -> Recording:
+        """Simulate one episode as `run` does, and keep poses and commands.
+
+        Raises:
+            EpisodeError: As in `run`.
+        """
+        ...
+
+
 class Demonstration(NamedTuple):
     """What an expert has shown: samples to imitate.
 

@@ -14,8 +14,8 @@ import pytest
 from floors import floor
 
 from proxytune.cli.compare_objective import STAND_INS
-from proxytune.cli.interruption import INTERRUPTED, TERMINATED
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
+from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
 from proxytune.driving.agents import AGENTS
 from proxytune.driving.road.reading import map_names
 from proxytune.driving.robot import UNITS

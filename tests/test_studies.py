@@ -12,7 +12,7 @@ import pytest
 from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.learning.cloning import BehaviourCloning
-from proxytune.learning.lessons import Distribution, teach
+from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.study.family import load_family
 from proxytune.study.settings import read_study_settings
 
@@ -85,7 +85,7 @@ def test_an_imitator_of_enough_target_samples_drives_the_twins_loop(study):
     settings = read_study_settings(study("teacher"))
     twin = dataclasses.replace(load_family(settings, settings.teaching.target), plant="planar", seconds=30.0)
     learner = BehaviourCloning()
-    weights = learner.train(teach(twin, Distribution({}), count=1600, seed=3, lesson_s=5.0), None, 1)
+    weights = learner.train(collect_samples(twin, Distribution({}), count=1600, seed=3, lesson_s=5.0), None, 1)
     policy = functools.partial(learner.act, weights)
     scores = [twin.examine(make_episode({}, agent="pupil", start=start, seed=9), policy) for start in (1, 3, 6, 7)]
     assert np.mean(scores) > 30.0 * 45.0 / 60.0

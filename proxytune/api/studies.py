@@ -1,33 +1,36 @@
 """A study from Python: run or resume it, or look at what it has; the command `study` is this and a terminal."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 from matplotlib.figure import Figure
 
 from proxytune.report.study.convergence import convergence
 from proxytune.report.study.document import study_document
+from proxytune.report.study.finding import finding_of
 from proxytune.report.study.importance_figure import importance_figure
 from proxytune.report.study.page import page
 from proxytune.report.study.profiles_figure import profiles_figure
 from proxytune.report.study.search_figures import evaluations_figure
+from proxytune.report.study.verdict import sentence
 from proxytune.report.writing import save, write_text
-from proxytune.running.progress import Silent, Watcher
+from proxytune.running.progress import Bars, Silent, Watcher
 from proxytune.search.engines.registry import make_proposer
-from proxytune.space import Theta
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
-from proxytune.study import confirmation, preflight
 from proxytune.study.evaluation import Spent
 from proxytune.study.knowledge import goal_of
 from proxytune.study.provenance import note_search
 from proxytune.study.result import Best, StudyResult, result_of
-from proxytune.study.run import as_stored, check_facts, run_study
-from proxytune.study.settings import StudySettings
+from proxytune.study.run import as_stored, check_facts
+from proxytune.study.run import run_study as run_trials
+from proxytune.study.settings import LEARNING, StudySettings
+from proxytune.study.stages import confirmation, preflight
 from proxytune.study.study import Study, open_study
 from proxytune.study.study_run import StudyRun
 
@@ -39,30 +42,50 @@ FIGURES: Mapping[str, Callable[[StudyResult], Figure]] = {
 }
 
 
-@dataclass(frozen=True)
+class ReportFiles(NamedTuple):
+    """Where a study's figures and its page were written."""
+
+    figures: list[Path]
+    page: Path
+
+
+@dataclass(frozen=True, repr=False)
 class StudyReport:
     """What a study has found.
 
     Attributes:
         result: All of it.
-        spent: What this call has simulated.
+        spent: What this call has simulated: `spent.episodes`, `spent.seconds`.
     """
 
     result: StudyResult
     spent: Spent
 
+    def __repr__(self) -> str:
+        return f"StudyReport of '{self.result.study.settings.name}': {self.sentence}"
+
+    @property
+    def sentence(self) -> str:
+        """What was found, how good the proxy is there, and what to do next."""
+        return sentence(finding_of(self.result))
+
     @property
     def best(self) -> Best:
-        """The answer: its trial, what is expected there, and how useful the proxy is."""
+        """The answer: its trial, the PRPV expected there, and how useful the proxy is by every measure."""
         return self.result.best
 
     @property
-    def theta(self) -> Theta:
-        """The best θ."""
+    def theta(self) -> dict[str, float]:
+        """The best θ: what to run the simulator with."""
         return dict(self.best.trial.theta)
 
     def trials(self) -> pd.DataFrame:
-        """One row per finished trial: its θ, state, score (what the search makes small) and measures."""
+        """One row per trial that has ended: its θ, state, score and measures.
+
+        The state is "finished", "failed", or "cut" where it was seen early that it could not be the best. The score is
+        what the search makes small: the objective, negative where that is to be large; of a trial that was cut, the
+        expected one.
+        """
         rows = [
             {"trial": one.number, **one.theta, "state": one.state, "score": one.score, **one.measures}
             for one in self.result.trials
@@ -77,28 +100,41 @@ class StudyReport:
         """What `study --json` prints of it."""
         return study_document(self.result)
 
-    def write(self, folder: Path) -> tuple[list[Path], Path]:
-        """Write the figures and the page; their paths."""
-        paths = [folder / "figures" / f"{name}.png" for name in FIGURES]
+    def write(self, folder: str | Path | None = None) -> ReportFiles:
+        """Write the figures and report.html, into the study's folder unless another is given.
+
+        Raises:
+            RunError: If a file cannot be written.
+        """
+        home = self.result.study.settings.folder if folder is None else Path(folder)
+        paths = [home / "figures" / f"{name}.png" for name in FIGURES]
         for path, figure in zip(paths, self.figures().values(), strict=True):
             save(figure, path)
-        report = folder / "report.html"
+        report = home / "report.html"
         write_text(report, page(self.result, paths))
-        return paths, report
+        return ReportFiles(paths, report)
 
 
-def run(path: str | Path, watcher: Watcher | None = None) -> StudyReport:
+def run_study(path: str | Path, *, progress: bool = False) -> StudyReport:
     """Run a study, or resume it where it was left; a finished one is summed up again without simulating.
+
+    It may be interrupted at any moment, Ctrl-C or worse: every finished episode is kept, and the next call goes on to
+    the same result. What the user should know at once, as of a parameter without effect, is a warning.
 
     Args:
         path: The study's folder, or its study.toml.
-        watcher: Hears of every episode, to show progress.
+        progress: Whether to show a bar with the time left, where standard error is a terminal.
 
     Raises:
         InputError: If anything in the study cannot be used, with file, key and remedy.
         RunError: If no trial works, or the machine fails; all that was finished is kept.
     """
-    return run_opened(open_study(Path(path)), nullcontext(watcher or Silent()))
+    study = open_study(Path(path))
+    if study.settings.objective == LEARNING:
+        remedy = f"run it with: python -m proxytune study {study.settings.folder}"
+        raise study.settings.error("objective", f"run_study has no search for '{LEARNING}'; {remedy}")
+    watching = Bars(most_episodes(study.settings)) if progress else nullcontext(Silent())
+    return run_opened(study, watching, lambda line: warnings.warn(line, stacklevel=5))
 
 
 def run_opened(
@@ -117,13 +153,16 @@ def run_opened(
             under_way = StudyRun(study, store, watcher)
             _prepare(under_way, warn)
             # The proposer allows for the noise that the pre-flight measured.
-            run_study(under_way, make_proposer(study.engine, settings.initial, goal_of(under_way)))
+            run_trials(under_way, make_proposer(study.engine, settings.initial, goal_of(under_way)))
             confirmation.run_confirmation(under_way)
         return StudyReport(result_of(under_way), under_way.spent)
 
 
-def read(path: str | Path) -> StudyReport:
-    """Look at a study as far as it has been run; nothing is simulated.
+def read_study(path: str | Path) -> StudyReport:
+    """Look at a study as far as it has been run, also while it is running elsewhere; nothing is simulated.
+
+    Args:
+        path: The study's folder, or its study.toml.
 
     Raises:
         InputError: If the study has not been run, or was changed since.

@@ -1,46 +1,77 @@
-"""Usefulness from two DataFrames."""
+"""Usefulness from two tables of scores: DataFrames, files, or tables that were read before."""
 
-import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
 
-from proxytune.errors import ScoresError
+from proxytune.api.frames import as_files
+from proxytune.errors import InputError, ScoresError
 from proxytune.scores import Metric, ScoreTable, read_scores
 from proxytune.usefulness import Assessment, assess
 
-Scores = pd.DataFrame | ScoreTable
+Scores = pd.DataFrame | ScoreTable | str | Path
 
 
-def score(*, proxy: Scores, target: Scores, metrics: Sequence[str | Metric], seed: int = 0) -> Assessment:
-    """Measure how useful a proxy is, from the scores of the same agents on both sides.
+def score(
+    *,
+    proxy: Scores,
+    target: Scores,
+    metrics: str | Metric | Sequence[str | Metric],
+    beta: Mapping[str, float] | None = None,
+    seed: int = 0,
+) -> Assessment:
+    """Measure how useful a proxy is as a predictor, from the scores of the same agents on both sides.
 
     Args:
         proxy: One row per agent and episode, with the columns agent, episode (not needed for one row per agent) and
-            metrics.
-        target: The same of the target.
-        metrics: How agents are compared, as in "distance:max" or "distance:max:5%".
+            the metrics; a DataFrame, a CSV file or a ScoreTable.
+        target: The same of the target. Equal episodes on both sides are the same start.
+        metrics: How agents are compared, as in "distance:max" or ["distance:max:5%", "time_out_of_lane:min"].
+        beta: Weight of each metric in PPV; by default one over its spread on the target.
         seed: Seed of resamples and permutations.
 
+    Returns:
+        Every measure: `.prpv.value`, `.srcc.value["distance"]`, `.noise_floor`, `.chance`, `.notes`.
+
     Raises:
-        ScoresError: If a table lacks an agent, an episode or a metric, with row and column.
-        InputError: If a metric is not one.
+        ScoresError: If a table lacks an agent or a metric, with side, row and column.
+        InputError: If a metric, a weight or the seed cannot be used.
     """
-    compared = [metric if isinstance(metric, Metric) else Metric.parse(metric) for metric in metrics]
+    if seed < 0:
+        raise InputError(f"seed must be at least 0, got {seed}")
+    given = [metrics] if isinstance(metrics, str | Metric) else metrics
+    compared = [metric if isinstance(metric, Metric) else Metric.parse(metric) for metric in given]
     names = [metric.name for metric in compared]
-    sides = {side: _table(scores, side, names) for side, scores in {"proxy": proxy, "target": target}.items()}
-    return assess(proxy=sides["proxy"], target=sides["target"], metrics=compared, seed=seed)
+    sides = {side: _table(scores, side, names) for side, scores in (("proxy", proxy), ("target", target))}
+    return assess(proxy=sides["proxy"], target=sides["target"], metrics=compared, beta=beta, seed=seed)
 
 
 def _table(scores: Scores, side: str, names: Sequence[str]) -> ScoreTable:
-    """The table, checked by the reader of files, so that there is one way to read scores."""
     if isinstance(scores, ScoreTable):
-        return scores
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{side}.csv"
-        scores.to_csv(path, index=False)
-        try:
-            return read_scores(path, names)
-        except ScoresError as problem:
-            raise ScoresError(str(problem).replace(f"{folder}/", "").replace(".csv", "", 1)) from None
+        return _selected(scores, side, names)
+    if isinstance(scores, str | Path):
+        return read_scores(scores, names)
+    _check_columns(scores, side)
+    with as_files({side: scores}) as folder:
+        return read_scores(folder / f"{side}.csv", names)
+
+
+def _selected(scores: ScoreTable, side: str, names: Sequence[str]) -> ScoreTable:
+    try:
+        return scores.select(names)
+    except ScoresError as problem:
+        raise ScoresError(f"{side}: {problem}") from None
+
+
+def _check_columns(scores: pd.DataFrame, side: str) -> None:
+    """Refuse what a DataFrame may be like and a file not."""
+    if not isinstance(scores, pd.DataFrame):
+        kind = type(scores).__name__
+        raise InputError(f"{side}: must be a DataFrame, a CSV file or a ScoreTable, got {kind}")
+    if "agent" not in (*scores.columns, *scores.index.names):
+        found = ", ".join(map(str, scores.columns))[:60]
+        raise ScoresError(f"{side}: no column 'agent'; columns are {found}; name the column or index of agents 'agent'")
+    domains = list(scores["domain"].unique()) if "domain" in scores else []
+    if len(domains) > 1:
+        raise ScoresError(f"{side}: has several domains; select one, as in scores[scores.domain == {domains[0]!r}]")

@@ -9,8 +9,8 @@ from joblib import Parallel, delayed
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.cli.answer import Answer
 from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, check_truths, objective_of
+from proxytune.cli.terminal.answer import Answer
 from proxytune.comparison.analytic import Objective
 from proxytune.comparison.judgement import judging_code
 from proxytune.comparison.runs import Run, RunKey, judged_again, run_document, run_engine, run_from

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from proxytune.cli.study_folder import study_folder
+from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.comparison.analytic import Analytic, Objective
 from proxytune.comparison.calibrated import Calibrated
 from proxytune.comparison.of_study import StudyObjective, noise_floor
@@ -15,9 +15,9 @@ from proxytune.comparison.ranking import Ranking
 from proxytune.errors import InputError
 from proxytune.running.progress import Bars
 from proxytune.storage.store import Store
-from proxytune.study.preflight import most_episodes
 from proxytune.study.provenance import adopt
 from proxytune.study.settings import StudySettings
+from proxytune.study.stages.preflight import most_episodes
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

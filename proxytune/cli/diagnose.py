@@ -1,24 +1,20 @@
 """`diagnose`: find the effect that the model lacks, from a log of measured drives."""
 
 import argparse
-import json
 from pathlib import Path
-from typing import Any
 
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.cli.answer import Answer
-from proxytune.cli.steps import Steps
+from proxytune.api.diagnosing import DiagnosisReport
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.steps import Steps
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.logs import read_log
-from proxytune.report.diagnosis.document import document, model_file, tables_and_notes
-from proxytune.report.diagnosis.figures import diagnosis_figures
-from proxytune.report.writing import save, write_text
+from proxytune.report.diagnosis.document import tables_and_notes
 
 SHARES = {
     "fitting what is declared": 0.02,
@@ -65,23 +61,13 @@ def run(arguments: argparse.Namespace) -> Answer:
     declared = declared_effects(robot) if arguments.declared is None else _names(arguments.declared)
     test = read_log(arguments.test) if arguments.test else None
     with Steps(SHARES) as step:
-        diagnosis = diagnose(log, robot, declared, test=test, seed=arguments.seed, told=step)
+        diagnosis = diagnose(log, robot, declared, test=test, seed=arguments.seed, report=step)
         folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
         step("drawing")
-        findings = document(diagnosis)
-        files = _write(diagnosis, findings, folder)
-    return Answer(findings | {"files": files}, Group(tables_and_notes(diagnosis), Text("\n".join(files))))
+        report = DiagnosisReport(diagnosis)
+        files = [str(path) for path in report.write(folder)]
+    return Answer(report.document() | {"files": files}, Group(tables_and_notes(diagnosis), Text("\n".join(files))))
 
 
 def _names(given: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in given.split(",") if name.strip())
-
-
-def _write(diagnosis: Diagnosis, findings: dict[str, Any], folder: Path) -> list[str]:
-    write_text(folder / "diagnosis.json", json.dumps(findings, indent=2, allow_nan=False, ensure_ascii=False))
-    write_text(folder / "model.toml", model_file(diagnosis))
-    figures = []
-    for name, figure in diagnosis_figures(diagnosis).items():
-        save(figure, folder / f"{name}.png")
-        figures.append(f"{name}.png")
-    return [str(folder / name) for name in ("diagnosis.json", "model.toml", *figures)]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from proxytune.cli.answer import Answer
+from proxytune.cli.terminal.answer import Answer
 from proxytune.driving.agents import AGENTS
 from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.road.lane import lane_length

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from proxytune.cli.answer import Answer
-from proxytune.cli.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
 from proxytune.errors import InputError, ProxytuneError, RunError
 
 

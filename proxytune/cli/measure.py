@@ -7,7 +7,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.cli.answer import Answer
+from proxytune.cli.terminal.answer import Answer
 from proxytune.errors import InputError
 from proxytune.running.progress import Bars
 from proxytune.scores import ScoreTable, write_scores

@@ -10,8 +10,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from proxytune.api.studies import StudyReport
-from proxytune.cli.answer import Answer
 from proxytune.cli.sweep import draw_curves
+from proxytune.cli.terminal.answer import Answer
 from proxytune.report.study.document import study_document
 from proxytune.report.study.table import study_table
 from proxytune.scores import Metric

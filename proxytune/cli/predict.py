@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from rich.text import Text
 
-from proxytune.cli.answer import Answer
+from proxytune.cli.terminal.answer import Answer
 from proxytune.diagnosis.horizon.prediction import agreement, predict
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.driving.robot import Robot, robot_from_geometry, robot_names

@@ -6,9 +6,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from proxytune.cli.answer import Answer
+from proxytune.cli.terminal.answer import Answer
 from proxytune.diagnosis.recording import log_text, record, samples_text
-from proxytune.driving.family import LaneFollowing
+from proxytune.driving.lane_following import LaneFollowing
 from proxytune.errors import InputError
 from proxytune.report.writing import write_text
 from proxytune.study.family import load_family

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from proxytune.cli.answer import Answer
+from proxytune.cli.terminal.answer import Answer
 from proxytune.errors import InputError
 from proxytune.report.scores.document import document_of, document_of_ranking
 from proxytune.report.scores.figures import flipped_pairs, scatter

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.api.studies import StudyReport, most_episodes, run_opened
-from proxytune.cli.answer import Answer
 from proxytune.cli.learning_value import search_by_plv
-from proxytune.cli.study_folder import study_folder
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.report.study.table import study_table
 from proxytune.running.progress import Bars
 from proxytune.study.evaluation import Spent

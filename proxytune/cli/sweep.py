@@ -9,8 +9,8 @@ from pathlib import Path
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.cli.answer import Answer
-from proxytune.cli.study_folder import study_folder
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
 from proxytune.report.sweep.document import (

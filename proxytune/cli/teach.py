@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from proxytune.cli.answer import Answer
-from proxytune.cli.study_folder import study_folder
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.report.teaching.document import teach_document
 from proxytune.report.teaching.figure import teach_figure
 from proxytune.report.teaching.table import teach_table
@@ -15,7 +15,7 @@ from proxytune.storage.store import Store
 from proxytune.study.provenance import adopt
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
-from proxytune.teaching.experiment import open_school, points_of, run_experiment
+from proxytune.teaching.experiment import count_points, load_setup, run_experiment
 from proxytune.teaching.predictivity import predictivity
 
 
@@ -30,12 +30,12 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Run what is left of the experiment; a finished one is summed up again without training or driving."""
     folder = study_folder(arguments.path)
     study = open_study(folder)
-    school = open_school(study.settings)
-    proxies = school.settings.proxies
+    setup = load_setup(study.settings)
+    proxies = setup.settings.proxies
     with locked(folder), Store.open(folder) as store:
         adopt(study, store)
-        with Bars(points_of(school, len(proxies)), "points of learning curves") as bars:
-            experiment = run_experiment(study.settings, school, bars)
+        with Bars(count_points(setup, len(proxies)), "points of learning curves") as bars:
+            experiment = run_experiment(study.settings, setup, bars)
         agents = len(study.settings.agents) * study.settings.starts
         with Bars(agents * sum(proxy.fixed for proxy in proxies.values())) as bars:
             prpv = predictivity(StudyRun(study, store, bars), proxies)

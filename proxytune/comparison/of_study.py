@@ -11,7 +11,7 @@ from proxytune.space import Space
 from proxytune.study.evaluation import plan
 from proxytune.study.knowledge import goal_of
 from proxytune.study.outputs import outputs_of
-from proxytune.study.preflight import run_preflight
+from proxytune.study.stages.preflight import run_preflight
 from proxytune.study.study import Study, facts
 from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import assess

@@ -3,27 +3,27 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
-from proxytune.diagnosis.horizon.confirmation import bullet_strays, has_body
+from proxytune.diagnosis.horizon.confirmation import bullet_pose_errors, has_body
 from proxytune.diagnosis.horizon.floor import pose_noise
-from proxytune.diagnosis.horizon.polish import HORIZONS_S, Polish, polished
+from proxytune.diagnosis.horizon.polish import HORIZONS_S, Polish, polish_fit
 from proxytune.diagnosis.horizon_error import HorizonError, KeptAside, horizon_error
 from proxytune.diagnosis.manoeuvres import next_manoeuvre
-from proxytune.diagnosis.measured.clocks import Clocks, in_step, read_clocks
+from proxytune.diagnosis.measured.clocks import Clocks, put_in_step, read_clocks
 from proxytune.diagnosis.measured.drives import gather
-from proxytune.diagnosis.measured.rests import without_long_rests
+from proxytune.diagnosis.measured.rests import cut_out_long_rests
 from proxytune.diagnosis.measured.split import Parts, all_drives, split
 from proxytune.diagnosis.model.fitting import Fit
 from proxytune.diagnosis.model.intervals import intervals
 from proxytune.diagnosis.model.plausible import check_motion, check_units
 from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, motion_effects
-from proxytune.diagnosis.naming.found import Adopted, Dropped, Found, Variant
+from proxytune.diagnosis.naming.findings import AdoptedEffect, DroppedEffect, Findings, Variant
 from proxytune.diagnosis.naming.likeness import two_robots
 from proxytune.diagnosis.naming.materiality import Worth, worth
 from proxytune.diagnosis.naming.names import name_effects
-from proxytune.diagnosis.naming.search import Told, fit_declared
-from proxytune.diagnosis.naming.visibility import unseen
+from proxytune.diagnosis.naming.search import Report, fit_declared
+from proxytune.diagnosis.naming.visibility import invisible_effects
 from proxytune.diagnosis.remainder.learning import Learning, learn
+from proxytune.diagnosis.result import Diagnosis, Estimate, main_error
 from proxytune.diagnosis.verdict import verdict
 from proxytune.driving.robot import Robot
 from proxytune.effects import DECLARED, SHIPPED, Catalogue, effect_of
@@ -42,7 +42,7 @@ def diagnose(
     *,
     test: Log | None = None,
     seed: int = 1,
-    told: Told = lambda _: None,
+    report: Report = lambda _: None,
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside.
 
@@ -52,7 +52,7 @@ def diagnose(
         declared: Effects whose parameters are tuned in any case.
         test: Another log to test on; without it a part of the drives is kept.
         seed: Of the null distributions.
-        told: Hears of progress.
+        report: Takes a line about each step, as it begins.
 
     Raises:
         LogError: If the log cannot bear the question: too short, no motion, other units.
@@ -60,26 +60,27 @@ def diagnose(
     """
     names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
     start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}
-    log, test = without_long_rests(log), without_long_rests(test) if test is not None else None
+    log, test = cut_out_long_rests(log), cut_out_long_rests(test) if test is not None else None
     own = read_clocks(log, robot)
     clocks = (own,) if test is None else (own, read_clocks(test, robot, own))
+    # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.
     if any(one.offset.value for one in clocks) and "delay" not in names:
         names, start = (*names, "delay"), {**start, "delay": own.assumed_delay_s}
     parts = split(log, robot, test, clocks)
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
-    told("fitting what is declared")
-    found = name_effects(fit_declared(parts.fitted, start, names), seed, told)
-    told("fitting to windows of prediction")
-    found, polishes = _polished(found)
-    told("learning what no named effect explains")
+    report("fitting what is declared")
+    found = name_effects(fit_declared(parts.fitted, start, names), seed, report)
+    report("fitting to windows of prediction")
+    found, polishes = _polish_models(found)
+    report("learning what no named effect explains")
     learning = learn(found, parts.tested, HORIZONS_S)
-    told("testing on drives kept aside")
-    tested = _tested(test or log, parts, found, clocks[-1])
+    report("testing on drives kept aside")
+    tested = _gather_tested(test or log, parts, found, clocks[-1])
     errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h, learning.theta)) is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
-    answer = _verdict(found, learning, main_error(errors))
+    answer = _give_verdict(found, learning, main_error(errors))
     return Diagnosis(
         log=log.name,
         robot=robot,
@@ -88,12 +89,12 @@ def diagnose(
         theta=estimates(found.model, found.adopted, polishes[1]),
         effects=found.adopted,
         immaterial=tuple(dropped.effect for dropped in found.immaterial),
-        worth=_worth(found, parts, seed),
+        worth=_weigh_effects(found, parts, seed),
         polish=polishes[1],
         residual_depends_on=learning.depends_on(curve.group.name for curve in found.remainder),
         errors=errors,
-        confirmed=_confirmed(found, tested, told),
-        could_not_be_seen=_unseen(found, names),
+        confirmed=_confirm_on_bullet(found, tested, report),
+        could_not_be_seen=_list_invisible(found, names),
         manoeuvre=next_manoeuvre(found, again=answer == "cannot be told"),
         parts=parts,
         found=found,
@@ -105,7 +106,7 @@ def diagnose(
 
 
 def declared_effects(robot: Robot) -> tuple[str, ...]:
-    """The effects that are declared where nobody says: those of θ that act on motion and that the robot has."""
+    """The effects that are declared by default: those of θ that act on motion and that the robot has."""
     return tuple(name for name in DECLARED if name in MOTION_EFFECTS and name in robot.theta)
 
 
@@ -124,8 +125,8 @@ def declared_parameters(effects: Iterable[str], catalogue: Catalogue = SHIPPED) 
     return tuple(dict.fromkeys(names))
 
 
-def estimates(fitted: Fit, adopted: Iterable[Adopted], polish: Polish | None) -> dict[str, Estimate]:
-    """Every value of a fitted model with its interval; fixed ones have none to speak of."""
+def estimates(fitted: Fit, adopted: Iterable[AdoptedEffect], polish: Polish | None) -> dict[str, Estimate]:
+    """The values of a fitted model with their intervals; the interval of a fixed value has no width."""
     parameters = fitted.drives.robot.catalogue.parameters
     known = intervals(fitted) | (dict(polish.intervals) if polish else {})
     for effect in adopted:
@@ -137,39 +138,39 @@ def estimates(fitted: Fit, adopted: Iterable[Adopted], polish: Polish | None) ->
     }
 
 
-def _polished(found: Found) -> tuple[Found, tuple[Polish | None, Polish | None]]:
-    """Both models with parameters fitted to windows, where that helps: before and after are compared on equal terms."""
-    declared, before = polished(found.declared)
+def _polish_models(found: Findings) -> tuple[Findings, tuple[Polish | None, Polish | None]]:
+    """Fit both models to windows, where that helps: before and after are compared on equal terms."""
+    declared, before = polish_fit(found.declared)
     if not found.adopted and not found.immaterial:
         return replace(found, declared=declared, model=declared), (before, before)
-    model, after = polished(found.model)
+    model, after = polish_fit(found.model)
     return replace(found, declared=declared, model=model), (before, after)
 
 
-def _unseen(found: Found, declared: Iterable[str]) -> tuple[str, ...]:
+def _list_invisible(found: Findings, declared: Iterable[str]) -> tuple[str, ...]:
     seen = {effect.effect for effect in (*found.adopted, *(dropped.effect for dropped in found.immaterial))}
-    return unseen(found.model, set(map(effect_of, declared)) | seen)
+    return invisible_effects(found.model, set(map(effect_of, declared)) | seen)
 
 
-def _tested(log: Log, parts: Parts, found: Found, clocks: Clocks) -> KeptAside:
-    whole = in_step(gather(log, parts.tested.robot, log.episodes), clocks, range(len(log.episodes)))
+def _gather_tested(log: Log, parts: Parts, found: Findings, clocks: Clocks) -> KeptAside:
+    whole = put_in_step(gather(log, parts.tested.robot, log.episodes), clocks, range(len(log.episodes)))
     return KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
 
 
-def _verdict(found: Found, learning: Learning, error: HorizonError) -> str:
+def _give_verdict(found: Findings, learning: Learning, error: HorizonError) -> str:
     unnamed = bool(found.remainder) or learning.remainder.used
     return verdict(error.after.value, error.floor, named=bool(found.adopted), unnamed=unnamed)
 
 
-def _confirmed(found: Found, tested: KeptAside, told: Told) -> HorizonError | None:
+def _confirm_on_bullet(found: Findings, tested: KeptAside, report: Report) -> HorizonError | None:
     if not has_body(tested.drives):
         return None
-    told("confirming on the bullet plant")
-    return horizon_error(found, tested, CONFIRMED_S, {}, bullet_strays)
+    report("confirming on the bullet plant")
+    return horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors)
 
 
-def _worth(found: Found, parts: Parts, seed: int) -> dict[str, Worth]:
-    """What every effect is worth on the drives kept aside, those that were dropped again too."""
+def _weigh_effects(found: Findings, parts: Parts, seed: int) -> dict[str, Worth]:
+    """Weigh every effect on the drives kept aside, the dropped ones too."""
     model = Variant(found.model.theta, found.model.free)
-    weighed = [Dropped(effect, model) for effect in found.adopted] + list(found.immaterial)
+    weighed = [DroppedEffect(effect, model) for effect in found.adopted] + list(found.immaterial)
     return {effect.effect: worth(parts.fitted, parts.tested, beside, effect, seed) for effect, beside, _ in weighed}

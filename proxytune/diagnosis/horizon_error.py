@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.horizon.floor import PoseNoise, noise_floor
-from proxytune.diagnosis.horizon.polish import FEWEST_BLOCKS
-from proxytune.diagnosis.horizon.repeats import repeated
-from proxytune.diagnosis.horizon.windows import Ratio, Rmse, Windows, blocks_of, cut, ratio, rmse, strays
+from proxytune.diagnosis.horizon.repeats import compare_repeats
+from proxytune.diagnosis.horizon.windows import Ratio, Rmse, Windows, blocks_of, cut, pose_errors, ratio, rmse
 from proxytune.diagnosis.measured.drives import Drives, Floats
-from proxytune.diagnosis.naming.found import Found
+from proxytune.diagnosis.naming.findings import Findings
+from proxytune.diagnosis.rules import RULES
 from proxytune.diagnosis.verdict import Bracket, bracket
 from proxytune.space import Theta
 
@@ -51,7 +51,7 @@ class HorizonError:
 
 
 class KeptAside(NamedTuple):
-    """What errors are told of.
+    """The drives kept aside, on which errors are measured.
 
     Attributes:
         drives: Drives that nothing was fitted to.
@@ -64,12 +64,12 @@ class KeptAside(NamedTuple):
     noise: PoseNoise
 
 
-Strays = Callable[[Drives, Theta, Windows], Floats]
+PoseErrors = Callable[[Drives, Theta, Windows], Floats]
 """How far a model's poses are from measured ones (M, 2): [m], [rad]."""
 
 
 def horizon_error(
-    found: Found, tested: KeptAside, horizon_s: float, learnt: Theta, how: Strays = strays
+    found: Findings, tested: KeptAside, horizon_s: float, learnt: Theta, how: PoseErrors = pose_errors
 ) -> HorizonError | None:
     """The error at a horizon, None where too few blocks have a window of it.
 
@@ -82,7 +82,7 @@ def horizon_error(
     """
     drives = tested.drives
     windows = cut(drives, horizon_s)
-    if len(np.unique(drives.block[windows.begin])) < FEWEST_BLOCKS:
+    if len(np.unique(drives.block[windows.begin])) < RULES.fewest_blocks:
         return None
     blocks = blocks_of(drives, windows)
     before, after = (how(drives, fitted.theta, windows) ** 2 for fitted in (found.declared, found.model))
@@ -90,7 +90,7 @@ def horizon_error(
     besides = [one.beside.theta for one in found.immaterial]
     if learnt:
         besides.append({**found.model.theta, **learnt})
-    others = [strays(drives, theta, windows) ** 2 for theta in besides]
+    others = [pose_errors(drives, theta, windows) ** 2 for theta in besides]
     reached = min(float(np.sqrt(squares[:, 0].mean())) for squares in (before, after, *others))
     return HorizonError(
         horizon_s=horizon_s,
@@ -98,7 +98,7 @@ def horizon_error(
         before=rmse(before[:, 0], blocks),
         after=rmse(after[:, 0], blocks),
         ratio=ratio(after[:, 0], before[:, 0], blocks),
-        floor=bracket(lower, reached, repeated(tested.whole, found.model.theta, horizon_s)),
+        floor=bracket(lower, reached, compare_repeats(tested.whole, found.model.theta, horizon_s)),
         heading_before=rmse(before[:, 1], blocks),
         heading_after=rmse(after[:, 1], blocks),
         heading_floor=turn,

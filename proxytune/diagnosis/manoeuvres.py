@@ -7,10 +7,10 @@ import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.fitting import Fit, evaluate
-from proxytune.diagnosis.naming.adoption import NATS_APART
 from proxytune.diagnosis.naming.candidates import Candidate
-from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings
 from proxytune.diagnosis.naming.visibility import trace_of
+from proxytune.diagnosis.rules import RULES
 
 SECONDS = 60.0
 
@@ -94,7 +94,7 @@ LIBRARY: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
 )
 
 
-def next_manoeuvre(found: Found, *, again: bool = False) -> Manoeuvre | None:
+def next_manoeuvre(found: Findings, *, again: bool = False) -> Manoeuvre | None:
     """The manoeuvre that tells the adopted effect with a rival from that rival best, None where nothing would.
 
     Args:
@@ -104,35 +104,35 @@ def next_manoeuvre(found: Found, *, again: bool = False) -> Manoeuvre | None:
     best = _best_offer(found)
     if not again:
         return best
-    return replace(best, times=REPEATS) if best else _repeated(found.model.drives)
+    return replace(best, times=REPEATS) if best else _repeat_first(found.model.drives)
 
 
-def _repeated(drives: Drives) -> Manoeuvre:
+def _repeat_first(drives: Drives) -> Manoeuvre:
     name, text, shape = LIBRARY[0]
-    return Manoeuvre(name, text, ("noise", "what is missing"), None, _driven(shape, drives), REPEATS)
+    return Manoeuvre(name, text, ("noise", "what is missing"), None, _duties_of(shape, drives), REPEATS)
 
 
-def _best_offer(found: Found) -> Manoeuvre | None:
+def _best_offer(found: Findings) -> Manoeuvre | None:
     pairs = [(effect, rival) for effect in found.adopted for rival in effect.rivals]
     if not pairs:
         return None
-    offers = [(_clear(found.model, shape, *pairs[0]), name, text, shape) for name, text, shape in LIBRARY]
+    offers = [(_nats_apart(found.model, shape, *pairs[0]), name, text, shape) for name, text, shape in LIBRARY]
     clear, name, text, shape = max(offers, key=lambda offer: offer[0])
-    if clear <= NATS_APART:
+    if clear <= RULES.rival_nats:
         return None
     between = (pairs[0][0].effect, pairs[0][1].effect)
-    return Manoeuvre(name, text, between, clear, _driven(shape, found.model.drives))
+    return Manoeuvre(name, text, between, clear, _duties_of(shape, found.model.drives))
 
 
-def _driven(shape: Callable[[Floats], Floats], drives: Drives) -> Floats:
+def _duties_of(shape: Callable[[Floats], Floats], drives: Drives) -> Floats:
     return shape(np.arange(round(SECONDS * drives.rate_hz)) / drives.rate_hz)
 
 
-def _clear(model: Fit, shape: Callable[[Floats], Floats], effect: Adopted, rival: Candidate) -> float:
+def _nats_apart(model: Fit, shape: Callable[[Floats], Floats], effect: AdoptedEffect, rival: Candidate) -> float:
     """How clearly a minute of a manoeuvre tells an effect from its rival [nats]."""
     plain = {key: value for key, value in model.theta.items() if key not in effect.names}
     free = tuple(coordinate for coordinate in model.free if coordinate not in effect.free)
-    driven = evaluate(imagined(model.drives, _driven(shape, model.drives)), plain, free, model.noise)
+    driven = evaluate(imagine_drive(model.drives, _duties_of(shape, model.drives)), plain, free, model.noise)
     size = np.array([model.theta[coordinate[0]] for coordinate in effect.free])
     own = Candidate(effect.effect, effect.form, effect.free, {n: model.theta[n] for n in effect.names}, (), ())
     one, other = trace_of(driven, own, tuple(size)), trace_of(driven, rival, rival.probes[len(rival.probes) // 2])
@@ -140,8 +140,8 @@ def _clear(model: Fit, shape: Callable[[Floats], Floats], effect: Adopted, rival
     return 0.5 * float(((one - alike) ** 2).sum()) * 60.0 / SECONDS
 
 
-def imagined(drives: Drives, duties: Floats) -> Drives:
-    """A drive that has not been driven: one episode of duties (rows, 2), a pose at every row."""
+def imagine_drive(drives: Drives, duties: Floats) -> Drives:
+    """Make up a drive that was never driven: one episode of duties (rows, 2), a pose at every row."""
     ticks = round(drives.tick_hz / drives.rate_hz)
     rows = len(duties)
     first = np.arange(rows - 1) * ticks

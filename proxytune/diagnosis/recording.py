@@ -7,7 +7,7 @@ import pandas as pd
 
 from proxytune.diagnosis.manoeuvres import LIBRARY
 from proxytune.diagnosis.measured.drives import Floats
-from proxytune.driving.family import LaneFollowing
+from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.recording import follow
 from proxytune.driving.robot import read_robot
 from proxytune.logs import Log, LogEpisode
@@ -32,18 +32,18 @@ def record(family: LaneFollowing, *, name: str, repeats: int, seconds: float, se
     episodes = []
     for number in range(repeats * len(LIBRARY)):
         random = np.random.default_rng((seed, number))
-        duties = _varied(LIBRARY[number % len(LIBRARY)][2](times), random, number // len(LIBRARY))
-        poses = _driven(family, duties, random, number)
+        duties = _vary(LIBRARY[number % len(LIBRARY)][2](times), random, number // len(LIBRARY))
+        poses = _drive(family, duties, random, number)
         episodes.append(LogEpisode(str(number), times, duties, poses, None))
     return Log(name, family.robot, "duty", rate, {}, tuple(episodes))
 
 
-def _varied(duties: Floats, random: np.random.Generator, repeat: int) -> Floats:
+def _vary(duties: Floats, random: np.random.Generator, repeat: int) -> Floats:
     sized = duties * random.uniform(0.75, 1.0)
     return np.round(sized if repeat % 2 == 0 else sized[:, ::-1], 4)
 
 
-def _driven(family: LaneFollowing, duties: Floats, random: np.random.Generator, number: int) -> Floats:
+def _drive(family: LaneFollowing, duties: Floats, random: np.random.Generator, number: int) -> Floats:
     start = np.array((0.0, 0.0, random.uniform(-np.pi, np.pi)))
     instance = family.instance({})
     with family.plant_at(instance.robot, start) as plant:

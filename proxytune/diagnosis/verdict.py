@@ -1,31 +1,15 @@
-"""The verdict: what the error that is left says, against what noise alone would leave."""
+"""The verdict: the error that is left, against what noise alone would leave."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from proxytune.diagnosis.horizon.repeats import Repeated
-
-AT_FLOOR = 1.15
-"""An error of no more than so many times the floor is at it."""
-
-WIDE = 1.5
-"""A bracket whose upper end is no more than so many times its lower is narrow enough to say that all is explained."""
-
-CHANCE = 1.03
-"""The lowest of several errors is lower than that of the right model by chance, by no more than this."""
-
-LOWERS = 0.95
-"""A model lowers the error if it brings it to this share."""
-
-
-ALIKE = 1.3
-"""What was driven again speaks for all drives if the error is no more than so many times what it does not repeat: a
-manoeuvre that never meets what is missing is repeated well, too."""
+from proxytune.diagnosis.rules import RULES
 
 
 class Bracket(NamedTuple):
-    """Between which errors that of a model that is right lies.
+    """The two errors between which that of a right model lies.
 
     Attributes:
         lower: What the noise of measured poses alone makes [m].
@@ -42,7 +26,7 @@ class Bracket(NamedTuple):
 
 
 def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
-    """The bracket; its lower end is an estimate too, and never above what a model reached.
+    """Bracket the error of a right model; the lower end is an estimate too, and never above what a model reached.
 
     Args:
         lower: What the noise of poses makes [m].
@@ -50,18 +34,18 @@ def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
         again: What drives from the same commands say.
     """
     lower = min(lower, reached)
-    upper = reached if again is None else _not_repeated(reached, again)
-    return Bracket(lower, max(lower, CHANCE * upper), reached, again)
+    upper = reached if again is None else _upper_from_repeats(reached, again)
+    return Bracket(lower, max(lower, RULES.lowest_by_chance * upper), reached, again)
 
 
-def _not_repeated(reached: float, again: Repeated) -> float:
-    """At most so much of an error is noise [m]: all of it in windows that were driven once."""
+def _upper_from_repeats(reached: float, again: Repeated) -> float:
+    """The most of an error that can be noise [m]: all of it in windows that were driven once."""
     most = min(reached, again.apart * again.share.interval[1] / again.share.value)
     return float(np.sqrt((1.0 - again.part) * reached**2 + again.part * most**2))
 
 
 def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:
-    """One of five answers; none says that all is explained where the error is beyond the floor.
+    """Give one of five answers; none says that all is explained where the error is beyond the floor.
 
     Args:
         after: The error that is left [m].
@@ -69,24 +53,24 @@ def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:
         named: Whether effects were added.
         unnamed: Whether a signal explains more of the rest than any named effect.
     """
-    if at_floor(after, floor, unnamed=unnamed):
+    if is_at_floor(after, floor, unnamed=unnamed):
         return "explained" if named else "nothing missing"
-    if unnamed or _beyond(floor):
+    if unnamed or _repeats_more(floor):
         return "partly explained" if named else "unexplained"
     return "cannot be told"
 
 
-def at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
+def is_at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
     """Whether an error is no more than noise: of poses, or of what drives do not repeat, or nothing lowers it."""
-    if after <= AT_FLOOR * floor.lower:
+    if after <= RULES.floor_factor * floor.lower:
         return True
-    if unnamed or floor.reached < LOWERS * after:
+    if unnamed or floor.reached < RULES.lowers * after:
         return False
     if floor.again is not None:
-        return floor.again.share.value >= 1.0 / AT_FLOOR and after <= ALIKE * floor.again.apart
-    return floor.upper < CHANCE * WIDE * floor.lower
+        return floor.again.share.value >= 1.0 / RULES.floor_factor and after <= RULES.repeats_alike * floor.again.apart
+    return floor.upper < RULES.lowest_by_chance * RULES.narrow_bracket * floor.lower
 
 
-def _beyond(floor: Bracket) -> bool:
+def _repeats_more(floor: Bracket) -> bool:
     """Whether drives repeat more than the model predicts."""
-    return floor.again is not None and floor.again.share.interval[1] < 1.0 / AT_FLOOR
+    return floor.again is not None and floor.again.share.interval[1] < 1.0 / RULES.floor_factor

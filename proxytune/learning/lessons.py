@@ -1,4 +1,4 @@
-"""What is taught: θ drawn from a distribution per lesson, and the expert's samples of many lessons."""
+"""Demonstrations: θ drawn from p(θ) for each lesson, and the expert's samples of many lessons."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -47,8 +47,10 @@ class Distribution:
         return all(low == high for low, high in self.bounds.values())
 
 
-def teach(classroom: Classroom, where: Distribution, *, count: int, seed: int, lesson_s: float) -> Demonstration:
-    """Collect so many samples, lesson by lesson: a longer answer begins with every shorter one.
+def collect_samples(
+    classroom: Classroom, where: Distribution, *, count: int, seed: int, lesson_s: float
+) -> Demonstration:
+    """Collect this many samples from the expert, lesson by lesson; more samples begin with the same ones.
 
     Args:
         classroom: Where the expert drives.
@@ -71,7 +73,7 @@ def teach(classroom: Classroom, where: Distribution, *, count: int, seed: int, l
         if found < LEAST_SHARE * asked and (lessons >= TRIED or found >= count):
             raise LearnerError(
                 f"the expert cannot drive here: it kept to the road for {found / asked:.0%} of {lessons} lessons at "
-                f"{_told(where)}; move θ closer to where the robot can be driven"
+                f"{_describe(where)}; move θ closer to where the robot can be driven"
             )
     return Demonstration(np.concatenate(observations)[:count], np.concatenate(commands)[:count])
 
@@ -82,7 +84,7 @@ def _lesson(classroom: Classroom, where: Distribution, seed: int, number: int) -
     return make_episode(where.draw(drawn.theta), agent=EXPERT, start=start, seed=drawn.episode)
 
 
-def _told(where: Distribution) -> str:
+def _describe(where: Distribution) -> str:
     spans = [
         f"{n} = {low:g}" if low == high else f"{n} in [{low:g}, {high:g}]" for n, (low, high) in where.bounds.items()
     ]

@@ -16,7 +16,7 @@ LEVELS = (2.5, 97.5)
 
 @dataclass(frozen=True)
 class Curve:
-    """A learning curve: what is scored in the target after so many target samples.
+    """A learning curve: scores in the target by number of target samples.
 
     Attributes:
         counts: Numbers of target samples, rising, the first 0.
@@ -149,9 +149,12 @@ def teaching(*, without: Curve, with_proxy: Curve, when: Convergence, seed: int 
     if without.counts != with_proxy.counts or without.scores.shape != with_proxy.scores.shape:
         raise InputError("the two learning curves have other counts or seeds; teach both on one grid and seeds")
     rows = np.random.default_rng(seed).integers(0, len(without.scores), (RESAMPLES, len(without.scores)))
-    pairs = [(_needed(without.resampled(row), when), _needed(with_proxy.resampled(row), when)) for row in rows]
+    pairs = [
+        (_samples_or_infinity(without.resampled(row), when), _samples_or_infinity(with_proxy.resampled(row), when))
+        for row in rows
+    ]
     base, helped = np.array(pairs).T
-    first, second = _needed(without, when), _needed(with_proxy, when)
+    first, second = _samples_or_infinity(without, when), _samples_or_infinity(with_proxy, when)
     return Teaching(
         without=_estimate(first, base),
         needed=_estimate(second, helped),
@@ -161,7 +164,7 @@ def teaching(*, without: Curve, with_proxy: Curve, when: Convergence, seed: int 
     )
 
 
-def _needed(curve: Curve, when: Convergence) -> float:
+def _samples_or_infinity(curve: Curve, when: Convergence) -> float:
     """η, infinite where it is not reached."""
     found = samples_needed(curve, when)
     return np.inf if found is None else float(found)

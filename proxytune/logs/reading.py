@@ -25,7 +25,7 @@ class _Issued(NamedTuple):
     commands: Floats
 
 
-def read_log(path: Path) -> Log:
+def read_log(path: str | Path) -> Log:
     """Read a log's folder.
 
     Missing rows are filled: the last command held, no pose. Wrapped headings are unwrapped. Where commands.csv lies
@@ -37,6 +37,7 @@ def read_log(path: Path) -> Log:
     Raises:
         LogError: If the folder is not such a log, naming file, line and column.
     """
+    path = Path(path)
     if not path.is_dir():
         problem = "is a file; give the folder that it lies in" if path.exists() else "no such folder; check the path"
         raise LogError(f"{path}: {problem}")

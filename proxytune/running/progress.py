@@ -7,7 +7,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 
 class Watcher(Protocol):
-    """Is told how a run goes."""
+    """Hears how a run goes."""
 
     def begin(self, what: str, known: int) -> None:
         """Something of several episodes begins, so many of which are known already."""

@@ -45,7 +45,7 @@ def working(
     begun = (piece for piece in pieces if not skip(piece))
     results = _spread(work, begun, jobs) if min(jobs, len(pieces)) > 1 else _here(work, begun)
     try:
-        yield _told(results)
+        yield _name_dead_processes(results)
     finally:
         with warnings.catch_warnings():
             # joblib warns of pieces it has finished in vain; whoever leaves early knows.
@@ -105,7 +105,7 @@ def _unpickled(recipe: _Recipe) -> Callable[[Any], Any]:
     return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
 
 
-def _told(results: Iterator[Result]) -> Iterator[Result]:
+def _name_dead_processes(results: Iterator[Result]) -> Iterator[Result]:
     try:
         yield from results
     except BrokenExecutor:

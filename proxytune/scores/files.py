@@ -15,7 +15,7 @@ from proxytune.settings import nearest
 LABELS = ("agent", "episode", "domain")
 
 
-def read_scores(path: Path, metrics: Iterable[str], domain: str | None = None) -> ScoreTable:
+def read_scores(path: str | Path, metrics: Iterable[str], domain: str | None = None) -> ScoreTable:
     """Read the scores of one domain from a CSV file.
 
     Args:
@@ -26,7 +26,7 @@ def read_scores(path: Path, metrics: Iterable[str], domain: str | None = None) -
     Raises:
         ScoresError: If the file is not such a table, naming line and column.
     """
-    tables = read_domains(path, metrics)
+    tables = read_domains(Path(path), metrics)
     if domain is None:
         if len(tables) > 1:
             example = next(iter(tables))

@@ -65,10 +65,10 @@ def propose_batch(
     proposer: Proposer, space: Space, finished: Sequence[Trial], seed: int, count: int
 ) -> tuple[Values, ...]:
     """So many points after these trials, each proposed while those before it are pending."""
-    told = list(finished)
+    trials = list(finished)
     for _ in range(count):
-        told.append(Trial(proposer.propose(space, told, seed), None, pending=True))
-    return tuple(trial.values for trial in told[len(finished) :])
+        trials.append(Trial(proposer.propose(space, trials, seed), None, pending=True))
+    return tuple(trial.values for trial in trials[len(finished) :])
 
 
 def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:

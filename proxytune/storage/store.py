@@ -133,6 +133,10 @@ class Store:
             self._trials[objective] = {row[0]: _trial(*row) for row in rows}
         return [trial for _, trial in sorted(self._trials[objective].items())]
 
+    def searches(self) -> list[str]:
+        """The objectives by which trials have ended."""
+        return [row[0] for row in self._all("SELECT DISTINCT objective FROM trials WHERE state <> 'open'")]
+
     def save_trial(self, identity: str, *trials: TrialRecord, objective: str = "prpv") -> None:
         """Write a trial, or several at once, over what was known of it before."""
         with self._transaction() as connection:

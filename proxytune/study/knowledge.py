@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from proxytune.search.goal import Goal
 from proxytune.search.knowledge.knowledge import Knowledge, learn
 from proxytune.storage.records import TrialRecord
-from proxytune.study.noise import noise_of
 from proxytune.study.outputs import compose_of
+from proxytune.study.stages.noise import noise_of
 from proxytune.study.study_run import StudyRun
 
 

@@ -7,10 +7,10 @@ from proxytune.errors import InputError
 from proxytune.scores import Metric
 from proxytune.settings import nearest
 from proxytune.storage.records import TrialRecord
-from proxytune.study.cutting import by_other_metrics
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import record
-from proxytune.study.stopping import stopped
+from proxytune.study.stages.cutting import by_other_metrics
+from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study, read_target
 from proxytune.study.study_run import StudyRun
 

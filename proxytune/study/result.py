@@ -9,14 +9,14 @@ from proxytune.search.knowledge.knowledge import Knowledge
 from proxytune.search.surrogate import fit_surrogate
 from proxytune.space import Theta
 from proxytune.storage.records import TrialRecord
-from proxytune.study.confirmation import Confirmation, confirmation_of
-from proxytune.study.cutting import spared
 from proxytune.study.evaluation import failure_of
 from proxytune.study.knowledge import knowledge_of
-from proxytune.study.noise import noise_of
 from proxytune.study.outputs import score_trials
-from proxytune.study.preflight import Preflight, preflight_of
-from proxytune.study.stopping import stopped
+from proxytune.study.stages.confirmation import Confirmation, confirmation_of
+from proxytune.study.stages.cutting import spared
+from proxytune.study.stages.noise import noise_of
+from proxytune.study.stages.preflight import Preflight, preflight_of
+from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import Assessment, NoiseFloor, assess

@@ -9,14 +9,15 @@ from proxytune.search.loop import Propose, Search
 from proxytune.search.proposer import Proposer, Trial
 from proxytune.storage.records import State, TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.cutting import Cut, reference, run_or_cut
 from proxytune.study.evaluation import Evaluation
 from proxytune.study.provenance import CODE, SEARCH, adopt, differ
-from proxytune.study.stopping import stopped
+from proxytune.study.settings import LEARNING
+from proxytune.study.stages.cutting import Cut, reference, run_or_cut
+from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study, changes, facts
 from proxytune.study.study_run import StudyRun
 
-OTHERS = ("plv", SEARCH)
+OTHERS = (LEARNING, SEARCH)
 """Facts that the trials do not depend on: of a search for learning value, and which code proposed what."""
 
 
@@ -119,7 +120,7 @@ def check_facts(run: StudyRun) -> None:
     before, after = _facts_before(study, store), facts(study)
     if before == after:
         return
-    if run.finished_trials():
+    if set(store.searches()) - {LEARNING}:
         raise _changed(study, store, before)
     others = {key: value for key, value in store.facts().items() if key in OTHERS}
     store.begin({**after, **others}, study.objective.name)

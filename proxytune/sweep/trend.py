@@ -76,7 +76,7 @@ def shape_of(series: Series, held: float | None) -> Shape:
     return Shape(tuple(cost.value for cost in best), sign * least + 0.0, near, held, *sides)
 
 
-def told(series: Series, held: float | None) -> str:
+def describe(series: Series, held: float | None) -> str:
     """The shape in one line."""
     shape = shape_of(series, held)
     if shape.score is None:

@@ -21,15 +21,15 @@ from proxytune.meaning import meaning_of
 from proxytune.running.progress import Watcher
 from proxytune.study.family import check_bounds, load_family
 from proxytune.study.settings import StudySettings
-from proxytune.teaching.points import Point, School, examined, prepared
+from proxytune.teaching.points import Point, TeachingSetup, prepare_shared, score_points
 
 CACHE = "teaching"
 """The folder, within a study's, where all that was taught is kept."""
 
 
 @dataclass(frozen=True)
-class Lesson:
-    """One proxy as a teacher.
+class TeacherResult:
+    """What one proxy has come to as a teacher.
 
     Attributes:
         name: What it is called.
@@ -46,15 +46,15 @@ class Lesson:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What a learning experiment has found.
+    """The result of a learning experiment.
 
     Attributes:
         settings: Of the study.
-        best_score: What a flawless examination scores.
+        best_score: The score of a flawless examination.
         without: The learning curve without a proxy.
         when: When a learner counts as converged.
         settled: Whether it has, without a proxy: over the last doubling of samples it gains no more than the tolerance.
-        lessons: One per proxy, in the order of study.toml.
+        teachers: One per proxy, in the order of study.toml.
     """
 
     settings: StudySettings
@@ -62,10 +62,10 @@ class Experiment:
     without: Curve
     when: Convergence
     settled: bool
-    lessons: tuple[Lesson, ...]
+    teachers: tuple[TeacherResult, ...]
 
 
-def open_school(settings: StudySettings) -> School:
+def load_setup(settings: StudySettings) -> TeachingSetup:
     """Load both domain families and the learner that a study's [teaching] table names.
 
     Raises:
@@ -73,7 +73,7 @@ def open_school(settings: StudySettings) -> School:
     """
     taught = teaching_settings(settings)
     learner, identity = _load_learner(settings, taught.learner)
-    return School(
+    return TeachingSetup(
         proxy=_classroom(settings, settings.proxy),
         target=_classroom(settings, taught.target),
         learner=learner,
@@ -96,33 +96,33 @@ def teaching_settings(settings: StudySettings) -> TeachingSettings:
     return settings.teaching
 
 
-def run_experiment(settings: StudySettings, school: School, watcher: Watcher) -> Experiment:
+def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watcher) -> Experiment:
     """Teach every proxy's learner and the one without, from wherever an earlier run was left.
 
     Raises:
         InputError: If there is no proxy, or one's expert cannot drive.
         RunError: If a domain, the learner or the machine fails; all that was finished is kept.
     """
-    proxies = school.settings.proxies
+    proxies = setup.settings.proxies
     if not proxies:
         raise settings.error("teaching.proxies", "is missing; name at least one, as in [teaching.proxies.nominal]")
-    check_proxies(settings, school, proxies)
-    curves = learning_curves(school, {NONE: None, **proxies}, settings.jobs, watcher)
-    return judged(settings, school, curves)
+    check_proxies(settings, setup, proxies)
+    curves = learning_curves(setup, {NONE: None, **proxies}, settings.jobs, watcher)
+    return judge_curves(settings, setup, curves)
 
 
-def judged(settings: StudySettings, school: School, curves: Mapping[str, Curve]) -> Experiment:
-    """What the curves say: a pure function of them and of what counts as converged."""
-    taught, without = school.settings, curves[NONE]
+def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, Curve]) -> Experiment:
+    """Judge each proxy by the learning curves: a pure function of them and of what counts as converged."""
+    taught, without = setup.settings, curves[NONE]
     when = convergence(taught, without)
     steady = settled(without, taught.tolerance)
-    lessons = [
-        Lesson(
+    teachers = [
+        TeacherResult(
             name, proxy, curves[name], teaching(without=without, with_proxy=curves[name], when=when) if steady else None
         )
         for name, proxy in taught.proxies.items()
     ]
-    return Experiment(settings, school.target.best_score, without, when, steady, tuple(lessons))
+    return Experiment(settings, setup.target.best_score, without, when, steady, tuple(teachers))
 
 
 def convergence(taught: TeachingSettings, without: Curve) -> Convergence:
@@ -132,38 +132,38 @@ def convergence(taught: TeachingSettings, without: Curve) -> Convergence:
 
 
 def learning_curves(
-    school: School, proxies: Mapping[str, Distribution | None], jobs: int, watcher: Watcher
+    setup: TeachingSetup, proxies: Mapping[str, Distribution | None], jobs: int, watcher: Watcher
 ) -> dict[str, Curve]:
     """The learning curve of each proxy, by name; what is cached is not made again."""
     points = [
         Point(name, proxy, repetition, count)
         for name, proxy in proxies.items()
-        for repetition in range(school.settings.seeds)
-        for count in school.settings.target_samples
+        for repetition in range(setup.settings.seeds)
+        for count in setup.settings.target_samples
     ]
-    missing = [point for point in points if not school.known(point)]
+    missing = [point for point in points if not setup.is_cached(point)]
     watcher.begin("demonstrations", len(points) - len(missing))
-    with prepared(school, missing, jobs) as made:
+    with prepare_shared(setup, missing, jobs) as made:
         for _ in made:
             pass
     watcher.begin("learning", 0)
-    with examined(school, missing, jobs) as scored:
+    with score_points(setup, missing, jobs) as scored:
         for _ in scored:
             watcher.episode()
-    return {name: _curve(school, [point for point in points if point.name == name]) for name in proxies}
+    return {name: _curve(setup, [point for point in points if point.name == name]) for name in proxies}
 
 
-def points_of(school: School, proxies: int) -> int:
-    """How many points the learning curves of so many proxies have, with the one of no proxy."""
-    return (proxies + 1) * school.settings.seeds * len(school.settings.target_samples)
+def count_points(setup: TeachingSetup, proxies: int) -> int:
+    """The number of points on the learning curves of this many proxies and of the learner without one."""
+    return (proxies + 1) * setup.settings.seeds * len(setup.settings.target_samples)
 
 
-def _curve(school: School, points: Sequence[Point]) -> Curve:
-    scores = np.array([school.score(point) for point in points])
-    return Curve(school.settings.target_samples, scores.reshape(school.settings.seeds, -1))
+def _curve(setup: TeachingSetup, points: Sequence[Point]) -> Curve:
+    scores = np.array([setup.score(point) for point in points])
+    return Curve(setup.settings.target_samples, scores.reshape(setup.settings.seeds, -1))
 
 
-def check_proxies(settings: StudySettings, school: School, proxies: Mapping[str, Distribution]) -> None:
+def check_proxies(settings: StudySettings, setup: TeachingSetup, proxies: Mapping[str, Distribution]) -> None:
     """Refuse a parameter that the family has not, or a value beyond its bounds.
 
     Raises:
@@ -172,7 +172,7 @@ def check_proxies(settings: StudySettings, school: School, proxies: Mapping[str,
     for proxy, where in proxies.items():
         for name, (low, high) in where.bounds.items():
             key, given = f"teaching.proxies.{proxy}.{name}", f"{low:g} to {high:g}"
-            check_bounds(settings, school.proxy, key, name, (low, high), given)
+            check_bounds(settings, setup.proxy, key, name, (low, high), given)
 
 
 def _classroom(settings: StudySettings, model: Path | None) -> Classroom:

@@ -13,7 +13,7 @@ from proxytune.domain import Classroom, Demonstration, make_episode
 from proxytune.errors import EpisodeError, LearnerError
 from proxytune.learning.cache import Arrays, Cache, digest
 from proxytune.learning.learner import Learner, Weights
-from proxytune.learning.lessons import Distribution, teach
+from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.learning.settings import TeachingSettings
 from proxytune.running.workers import working
 from proxytune.seeds import exam_seed, proxy_lessons_seed, target_lessons_seed
@@ -40,18 +40,18 @@ class Point:
 
 
 @dataclass(frozen=True)
-class School:
-    """Where learners are taught and examined.
+class TeachingSetup:
+    """A learning experiment ready to run: both domains, the learner, how much of what, and the cache.
 
     Attributes:
         proxy: The proxy's domain family.
         target: The target's.
-        learner: Who learns.
+        learner: What is trained.
         learner_identity: A digest of its code and settings.
-        settings: How much of what.
+        settings: Numbers of samples, seeds and seconds.
         seed: The study's.
-        starts: How many starts an examination has.
-        cache: Where all that was made is kept.
+        starts: Number of starts in an examination.
+        cache: Where samples, weights and scores are kept.
     """
 
     proxy: Classroom
@@ -65,7 +65,7 @@ class School:
 
     @functools.cached_property
     def identities(self) -> tuple[str, str]:
-        """Of the proxy's and the target's domain family, once: reading them digests the user's modules."""
+        """Identities of the proxy's and the target's domain family, read once: reading digests the user's modules."""
         return self.proxy.identity, self.target.identity
 
     def score(self, point: Point) -> float:
@@ -75,24 +75,24 @@ class School:
             LearnerError: If the proxy's expert cannot drive, or the learner cannot use the samples.
             EpisodeError: If a domain or the policy fails.
         """
-        with _told(point), threadpool_limits(limits=1):
+        with _name_proxy_in_errors(point), threadpool_limits(limits=1):
             found = self.cache.get("exam", self.exam_facts(point), lambda: self._examine(point))
             return float(np.mean(found["scores"]))
 
     def prepare(self, point: Point) -> None:
-        """Make what other points need as well: the samples of the target, or what the proxy alone has taught."""
-        with _told(point), threadpool_limits(limits=1):
+        """Make what several points share: the target's samples, or the weights that the proxy alone has taught."""
+        with _name_proxy_in_errors(point), threadpool_limits(limits=1):
             if point.proxy is None:
                 self._target_samples(point.repetition)
             else:
                 self._weights(replace(point, count=0))
 
-    def known(self, point: Point) -> bool:
-        """Whether the point is in the cache."""
+    def is_cached(self, point: Point) -> bool:
+        """Whether the point's scores are in the cache."""
         return self.cache.has("exam", self.exam_facts(point))
 
     def exam_facts(self, point: Point) -> dict[str, Any]:
-        """All that determines a point's scores."""
+        """All that determines a point's scores: what is missing here would return stale scores."""
         weights = self._weights_facts(point)
         return {
             "target": self.identities[1],
@@ -102,7 +102,10 @@ class School:
         }
 
     def _weights_facts(self, point: Point) -> dict[str, Any] | None:
-        """What determines the weights after this many target samples; None where nothing has been learnt."""
+        """All that determines the weights after this many target samples; None where nothing has been learnt.
+
+        The facts of what comes before enter as their digest, so that each key is short and complete.
+        """
         start = self._start_facts(point)
         if not point.count:
             return start
@@ -115,6 +118,7 @@ class School:
         }
 
     def _start_facts(self, point: Point) -> dict[str, Any] | None:
+        """All that determines the weights that a proxy alone has taught; None without one."""
         if point.proxy is None:
             return None
         return {
@@ -177,37 +181,40 @@ class School:
     def _samples(self, facts: Mapping[str, Any], room: Classroom, where: Distribution) -> Demonstration:
         def make() -> Arrays:
             count, seed = facts["count"], facts["seed"]
-            return teach(room, where, count=count, seed=seed, lesson_s=self.settings.lesson_s)._asdict()
+            return collect_samples(room, where, count=count, seed=seed, lesson_s=self.settings.lesson_s)._asdict()
 
         return Demonstration(**self.cache.get("samples", facts, make))
 
 
 @contextmanager
-def _told(point: Point) -> Iterator[None]:
-    """Name the proxy in what goes wrong with it."""
+def _name_proxy_in_errors(point: Point) -> Iterator[None]:
+    """Put the proxy's name in front of an error."""
     try:
         yield
     except (LearnerError, EpisodeError) as problem:
         raise type(problem)(f"{point.name}: {problem}") from None
 
 
-def prepared(school: School, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:
-    """Make beforehand what several points share, so that no two processes make the same."""
+def prepare_shared(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:
+    """Make what several points share before they are scored, so that no two processes make the same."""
     shared = [Point("the target", None, repetition, 0) for repetition in sorted({p.repetition for p in points})]
     for point in points:
         before = replace(point, count=0)
         if point.proxy is not None and before not in shared:
             shared.append(before)
-    return working(school.prepare, shared, jobs)
+    return working(setup.prepare, shared, jobs)
 
 
-def examined(
-    school: School, points: Sequence[Point], jobs: int
+def score_points(
+    setup: TeachingSetup, points: Sequence[Point], jobs: int
 ) -> AbstractContextManager[Iterator[tuple[Point, float]]]:
-    """The score of each point as soon as it is there, those that take longest begun first."""
+    """Score the points in parallel, each yielded as soon as it is there.
+
+    Those that take longest begin first: otherwise one of them, begun last, would keep one process busy alone.
+    """
     ordered = sorted(points, key=lambda point: -point.count)
-    return working(functools.partial(_scored, school.score), ordered, jobs)
+    return working(functools.partial(_score, setup.score), ordered, jobs)
 
 
-def _scored(score: Callable[[Point], float], point: Point) -> tuple[Point, float]:
+def _score(score: Callable[[Point], float], point: Point) -> tuple[Point, float]:
     return point, score(point)

@@ -19,21 +19,17 @@ from proxytune.running.progress import Watcher
 from proxytune.search.engines.gaussian_process import expected_improvement
 from proxytune.search.loop import Propose, Search
 from proxytune.search.proposer import Proposer, Trial
-from proxytune.space import Interval, Space, Theta
+from proxytune.space import Space, Theta
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.outputs import score_trials
 from proxytune.study.settings import StudySettings
-from proxytune.study.stopping import nothing_to_gain, out_of_time
+from proxytune.study.stages.stopping import nothing_to_gain, out_of_time
+from proxytune.teaching.box import distribution
 from proxytune.teaching.experiment import convergence, learning_curves, teaching_settings
-from proxytune.teaching.points import School
+from proxytune.teaching.points import TeachingSetup
 
 OBJECTIVE = "plv"
-WIDTH = " width"
-"""What the width of a parameter's distribution is called, after the parameter."""
-
-SLACK = 1.0 / 30.0
-"""A parameter that PRPV has pinned down is still searched over this share of its box, to both sides."""
 
 
 @dataclass(frozen=True)
@@ -92,48 +88,20 @@ def plv_or_worst(trial: PlvTrial) -> float:
     return float("-inf") if value is None else value
 
 
-def search_space(
-    settings: StudySettings, widths: Mapping[str, tuple[float, float]], left: Mapping[str, tuple[float, float]]
-) -> Space:
-    """The box that is searched for PLV: centres where PRPV cannot tell θ from the best, and widths as asked for.
-
-    Args:
-        settings: Of the study.
-        widths: Bounds of the width of each parameter's distribution, by parameter.
-        left: The ends of what PRPV cannot tell from the best, by parameter; empty where the box is not narrowed.
-
-    Raises:
-        SettingsError: If a width is of a parameter that is not searched.
-    """
-    for name in widths:
-        if name not in settings.space.names:
-            raise settings.error(f"teaching.width.{name}", "is not among [parameters]; add it there, or take this out")
-    centres = [_narrowed(box, left.get(box.name)) for box in settings.space.intervals]
-    return Space((*centres, *(Interval(name + WIDTH, *bounds) for name, bounds in sorted(widths.items()))))
-
-
-def _narrowed(box: Interval, left: tuple[float, float] | None) -> Interval:
-    if left is None:
-        return box
-    step = SLACK * (box.high - box.low)
-    slack = step if left[1] - left[0] < step else 0.0
-    return Interval(box.name, max(box.low, left[0] - slack), min(box.high, left[1] + slack), box.unit)
-
-
 @dataclass(frozen=True)
 class PlvSearch:
     """A search for the proxy of highest learning value: what its trials are a function of, and where they are kept.
 
     Attributes:
         settings: Of the study.
-        school: Where learners are taught and examined.
+        setup: Where learners are taught and examined.
         store: Where trials are kept.
         space: The box that is searched.
         watcher: Hears of every point of a learning curve.
     """
 
     settings: StudySettings
-    school: School
+    setup: TeachingSetup
     store: Store
     space: Space
     watcher: Watcher
@@ -145,8 +113,8 @@ class PlvSearch:
             RunError: If the learner does not converge without a proxy, so that no PLV is known.
             LearnerError: If an expert cannot drive somewhere in the box.
         """
-        settings, taught = self.settings, self.school.settings
-        without = learning_curves(self.school, {NONE: None}, settings.jobs, self.watcher)[NONE]
+        settings, taught = self.settings, self.setup.settings
+        without = learning_curves(self.setup, {NONE: None}, settings.jobs, self.watcher)[NONE]
         if not settled(without, taught.tolerance):
             raise RunError(
                 f"{settings.path}: without a proxy the score still rises by more than {taught.tolerance:g} up to "
@@ -159,11 +127,11 @@ class PlvSearch:
 
     def facts(self) -> dict[str, Any]:
         """All that a trial depends on; if it changes, trials lose their meaning."""
-        settings, taught = self.settings, self.school.settings
+        settings, taught = self.settings, self.setup.settings
         named = ("proxy_samples", "target_samples", "seeds", "lesson_s", "level", "tolerance")
         return {
-            "domains": list(self.school.identities),
-            "learner": self.school.learner_identity,
+            "domains": list(self.setup.identities),
+            "learner": self.setup.learner_identity,
             **{name: json.loads(json.dumps(getattr(taught, name))) for name in named},
             **{name: getattr(settings, name) for name in ("starts", "seed", "initial", "batch", "engine")},
             "box": {box.name: [box.low, box.high] for box in self.space.intervals},
@@ -191,8 +159,8 @@ class ProxyTrials:
     def ended(self) -> str:
         """Why no further proxy is tried; empty while one is."""
         search, done = self._search, self._records
-        if len(done) >= search.school.settings.budget:
-            return f"the budget of {search.school.settings.budget} proxies is spent"
+        if len(done) >= search.setup.settings.budget:
+            return f"the budget of {search.setup.settings.budget} proxies is spent"
         rules = search.settings.stop
         late = out_of_time(sum(record.seconds for record in done), rules)
         if late or rules.no_improvement is None or len(done) < search.settings.initial:
@@ -218,12 +186,12 @@ class ProxyTrials:
 
     @property
     def _identity(self) -> str:
-        return self._search.school.identities[0]
+        return self._search.setup.identities[0]
 
     def _tried(self, thetas: Mapping[int, Theta]) -> list[PlvTrial]:
         search = self._search
-        proxies = {f"trial {number}": distribution(search.school, theta) for number, theta in thetas.items()}
-        curves = learning_curves(search.school, proxies, search.settings.jobs, search.watcher)
+        proxies = {f"trial {number}": distribution(search.setup, theta) for number, theta in thetas.items()}
+        curves = learning_curves(search.setup, proxies, search.settings.jobs, search.watcher)
         return [
             PlvTrial(number, theta, proxies[name], curves[name], self._worth(curves[name]))
             for (number, theta), name in zip(thetas.items(), proxies, strict=True)
@@ -245,13 +213,3 @@ def _record(trial: PlvTrial, seconds: float) -> TrialRecord:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-def distribution(school: School, theta: Theta) -> Distribution:
-    """p(θ) with these centres and widths, cut off at what each parameter can be."""
-    bounds = {}
-    for name, centre in theta.items():
-        if not name.endswith(WIDTH):
-            half, known = theta.get(name + WIDTH, 0.0) / 2.0, school.proxy.parameters[name]
-            bounds[name] = (max(known.low, centre - half), min(known.high, centre + half))
-    return Distribution(bounds)

@@ -21,7 +21,7 @@ from proxytune.storage.store import Store
 from proxytune.study.evaluation import plan, table
 from proxytune.study.knowledge import goal_of
 from proxytune.study.outputs import outputs_of
-from proxytune.study.preflight import run_preflight
+from proxytune.study.stages.preflight import run_preflight
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

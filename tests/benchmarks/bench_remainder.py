@@ -20,7 +20,7 @@ import rates
 from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, make_log
 
 from proxytune.diagnosis.diagnose import declared_effects, declared_parameters
-from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.measured.split import split
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.diagnosis.model.fitting import fit
@@ -38,7 +38,7 @@ def errors(drives, theta):
     found = []
     for horizon_s in HORIZONS_S:
         windows = cut(drives, horizon_s)
-        squares = strays(drives, theta, windows)[:, 0] ** 2 if len(windows.begin) else np.array([np.nan])
+        squares = pose_errors(drives, theta, windows)[:, 0] ** 2 if len(windows.begin) else np.array([np.nan])
         found.append(1e3 * float(np.sqrt(squares.mean())))
     return found
 

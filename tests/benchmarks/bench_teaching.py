@@ -22,15 +22,16 @@ from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.drivetrain import Drivetrain
 from proxytune.driving.episode import _View, drive
 from proxytune.driving.expert import Expert
-from proxytune.driving.family import LaneFollowing, lane_following
+from proxytune.driving.family import lane_following
+from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.planar import PlanarPlant
 from proxytune.learning.cache import Cache
 from proxytune.learning.cloning import BehaviourCloning
-from proxytune.learning.lessons import Distribution, teach
+from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.settings import Section
 from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import open_school
-from proxytune.teaching.points import Point, School
+from proxytune.teaching.experiment import load_setup
+from proxytune.teaching.points import Point, TeachingSetup
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "teacher"
 TWIN = STUDY / "twin.toml"
@@ -44,7 +45,7 @@ def family(plant: str, model: Path | None = None) -> LaneFollowing:
 
 @functools.cache
 def samples(plant: str, count: int) -> Demonstration:
-    return teach(family(plant), Distribution({}), count=count, seed=1, lesson_s=LESSON_S)
+    return collect_samples(family(plant), Distribution({}), count=count, seed=1, lesson_s=LESSON_S)
 
 
 def timed(work: Callable[[], Any]) -> float:
@@ -138,14 +139,14 @@ def test_examination(capsys, plant, model):
 
 def test_learning_curve(tmp_path, capsys):
     """One proxy, one seed, the eight counts of studies/teacher, with nothing in the cache."""
-    opened = open_school(read_study_settings(STUDY))
-    school = dataclasses.replace(opened, cache=Cache(tmp_path))
-    proxy = school.settings.proxies["pitch 19°"]
-    counts = school.settings.target_samples
-    stats = profiled(lambda: [school.score(Point("pitch 19°", proxy, 0, count)) for count in counts])
+    opened = load_setup(read_study_settings(STUDY))
+    setup = dataclasses.replace(opened, cache=Cache(tmp_path))
+    proxy = setup.settings.proxies["pitch 19°"]
+    counts = setup.settings.target_samples
+    stats = profiled(lambda: [setup.score(Point("pitch 19°", proxy, 0, count)) for count in counts])
     tell(
         capsys,
-        f"learning curve of {len(counts)} counts × {school.starts} starts: {stats.total_tt:.1f} s, profiled",
+        f"learning curve of {len(counts)} counts × {setup.starts} starts: {stats.total_tt:.1f} s, profiled",
         f"  demonstrate {share(stats, LaneFollowing.demonstrate)}, train {share(stats, BehaviourCloning.train)}, "
-        f"examine {share(stats, LaneFollowing.examine)}, all of it {share(stats, School.score)}",
+        f"examine {share(stats, LaneFollowing.examine)}, all of it {share(stats, TeachingSetup.score)}",
     )

@@ -12,8 +12,8 @@ import pytest
 from processes import finished_episodes, start, wait_for
 
 from proxytune.cli.compare import read_runs
-from proxytune.cli.interruption import Terminated, sigterm_as_interrupt
 from proxytune.cli.main import main
+from proxytune.cli.terminal.interruption import Terminated, sigterm_as_interrupt
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 from proxytune.cli import listing
-from proxytune.cli.answer import Answer
 from proxytune.cli.main import COMMANDS, main
+from proxytune.cli.terminal.answer import Answer
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
 
 

@@ -1,7 +1,7 @@
 """Every step is told as it begins: a bar with the time left on a terminal, else a line."""
 
-from proxytune.cli import steps
-from proxytune.cli.steps import Steps
+from proxytune.cli.terminal import steps
+from proxytune.cli.terminal.steps import Steps
 
 
 def told(capsys, *lines):

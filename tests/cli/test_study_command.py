@@ -98,7 +98,7 @@ def test_why_a_study_has_ended_is_said(make_study, capsys):
     assert main(["study", str(folder)]) == 0
     out = " ".join(capsys.readouterr().out.split())
     assert "trials 5 of 7; best: trial " in out
-    assert "ended: no θ is expected to lower PRPV by more than" in out
+    assert "ended: no θ is expected to improve PRPV by more than" in out
     make_study()
     assert main(["study", str(folder)]) == 0
     assert "ended: the budget of 7 trials is spent" in " ".join(capsys.readouterr().out.split())
@@ -155,7 +155,7 @@ def travelling(make_study, tmp_path, monkeypatch):
     make_study("package/quickstart")
     (home / "quickstart" / "study.db").write_text("somebody's")
     (home / "quickstart" / "figures").mkdir()
-    monkeypatch.setattr("proxytune.cli.study_folder.shipped", lambda kind: home)
+    monkeypatch.setattr("proxytune.cli.terminal.study_folder.shipped", lambda kind: home)
     return home
 
 

@@ -8,7 +8,9 @@ from proxytune.comparison.analytic import Analytic
 from proxytune.comparison.judgement import Judgement, Reading
 from proxytune.comparison.runs import Run, RunKey, judged_again, run_document, run_engine, run_from
 from proxytune.comparison.summary import estimate, median_curve, summarise
+from proxytune.search.engines.registry import engine_of
 
+SOBOL = engine_of("sobol")
 KEY = RunKey("analytic 1", "sobol", 1, 12, 4, "")
 
 
@@ -19,34 +21,36 @@ def made(engine, seed, regrets, answer_regret=0.0, error=0.1, reading=None):
 
 
 def test_a_run_is_a_function_of_its_key_but_for_the_time_it_took():
-    runs = [replace(run_engine(Analytic(), KEY), seconds=0.0) for _ in range(2)]
+    runs = [replace(run_engine(Analytic(), KEY, SOBOL), seconds=0.0) for _ in range(2)]
     assert runs[0] == runs[1]
     assert len(runs[0].visited) == len(runs[0].judgement.regrets) == 12
 
 
 @pytest.mark.parametrize("engine", ["random", "gp"])
 def test_runs_of_one_seed_share_the_design_and_no_more(engine):
-    one, other = (run_engine(Analytic(), replace(KEY, engine=name, budget=7)) for name in ("sobol", engine))
+    one, other = (
+        run_engine(Analytic(), replace(KEY, engine=name, budget=7), engine_of(name)) for name in ("sobol", engine)
+    )
     assert one.visited[:4] == other.visited[:4]
     assert one.visited != other.visited
 
 
 def test_the_answer_is_a_visited_point_and_judged_without_noise():
-    found = run_engine(Analytic(), KEY).judgement
+    found = run_engine(Analytic(), KEY, SOBOL).judgement
     assert found.answer_score == found.answer_regret
     assert found.answer_regret in found.regrets
     assert found.error == Analytic().error(found.answer, 1)
 
 
 def test_a_run_judged_again_proposes_nothing_and_forgets_the_old_judgement(monkeypatch):
-    run = run_engine(Analytic(), KEY)
+    run = run_engine(Analytic(), KEY, SOBOL)
     stale = replace(run, judgement=replace(run.judgement, answer=(0.0,), code="old"))
     monkeypatch.setattr("proxytune.comparison.runs.make_proposer", None)
-    assert judged_again(Analytic(), stale) == run
+    assert judged_again(Analytic(), stale, SOBOL) == run
 
 
 def test_a_run_comes_back_from_json_as_it_was():
-    run = run_engine(Analytic(), KEY)
+    run = run_engine(Analytic(), KEY, SOBOL)
     assert run_from(json.loads(json.dumps(run_document(run)))) == run
 
 

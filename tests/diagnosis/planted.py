@@ -10,7 +10,7 @@ from manoeuvres import RATE_HZ, make_drives
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.measured.drives import Drives, gather
-from proxytune.diagnosis.measured.split import in_blocks
+from proxytune.diagnosis.measured.split import cut_into_blocks
 from proxytune.diagnosis.model.fitting import Fit, fit
 from proxytune.diagnosis.model.innovations import TURN_WEIGHT, Noise
 from proxytune.driving.drivetrain import drivetrain
@@ -76,7 +76,7 @@ def planted_drives(theta: Theta, **more: object) -> Drives:
 
 def drives_of(log: Log) -> Drives:
     """All of a log's drives, in blocks."""
-    return in_blocks(gather(log, ROBOT, log.episodes))
+    return cut_into_blocks(gather(log, ROBOT, log.episodes))
 
 
 def fitted(drives: Drives) -> Fit:

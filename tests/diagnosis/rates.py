@@ -11,15 +11,15 @@ from bullet_truth import BulletCase, make_bullet_log
 from rate_jobs import GENERATORS, Job
 
 import proxytune.diagnosis.diagnose as diagnosing
-import proxytune.diagnosis.naming.round as looking
+import proxytune.diagnosis.naming.evidence as looking
 from proxytune.diagnosis.diagnose import declared_effects, diagnose
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.horizon.windows import cut
 from proxytune.diagnosis.measured.drives import Drives, relative
 from proxytune.diagnosis.model.events import RandomEffect, random_effects
 from proxytune.diagnosis.model.fitting import Fit
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS
 from proxytune.diagnosis.naming.candidates import Candidate, candidates
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.driving.robot import Robot, read_robot
 from proxytune.logs import Log
 from proxytune.space import Theta

@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import ROBOT, TRUTH
 
-from proxytune.diagnosis.model.coordinates import placed
+from proxytune.diagnosis.model.coordinates import theta_at
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS
 from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, candidates
 from proxytune.effects import CATALOGUE, PARAMETERS, Stage, effects_from
@@ -88,6 +88,6 @@ def test_every_probe_is_a_model_that_differs_from_neutral(form):
     for values in form.probes:
         assert len(values) == len(form.free)
         assert not np.allclose(values, form.neutral)
-        theta = placed({**THETA, **form.fixed}, form.free, np.array(values))
+        theta = theta_at({**THETA, **form.fixed}, form.free, np.array(values))
         assert set(theta) <= set(PARAMETERS)
         assert form.effect in {effect.name for effect in effects_from(theta, ROBOT.figures)}

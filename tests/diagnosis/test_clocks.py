@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 import hidden
 from planted import ROBOT, driven_log, planted_log
 
-from proxytune.diagnosis.measured.clocks import in_step, read_clocks
+from proxytune.diagnosis.measured.clocks import put_in_step, read_clocks
 from proxytune.diagnosis.measured.drives import gather
 from proxytune.diagnosis.measured.stretches import Blocks, stretches
 from proxytune.logs import read_log
@@ -109,7 +109,7 @@ def test_drives_put_in_step_are_those_of_one_clock():
     late = in_one_drive(-0.3)
     found = clocks(late)
     apart, right = (hidden.make_log(CASE, late_s=late_s, noiseless=True, **SHORT) for late_s in (late, 0.0))
-    moved = in_step(gather(apart, ROBOT, apart.episodes), found, range(6))
+    moved = put_in_step(gather(apart, ROBOT, apart.episodes), found, range(6))
     drives = gather(right, ROBOT, right.episodes)
     shift = found.later_s[3] * drives.tick_hz
     own, other = moved.episode == 3, drives.episode == 3
@@ -125,11 +125,11 @@ def test_drives_put_in_step_are_those_of_one_clock():
 def test_poses_put_before_the_first_command_are_left_out_and_so_is_what_lies_beyond_a_jump():
     found = clocks(in_one_drive(0.5, after=500))
     log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
-    moved = in_step(gather(log, ROBOT, log.episodes), found, range(6))
+    moved = put_in_step(gather(log, ROBOT, log.episodes), found, range(6))
     assert moved.last[moved.episode == 3].max() <= found.kept_s[3, 1] * 60.0
     late = clocks(2.0)
     log = hidden.make_log(CASE, late_s=2.0, **SHORT)
-    moved = in_step(gather(log, ROBOT, log.episodes), late, range(6))
+    moved = put_in_step(gather(log, ROBOT, log.episodes), late, range(6))
     assert moved.first.min() >= 0
     assert not moved.linked[0]
 

@@ -12,7 +12,7 @@ from planted import ROBOT, TRUTH, fitted, planted_drives
 
 from proxytune.diagnosis.model.replay import increments
 from proxytune.diagnosis.naming.candidates import candidates
-from proxytune.diagnosis.naming.dense import part_of, with_dense_probes
+from proxytune.diagnosis.naming.dense import cut_part, with_dense_probes
 
 SHORT = {"episodes": 4, "seconds": 30.0}
 
@@ -45,6 +45,6 @@ def test_other_effects_keep_the_probes_that_they_have():
 
 def test_a_part_of_the_drives_moves_as_the_whole_does_there():
     whole = planted_drives(TRUTH, episodes=3, seconds=60.0, noise=None)
-    part = part_of(whole)
+    part = cut_part(whole)
     assert 0.15 * whole.seconds < part.seconds < 0.45 * whole.seconds
     np.testing.assert_allclose(increments(part, TRUTH | {"delay": 0.12}), part.measured, atol=1e-4)

@@ -17,12 +17,12 @@ from proxytune.diagnosis.diagnose import (
     declared_parameters,
     diagnose,
 )
-from proxytune.diagnosis.diagnosis import Estimate
 from proxytune.diagnosis.horizon.floor import PoseNoise
 from proxytune.diagnosis.horizon.polish import HORIZONS_S
 from proxytune.diagnosis.horizon_error import KeptAside, horizon_error
-from proxytune.diagnosis.naming.found import Adopted, Found
-from proxytune.diagnosis.verdict import CHANCE
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings
+from proxytune.diagnosis.result import Estimate
+from proxytune.diagnosis.rules import RULES
 from proxytune.driving.robot import read_robot
 from proxytune.effects import PARAMETERS
 from proxytune.errors import LogError
@@ -41,7 +41,7 @@ def scrubbing_log():
 
 @pytest.fixture(scope="module")
 def diagnosis(told):
-    return diagnose(scrubbing_log(), ROBOT, ("trim", "delay"), told=told.append)
+    return diagnose(scrubbing_log(), ROBOT, ("trim", "delay"), report=told.append)
 
 
 def test_the_planted_effect_is_found_with_its_value(diagnosis):
@@ -69,7 +69,7 @@ def test_errors_are_told_at_every_horizon_and_fall_to_the_floor(diagnosis):
         assert error.ratio.value == pytest.approx(error.after.value / error.before.value)
         assert error.after.value < error.before.value
         assert 0.85 * error.floor.lower < error.after.value < 1.15 * error.floor.lower
-        assert error.floor.lower <= error.floor.upper <= CHANCE * error.after.value + 1e-12
+        assert error.floor.lower <= error.floor.upper <= RULES.lowest_by_chance * error.after.value + 1e-12
     error = diagnosis.errors[1]
     assert error.ratio.interval[1] < 1.0
     assert error.removable_left < 0.3
@@ -155,7 +155,7 @@ def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
     drives = drives_of(log)
     model = fitted(drives)
     tested = KeptAside(drives, drives, PoseNoise(0.002, 0.005))
-    error = horizon_error(Found(model, model, (), (), (), ()), tested, 5.0, {})
+    error = horizon_error(Findings(model, model, (), (), (), ()), tested, 5.0, {})
     assert error is None or np.isfinite((*error.before.interval, *error.ratio.interval)).all()
 
 
@@ -195,7 +195,7 @@ def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
 
 
 def test_a_value_at_the_end_of_its_range_is_told_of_effects_that_draw_too(diagnosis):
-    jitter = Adopted("delay_jitter", "", ("delay_jitter",), (), 50.0, 0.01, ())
+    jitter = AdoptedEffect("delay_jitter", "", ("delay_jitter",), (), 50.0, 0.01, ())
     highest = Estimate(PARAMETERS["delay_jitter"].high, (0.2, 0.3), "s")
     there = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": highest})
     assert there.at_edge(jitter) == ("delay_jitter",)

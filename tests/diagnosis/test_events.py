@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parent))
 from own_times import own_times_log
 from planted import TRUTH, drives_of, fitted, planted_drives
 
-from proxytune.diagnosis.model.events import _changed, _mixture, _without, random_effects, responses
+from proxytune.diagnosis.model.events import _changed_commands, _lose_commands, _mixture, random_effects, responses
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS
 
 SHORT = {"episodes": 4, "seconds": 25.0}
@@ -126,9 +126,9 @@ def test_commands_at_times_of_their_own_are_no_jitter_of_the_robot_but_on_a_grid
 
 def test_a_command_that_is_lost_is_lost_until_the_next_one():
     drives = drives_of(own_times_log(1, episodes=1, seconds=20.0, gridded=False))
-    changed, phase = _changed(drives)
+    changed, phase = _changed_commands(drives)
     lost = changed[phase == phase[5]]
-    duties = _without(drives, lost)
+    duties = _lose_commands(drives, lost)
     issued = np.flatnonzero(drives.issued[0])
     for _, tick in lost:
         following = issued[issued > tick][0]

@@ -12,8 +12,17 @@ sys.path.append(str(Path(__file__).parent))
 from planted import DECLARED, NOISE, ROBOT, TRUTH, fitted, planted_drives
 
 from proxytune.diagnosis.model import fitting
-from proxytune.diagnosis.model.coordinates import placed, span
-from proxytune.diagnosis.model.fitting import Fit, by_block, evaluate, fit, loss_of, predictive, renoised, slopes
+from proxytune.diagnosis.model.coordinates import span, theta_at
+from proxytune.diagnosis.model.fitting import (
+    Fit,
+    evaluate,
+    fit,
+    held_out_log_likelihood,
+    loss_of,
+    replace_noise,
+    slopes,
+    sum_by_block,
+)
 from proxytune.diagnosis.model.innovations import Whitener, whitener
 from proxytune.diagnosis.model.intervals import intervals
 from proxytune.diagnosis.model.replay import increments
@@ -77,7 +86,7 @@ def test_of_steps_that_are_as_good_a_round_one_is_taken(drives, monkeypatch):
     name = "command_quantisation"
     monkeypatch.setattr(fitting, "loss_of", lambda drives, theta, whiten: round(abs(theta[name] - 0.25), 3))
     theta = {**TRUTH, name: 0.2503}
-    assert fitting._scanned(drives, theta, ((name,),), None, np.array([0.9, 1.1]))[name] == 0.25
+    assert fitting._scan(drives, theta, ((name,),), None, np.array([0.9, 1.1]))[name] == 0.25
 
 
 def test_a_step_is_found_with_an_interval_round_it():
@@ -107,7 +116,7 @@ def test_values_stay_within_their_bounds():
 
 def test_slopes_foretell_a_small_change(found):
     low, high = span(("trim",), ROBOT)
-    moved = placed(found.theta, (("trim",),), np.array([found.theta["trim"] + 1e-4 * (high - low)]))
+    moved = theta_at(found.theta, (("trim",),), np.array([found.theta["trim"] + 1e-4 * (high - low)]))
     there = found.whiten.whiten(found.drives.measured - increments(found.drives, moved))
     change = found.slopes[:, 0] * 1e-4
     assert np.linalg.norm(there - found.innovations - change) < 0.01 * np.linalg.norm(change)
@@ -130,7 +139,7 @@ def test_the_fitted_model_loses_least(found):
 
 
 def test_the_same_model_with_other_noise_keeps_its_parameters(found):
-    louder = renoised(found, NOISE)
+    louder = replace_noise(found, NOISE)
     assert (louder.theta, louder.free, louder.noise) == (found.theta, found.free, NOISE)
     assert evaluate(found.drives, found.theta, found.free, NOISE).innovations == pytest.approx(louder.innovations)
 
@@ -150,7 +159,7 @@ def linear(drives, columns=2, seed=4):
 def test_a_block_is_foretold_as_if_the_others_alone_had_been_fitted(drives):
     few = drives.only(np.isin(drives.block, (0, 3, 4, 7)) & (np.arange(len(drives.block)) % 5 == 0))
     model = linear(few)
-    told = predictive(model)
+    told = held_out_log_likelihood(model)
     label = np.repeat(few.block, 3)
     for block in range(4):
         own = label == block
@@ -162,14 +171,19 @@ def test_a_block_is_foretold_as_if_the_others_alone_had_been_fitted(drives):
 
 def test_a_useless_parameter_costs_and_a_needed_one_pays(drives):
     model = linear(drives, columns=3)
-    useless = float(predictive(model).sum() - predictive(replace(model, slopes=model.slopes[:, :1])).sum())
+    useless = float(
+        held_out_log_likelihood(model).sum() - held_out_log_likelihood(replace(model, slopes=model.slopes[:, :1])).sum()
+    )
     assert useless < 2.0
     needed = replace(model, innovations=model.innovations + 0.2 * model.slopes[:, 1])
-    gain = float(predictive(needed).sum() - predictive(replace(needed, slopes=needed.slopes[:, :1])).sum())
+    gain = float(
+        held_out_log_likelihood(needed).sum()
+        - held_out_log_likelihood(replace(needed, slopes=needed.slopes[:, :1])).sum()
+    )
     assert gain == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
 
 
 def test_sums_by_block_add_up(found):
-    sums = by_block(found.drives, found.slopes)
+    sums = sum_by_block(found.drives, found.slopes)
     assert len(sums) == found.drives.block.max() + 1
     np.testing.assert_allclose(sums.sum(axis=0), found.slopes.sum(axis=0))

@@ -16,9 +16,9 @@ from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives
 
 from proxytune.diagnosis.measured.drives import gather
 from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS
-from proxytune.diagnosis.naming.flexible import curves
-from proxytune.diagnosis.naming.round import LEAST_GAIN
+from proxytune.diagnosis.naming.flexible import fit_curves
 from proxytune.diagnosis.naming.signals import hats, signal_groups
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects import CATALOGUE, Cue
 
 SHORT = {"episodes": 3, "seconds": 30.0}
@@ -63,7 +63,7 @@ def test_every_signal_has_motion_on_every_tick_and_effects_of_the_catalogue(clea
 
 
 def test_no_curve_gains_much_where_nothing_is_missing(clean):
-    assert curves(clean)[0].gain < LEAST_GAIN
+    assert fit_curves(clean)[0].gain < RULES.least_gain_nats
 
 
 @pytest.mark.parametrize(
@@ -77,14 +77,14 @@ def test_no_curve_gains_much_where_nothing_is_missing(clean):
 )
 def test_the_signal_that_the_motion_depends_on_leads(effect, figures, signals):
     case = hidden.Case(effect, ((effect, figures),), "normal", 8, 0.02, 0.12)
-    found = curves(fitted(drives_of(hidden.make_log(case, **SHORT))))
+    found = fit_curves(fitted(drives_of(hidden.make_log(case, **SHORT))))
     assert found[0].group.name in signals
-    assert found[0].gain > LEAST_GAIN
+    assert found[0].gain > RULES.least_gain_nats
     assert found[0].weights.shape == (found[0].group.twists.shape[-1],)
 
 
 def test_curves_come_best_first(clean):
-    gains = [curve.gain for curve in curves(clean)]
+    gains = [curve.gain for curve in fit_curves(clean)]
     assert gains == sorted(gains, reverse=True)
 
 

@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import NOISE, TRUTH, drives_of, planted_drives, planted_log
 
 from proxytune.diagnosis.horizon.floor import PoseNoise, noise_floor, pose_noise
-from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.model.innovations import Noise
 
 STILL = Noise((0.0, 0.0, 0.0), (0.003, 0.008))
@@ -65,7 +65,7 @@ def test_drives_too_short_for_third_differences_tell_no_noise():
 @pytest.mark.parametrize("horizon_s", [1.0, 2.0, 5.0])
 def test_the_floor_is_the_error_of_the_true_model_where_only_poses_are_noisy(drives, horizon_s):
     windows = cut(drives, horizon_s)
-    place, turn = np.sqrt(np.mean(strays(drives, TRUTH, windows) ** 2, axis=0))
+    place, turn = np.sqrt(np.mean(pose_errors(drives, TRUTH, windows) ** 2, axis=0))
     told = noise_floor(drives, windows, PoseNoise(0.003, 0.008))
     assert told[0] == pytest.approx(place, rel=0.08)
     assert told[1] == pytest.approx(turn, rel=0.08)

@@ -20,7 +20,7 @@ from proxytune.diagnosis.model.innovations import (
     JITTER,
     TURN_WEIGHT,
     Noise,
-    clipped,
+    clip_outliers,
     fit_noise,
     huber,
     log_likelihood,
@@ -134,5 +134,5 @@ def test_the_innovations_of_a_model_that_is_right_are_white():
 
 def test_outliers_count_linearly_and_their_slope_is_cut():
     z = np.linspace(-8.0, 8.0, 1601)
-    np.testing.assert_allclose(np.gradient(huber(z), z)[1:-1], clipped(z)[1:-1], atol=0.01)
+    np.testing.assert_allclose(np.gradient(huber(z), z)[1:-1], clip_outliers(z)[1:-1], atol=0.01)
     assert np.diff(huber(np.array([HUBER, 5.0, 6.0, 7.0])))[1:].tolist() == [HUBER, HUBER]

@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import drives_of, planted_log, with_poses
 
-from proxytune.diagnosis.measured.latency import likeliest, measured_speeds, reaction, reaction_at
+from proxytune.diagnosis.measured.latency import likeliest_latency, measured_speeds, reaction, reaction_at
 
 
 def answered(theta, change=lambda poses: poses):
@@ -54,16 +54,16 @@ def test_speeds_are_taken_within_unbroken_runs_of_poses():
 def test_the_vertex_between_steps_is_found_with_its_deviation():
     latencies = np.arange(-10, 11) * 0.05
     truths = np.array([0.11, 0.13, 0.12, 0.12])
-    found = likeliest((latencies - truths[:, None]) ** 2, latencies)
+    found = likeliest_latency((latencies - truths[:, None]) ** 2, latencies)
     assert found.value == pytest.approx(0.12)
     assert found.deviation == pytest.approx(np.sqrt((np.array([0.01, 0.01, 0, 0]) ** 2).sum()) / 4.0)
 
 
 def test_squares_that_do_not_depend_on_the_latency_tell_none():
-    assert likeliest(np.ones((4, 9)), np.arange(9.0)).deviation == np.inf
+    assert likeliest_latency(np.ones((4, 9)), np.arange(9.0)).deviation == np.inf
 
 
 def test_squares_that_fall_to_the_end_of_what_was_tried_tell_none():
     latencies = np.arange(-4, 5) * 0.5
     for end in (-2.0, 2.0, 7.0):
-        assert likeliest((latencies - end) ** 2 * np.ones((6, 1)), latencies).deviation == np.inf
+        assert likeliest_latency((latencies - end) ** 2 * np.ones((6, 1)), latencies).deviation == np.inf

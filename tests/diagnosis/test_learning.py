@@ -12,16 +12,16 @@ from planted import TRUTH, planted_drives
 
 from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.model.innovations import FIRST_GUESS
-from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings
 from proxytune.diagnosis.remainder.learning import Learning, learn
 from proxytune.diagnosis.remainder.remainder import Remainder
 
-WRONG = Adopted("saturation", "", ("saturation.limit",), (), 100.0, 0.001, ())
+WRONG = AdoptedEffect("saturation", "", ("saturation.limit",), (), 100.0, 0.001, ())
 
 
 def found(drives, names, adopted=()):
     declared, model = (evaluate(drives, theta, (), FIRST_GUESS) for theta in (TRUTH, {**TRUTH, **names}))
-    return Found(declared, model, adopted, (), (), ())
+    return Findings(declared, model, adopted, (), (), ())
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,9 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import VEERING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.naming.candidates import candidates
+from proxytune.diagnosis.remainder import lookalike as reading
 from proxytune.diagnosis.remainder.lookalike import lookalike
 from proxytune.diagnosis.remainder.remainder import Remainder
 from proxytune.driving.robot import read_robot
@@ -25,12 +26,12 @@ FEW = ("lateral_slip", "turn_slip", "yaw_scrub")
 @pytest.fixture(autouse=True)
 def _few_candidates(monkeypatch):
     few = [one for one in candidates(read_robot("duckiebot"), {}, ()) if one.effect in FEW]
-    monkeypatch.setattr(sys.modules[lookalike.__module__], "candidates", lambda robot, theta, taken: few)
+    monkeypatch.setattr(reading, "candidates", lambda robot, theta, taken: few)
 
 
 def perfect(drives, theta):
     """What curves that say what is true would gain."""
-    return Remainder({}, {}, {}, True, strays(drives, theta, cut(drives, 2.0))[:, 0] ** 2)
+    return Remainder({}, {}, {}, True, pose_errors(drives, theta, cut(drives, 2.0))[:, 0] ** 2)
 
 
 def test_curves_that_do_what_turn_slip_does_are_turn_slip_with_its_value():

@@ -10,12 +10,12 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, ROBOT, TRUTH, driven_log, drives_of
 
-from proxytune.diagnosis.manoeuvres import LIBRARY, imagined, next_manoeuvre
+from proxytune.diagnosis.manoeuvres import LIBRARY, imagine_drive, next_manoeuvre
 from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.model.replay import increments
-from proxytune.diagnosis.naming.adoption import NATS_APART
 from proxytune.diagnosis.naming.candidates import candidates
-from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings
+from proxytune.diagnosis.rules import RULES
 
 SIZES = {
     "dead_band": {"dead_band.width": 0.08, "dead_band.imbalance": 0.0},
@@ -35,10 +35,12 @@ def found(drives, effect, *rivals):
     theta = {**TRUTH, **SIZES[effect]}
     forms = {form.effect: form for form in candidates(ROBOT, TRUTH, ()) if not form.form}
     own = forms[effect]
-    adopted = Adopted(effect, "", tuple(SIZES[effect]), own.free, 100.0, 0.002, tuple(forms[name] for name in rivals))
+    adopted = AdoptedEffect(
+        effect, "", tuple(SIZES[effect]), own.free, 100.0, 0.002, tuple(forms[name] for name in rivals)
+    )
     declared = evaluate(drives, TRUTH, DECLARED, NOISE)
     model = evaluate(drives, theta, (*DECLARED, *own.free), NOISE)
-    return Found(declared, model, (adopted,), (), (), ())
+    return Findings(declared, model, (adopted,), (), (), ())
 
 
 def test_without_rivals_there_is_nothing_to_tell_apart(drives):
@@ -62,7 +64,7 @@ def test_where_noise_is_not_known_what_is_driven_is_driven_ten_times(drives):
 def test_rivals_are_told_apart_by_a_manoeuvre_that_can_be_driven(drives, effect, rival):
     offer = next_manoeuvre(found(drives, effect, rival))
     assert offer.between == (effect, rival)
-    assert offer.nats_per_minute > NATS_APART
+    assert offer.nats_per_minute > RULES.rival_nats
     assert offer.name in {name for name, _, _ in LIBRARY}
     assert offer.duties.shape == (1200, 2)
 
@@ -82,7 +84,7 @@ def test_every_manoeuvre_is_described_and_stays_within_full_duty(name, text, sha
 
 def test_an_imagined_drive_is_one_episode_with_a_pose_at_every_row(drives):
     duties = LIBRARY[0][2](np.arange(200) / 20.0)
-    drive = imagined(drives, duties)
+    drive = imagine_drive(drives, duties)
     assert drive.seconds == pytest.approx(199 / 20.0)
     assert drive.linked.tolist() == [False] + [True] * 198
     np.testing.assert_array_equal(drive.duties[0, ::3], duties)

@@ -11,21 +11,22 @@ from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.horizon.windows import Ratio
 from proxytune.diagnosis.model.fitting import evaluate
-from proxytune.diagnosis.naming.found import Adopted, Found, Variant, lacking
-from proxytune.diagnosis.naming.materiality import MATERIAL, Weighed, without_immaterial, worth
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings, Variant, without_effect
+from proxytune.diagnosis.naming.materiality import WeighedEffect, drop_immaterial, worth
+from proxytune.diagnosis.rules import RULES
 
 SCRUB, SLIP = (("yaw_scrub",),), (("lateral_slip",),)
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
 
 
 def adopted(effect, free=(), names=()):
-    return Adopted(effect, "", names or tuple(name for names in free for name in names), free, 60.0, 0.002, ())
+    return AdoptedEffect(effect, "", names or tuple(name for names in free for name in names), free, 60.0, 0.002, ())
 
 
 def found(drives, theta, *effects):
     free = DECLARED + tuple(coordinate for effect in effects for coordinate in effect.free)
     declared = evaluate(drives, TRUTH, DECLARED, NOISE)
-    return Found(declared, evaluate(drives, theta, free, NOISE), effects, (), (), ())
+    return Findings(declared, evaluate(drives, theta, free, NOISE), effects, (), (), ())
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def drives():
 
 @pytest.fixture(scope="module")
 def weighed(drives):
-    return without_immaterial(found(drives, MIXED, adopted("yaw_scrub", SCRUB), adopted("lateral_slip", SLIP)), 1)
+    return drop_immaterial(found(drives, MIXED, adopted("yaw_scrub", SCRUB), adopted("lateral_slip", SLIP)), 1)
 
 
 def test_what_matters_is_kept_and_what_does_not_is_dropped(weighed):
@@ -52,19 +53,19 @@ def test_the_model_is_fitted_again_without_what_was_dropped(weighed):
 
 def test_where_everything_matters_nothing_changes(drives):
     whole = found(drives, MIXED, adopted("yaw_scrub", SCRUB))
-    assert without_immaterial(whole, 1) is whole
+    assert drop_immaterial(whole, 1) is whole
 
 
 def test_of_two_effects_that_stand_for_one_another_one_is_kept(drives):
     twins = (adopted("yaw_scrub", SCRUB), adopted("wheel_gain", (("wheel_gain.left", "wheel_gain.right"),)))
     theta = {**TRUTH, "yaw_scrub": 0.13, "wheel_gain.left": 1.0, "wheel_gain.right": 1.0}
-    assert [one.effect for one in without_immaterial(found(drives, theta, *twins), 1).adopted] == ["yaw_scrub"]
+    assert [one.effect for one in drop_immaterial(found(drives, theta, *twins), 1).adopted] == ["yaw_scrub"]
 
 
 def test_drives_too_short_for_windows_drop_nothing():
     few = planted_drives(MIXED, episodes=2, seconds=4.0)
     short = found(few, MIXED, adopted("lateral_slip", SLIP))
-    assert without_immaterial(short, 1) is short
+    assert drop_immaterial(short, 1) is short
 
 
 def test_worth_is_told_on_drives_that_were_not_fitted(drives):
@@ -74,14 +75,14 @@ def test_worth_is_told_on_drives_that_were_not_fitted(drives):
     assert set(much) == set(little) == {1.0, 2.0, 5.0}
     assert max(one.interval[0] for one in much.values()) > 1.2
     assert max(one.value for one in much.values()) > 1.5
-    assert all(one.interval[0] < MATERIAL and one.value < 1.2 for one in little.values())
+    assert all(one.interval[0] < RULES.material_factor and one.value < 1.2 for one in little.values())
 
 
 @pytest.mark.parametrize(("size", "matters"), [(0.4, True), (0.02, False)])
 def test_a_random_effect_matters_if_its_draws_make_up_the_error(size, matters):
     calm = planted_drives(TRUTH, episodes=6, seconds=20.0)
     lossy = adopted("dropped_commands", names=("dropped_commands",))
-    kept = without_immaterial(found(calm, {**TRUTH, "dropped_commands": size}, lossy), 1)
+    kept = drop_immaterial(found(calm, {**TRUTH, "dropped_commands": size}, lossy), 1)
     assert bool(kept.adopted) == matters
     if not matters:
         assert kept.model.theta["delay"] == pytest.approx(TRUTH["delay"], abs=0.01)
@@ -89,7 +90,7 @@ def test_a_random_effect_matters_if_its_draws_make_up_the_error(size, matters):
 
 def test_without_a_random_effect_its_mean_lateness_is_delay():
     theta = {**TRUTH, "delay_jitter": 0.1}
-    lack = lacking(Variant(theta, DECLARED), adopted("delay_jitter", names=("delay_jitter",)), 20.0)
+    lack = without_effect(Variant(theta, DECLARED), adopted("delay_jitter", names=("delay_jitter",)), 20.0)
     assert lack.theta == pytest.approx({**TRUTH, "delay": TRUTH["delay"] + 0.05})
     assert lack.free == DECLARED
 
@@ -105,14 +106,14 @@ def test_without_a_random_effect_its_mean_lateness_is_delay():
     ],
 )
 def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger(ratios, material):
-    one = Weighed(adopted("x"), {float(h): Ratio(value, ends) for h, (value, *ends) in enumerate(ratios)})
+    one = WeighedEffect(adopted("x"), {float(h): Ratio(value, ends) for h, (value, *ends) in enumerate(ratios)})
     assert one.material == material
-    assert MATERIAL == 1.05
+    assert RULES.material_factor == 1.05
 
 
 def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_without_it():
     def weighed(value, low, high):
-        return Weighed(adopted("lateral_slip", SLIP), {2.0: Ratio(value, (low, high))})
+        return WeighedEffect(adopted("lateral_slip", SLIP), {2.0: Ratio(value, (low, high))})
 
     assert weighed(0.9, 0.85, 0.96).harmful
     assert not weighed(0.9, 0.75, 1.02).harmful

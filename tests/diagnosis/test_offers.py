@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import TRUTH, planted_drives
 
 from proxytune.diagnosis.model.replay import twists_of
-from proxytune.diagnosis.remainder.offers import offered
+from proxytune.diagnosis.remainder.offers import offer_curves
 from proxytune.effects.learnt.features import GROUPS
 from proxytune.effects.learnt.table import learnt_effect, learnt_theta
 
@@ -23,14 +23,14 @@ def drives():
 
 
 def test_every_group_is_offered_in_the_order_of_its_weights_and_makes_an_effect(drives):
-    offer = offered(drives, TRUTH)
+    offer = offer_curves(drives, TRUTH)
     assert {curve.group for curve in offer.curves} == set(GROUPS)
     assert learnt_effect(learnt_theta(offer)) == offer
     assert not any(any(curve.weights) for curve in offer.curves)
 
 
 def test_knots_lie_within_what_was_seen(drives):
-    offer, asked = offered(drives, TRUTH), twists_of(drives, TRUTH)
+    offer, asked = offer_curves(drives, TRUTH), twists_of(drives, TRUTH)
     for bounds, signal in zip(offer.seen, (asked[..., 0], asked[..., 2]), strict=True):
         assert signal.min() <= bounds[0] < 0.0 < bounds[1] <= 1.01 * signal.max()
     knots = {curve.group: np.array(curve.knots) for curve in offer.curves}
@@ -40,7 +40,7 @@ def test_knots_lie_within_what_was_seen(drives):
 
 def test_what_was_never_driven_is_not_offered(drives):
     ahead = replace(drives, duties=np.abs(drives.duties[..., :1]).repeat(2, axis=-1))
-    groups = {curve.group for curve in offered(ahead, {**TRUTH, "trim": 0.0}).curves}
+    groups = {curve.group for curve in offer_curves(ahead, {**TRUTH, "trim": 0.0}).curves}
     assert "direction" not in groups
     assert "turn_rate" not in groups
     assert "wheel_speed" in groups

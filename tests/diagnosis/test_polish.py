@@ -11,9 +11,10 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
-from proxytune.diagnosis.horizon.polish import HARMS, HELPS, fit_windows, held_out, horizons, polished
-from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.horizon.polish import fit_windows, held_out_squares, horizons, polish_fit
+from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.model.fitting import evaluate
+from proxytune.diagnosis.rules import RULES
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def model(drives, **values):
 
 
 def squares(drives, theta, horizon_s=2.0):
-    return strays(drives, theta, cut(drives, horizon_s))[:, 0] ** 2
+    return pose_errors(drives, theta, cut(drives, horizon_s))[:, 0] ** 2
 
 
 def test_windows_lead_back_to_the_values_that_drove():
@@ -52,7 +53,7 @@ def test_long_logs_are_thinned(drives, monkeypatch):
     asked = []
     monkeypatch.setattr("proxytune.diagnosis.horizon.polish.MOST_WINDOWS", 5)
     monkeypatch.setattr(
-        "proxytune.diagnosis.horizon.polish.misses",
+        "proxytune.diagnosis.horizon.polish.pose_differences",
         lambda d, t, w: asked.append(len(w.begin)) or np.zeros((len(w.window), 3)),
     )
     fit_windows(drives, TRUTH, DECLARED, cut(drives, 2.0))
@@ -64,7 +65,7 @@ def test_no_pose_is_predicted_by_what_was_fitted_to_it(drives):
     own = drives.block % 4 == 0
     poses[own, :, 2] += np.linspace(0.0, 2.0, own.sum())[:, None]
     fitted = fit_windows(replace(drives, poses=poses), TRUTH, DECLARED, cut(drives, 2.0))
-    apart = held_out(replace(drives, poses=poses), TRUTH, DECLARED, 2.0)
+    apart = held_out_squares(replace(drives, poses=poses), TRUTH, DECLARED, 2.0)
     others = drives.block[cut(drives, 2.0).increment] % 4 == 0
     together = squares(replace(drives, poses=poses), fitted)
     assert apart[2.0][others].mean() > together[others].mean()
@@ -73,10 +74,10 @@ def test_no_pose_is_predicted_by_what_was_fitted_to_it(drives):
 
 def test_values_that_predict_poorly_are_fitted_again(drives):
     poor = model(drives, trim=0.08, delay=0.2)
-    better, polish = polished(poor)
+    better, polish = polish_fit(poor)
     assert squares(drives, better.theta).mean() < 0.5 * squares(drives, poor.theta).mean()
-    assert min(one.value for one in polish.ratios.values()) < HELPS
-    assert max(one.value for one in polish.ratios.values()) <= HARMS
+    assert min(one.value for one in polish.ratios.values()) < RULES.polish_helps
+    assert max(one.value for one in polish.ratios.values()) <= RULES.polish_harms
     for name, true in TRUTH.items():
         low, high = polish.intervals[name]
         assert low < better.theta[name] < high
@@ -85,16 +86,16 @@ def test_values_that_predict_poorly_are_fitted_again(drives):
 
 def test_values_that_windows_do_not_mend_are_kept(drives):
     right = model(drives)
-    assert polished(right) == (right, None)
+    assert polish_fit(right) == (right, None)
 
 
 def test_values_that_would_do_harm_at_some_horizon_are_not_taken(drives, monkeypatch):
     poor = model(drives, trim=0.08, delay=0.2)
-    monkeypatch.setattr("proxytune.diagnosis.horizon.polish.HARMS", 0.01)
-    assert polished(poor) == (poor, None)
+    monkeypatch.setattr("proxytune.diagnosis.horizon.polish.RULES", replace(RULES, polish_harms=0.01))
+    assert polish_fit(poor) == (poor, None)
 
 
 def test_drives_too_short_for_windows_in_three_blocks_are_not_fitted_to():
     few = model(planted_drives(TRUTH, episodes=2, seconds=4.0), trim=0.08)
     assert horizons(few.drives) == ()
-    assert polished(few) == (few, None)
+    assert polish_fit(few) == (few, None)

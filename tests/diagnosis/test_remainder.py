@@ -11,8 +11,9 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import TURNING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.horizon.windows import Ratio, cut, strays
-from proxytune.diagnosis.remainder.remainder import HARMS, HELPS, Remainder, _helps, remainder
+from proxytune.diagnosis.horizon.windows import Ratio, cut, pose_errors
+from proxytune.diagnosis.remainder.remainder import Remainder, _helps, remainder
+from proxytune.diagnosis.rules import RULES
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_dr
     others = planted_drives({**TRUTH, **TURNING}, episodes=3, seconds=20.0, seed=9)
     windows = cut(others, 2.0)
     before, after, right = (
-        np.sqrt(np.mean(strays(others, theta, windows)[:, 0] ** 2))
+        np.sqrt(np.mean(pose_errors(others, theta, windows)[:, 0] ** 2))
         for theta in (TRUTH, {**TRUTH, **learnt.theta}, {**TRUTH, **TURNING})
     )
     assert after < 0.5 * before
@@ -45,9 +46,9 @@ def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_dr
 def test_the_guard_and_the_held_out_errors_tell_of_blocks_that_were_not_fitted(found):
     drives, learnt = found
     assert set(learnt.guard) == {1.0, 2.0, 5.0}
-    before = strays(drives, TRUTH, cut(drives, 2.0))[:, 0] ** 2
+    before = pose_errors(drives, TRUTH, cut(drives, 2.0))[:, 0] ** 2
     assert np.sqrt(learnt.held_out.mean() / before.mean()) == pytest.approx(learnt.guard[2.0].value)
-    inside = strays(drives, {**TRUTH, **learnt.theta}, cut(drives, 2.0))[:, 0] ** 2
+    inside = pose_errors(drives, {**TRUTH, **learnt.theta}, cut(drives, 2.0))[:, 0] ** 2
     assert inside.mean() < learnt.held_out.mean()
 
 
@@ -79,7 +80,7 @@ BAD, UNSURE = Ratio(1.1, (0.9, 1.3)), Ratio(0.8, (0.6, 1.01))
     ],
 )
 def test_the_guard_wants_a_sure_gain_somewhere_and_a_loss_nowhere(guard, used):
-    assert DULL.value < HARMS < BAD.value
-    assert GOOD.value < HELPS < DULL.value
+    assert DULL.value < RULES.remainder_harms < BAD.value
+    assert GOOD.value < RULES.remainder_helps < DULL.value
     assert _helps(guard) == used
     assert not Remainder().used

@@ -14,10 +14,10 @@ from planted import TRUTH, planted_drives
 from proxytune.diagnosis.measured.drives import relative
 from proxytune.diagnosis.model.replay import (
     arrived_commands,
-    between,
-    disturbed,
-    expected,
+    disturbed_increments,
+    expected_theta,
     increments,
+    increments_along,
     lateness,
     paths,
     wheel_speeds,
@@ -52,7 +52,7 @@ def test_increments_are_the_differences_of_paths(drives, theta):
         np.testing.assert_array_equal(
             increments(drives, theta)[index], relative(walked[episode, first], walked[episode, last])
         )
-    np.testing.assert_array_equal(increments(drives, theta), between(drives, walked))
+    np.testing.assert_array_equal(increments(drives, theta), increments_along(drives, walked))
 
 
 def test_the_model_that_drove_says_what_was_measured(drives):
@@ -115,7 +115,7 @@ def test_nothing_measured_after_a_windows_start_changes_it(drives):
 )
 def test_random_effects_make_commands_late_by_their_mean(theta, late):
     assert lateness(theta, 20.0) == pytest.approx(late)
-    calm = expected({"trim": 0.02, "delay": 0.1, **theta}, 20.0)
+    calm = expected_theta({"trim": 0.02, "delay": 0.1, **theta}, 20.0)
     assert calm == pytest.approx({"trim": 0.02, "delay": 0.1 + late})
 
 
@@ -130,14 +130,14 @@ def test_the_mean_lateness_is_that_of_drawn_drives():
 
 
 def test_a_random_effect_without_a_declared_delay_is_late_from_nothing():
-    assert expected({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
+    assert expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
 
 
 def test_what_is_added_to_the_twists_moves_the_robot(drives):
     extra = np.zeros((*drives.duties.shape[:2], 3))
-    np.testing.assert_allclose(disturbed(drives, TRUTH, extra), increments(drives, TRUTH), atol=1e-12)
+    np.testing.assert_allclose(disturbed_increments(drives, TRUTH, extra), increments(drives, TRUTH), atol=1e-12)
     extra[..., 2] = 0.6
-    turned = disturbed(drives, TRUTH, extra)[:, 2] - increments(drives, TRUTH)[:, 2]
+    turned = disturbed_increments(drives, TRUTH, extra)[:, 2] - increments(drives, TRUTH)[:, 2]
     np.testing.assert_allclose(turned, 0.6 * (drives.last - drives.first) / 60.0, atol=1e-9)
 
 

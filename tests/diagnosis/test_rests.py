@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.measured.rests import without_long_rests
+from proxytune.diagnosis.measured.rests import cut_out_long_rests
 from proxytune.logs import Log, LogEpisode
 
 
@@ -21,7 +21,7 @@ def log(*told, rows=4000, **more):
 
 def test_each_stretch_between_long_rests_is_a_drive_of_its_own():
     whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
-    first, second = without_long_rests(whole).episodes
+    first, second = cut_out_long_rests(whole).episodes
     assert (first.name, second.name) == ("a from 34 s", "a from 124 s")
     assert (first.times[0], first.times[-1]) == pytest.approx((34.0, 77.95))
     assert (second.times[0], second.times[-1]) == pytest.approx((124.0, 157.95))
@@ -32,13 +32,13 @@ def test_each_stretch_between_long_rests_is_a_drive_of_its_own():
 
 def test_short_rests_are_kept():
     whole = log((10.0, 80.0), (95.0, 190.0))
-    assert without_long_rests(whole) is whole
+    assert cut_out_long_rests(whole) is whole
 
 
 def test_drives_without_commands_to_move_or_without_any_are_left_to_others():
     still, frames = log(), replace(log(), command="none")
-    assert without_long_rests(still) is still
-    assert without_long_rests(frames) is frames
+    assert cut_out_long_rests(still) is still
+    assert cut_out_long_rests(frames) is frames
 
 
 def test_commands_at_times_of_their_own_go_with_their_stretch():
@@ -46,7 +46,7 @@ def test_commands_at_times_of_their_own_go_with_their_stretch():
     issued = np.array([0.0, 50.0, 60.0, 150.0, 170.0])
     commands = np.array([[0, 0], [0.5, 0.5], [0, 0], [0.2, 0.2], [0, 0]])
     own = replace(whole.episodes[0], issued=issued, commands=commands)
-    first, second = without_long_rests(replace(whole, episodes=(own,))).episodes
+    first, second = cut_out_long_rests(replace(whole, episodes=(own,))).episodes
     np.testing.assert_array_equal(first.issued, [0.0, 50.0, 60.0])
     np.testing.assert_array_equal(second.issued, [60.0, 150.0, 170.0])
     np.testing.assert_array_equal(second.held[[0, -1]], [[0, 0], [0, 0]])

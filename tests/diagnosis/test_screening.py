@@ -12,7 +12,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives, planted_log, with_poses
 
 from proxytune.diagnosis.naming.candidates import candidates
-from proxytune.diagnosis.naming.screening import screen, stretches, without
+from proxytune.diagnosis.naming.screening import number_stretches, project_out, screen
 
 SHORT = {"episodes": 3, "seconds": 20.0}
 TAKEN = ("trim", "delay")
@@ -96,15 +96,15 @@ def test_a_mirror_swaps_left_and_right_and_nothing_else():
 def test_what_free_parameters_can_do_is_projected_out():
     random = np.random.default_rng(1)
     slopes, columns, weight = random.random((60, 2)), random.random((60, 3)), random.random(60) > 0.3
-    left = without(slopes, columns, weight)
+    left = project_out(slopes, columns, weight)
     np.testing.assert_allclose(slopes[weight].T @ left[weight], 0.0, atol=1e-9)
-    np.testing.assert_allclose(without(slopes, slopes @ random.random((2, 1)), weight), 0.0, atol=1e-9)
-    assert without(np.empty((60, 0)), columns, weight) is columns
+    np.testing.assert_allclose(project_out(slopes, slopes @ random.random((2, 1)), weight), 0.0, atol=1e-9)
+    assert project_out(np.empty((60, 0)), columns, weight) is columns
 
 
 def test_stretches_last_a_second_and_never_cross_episodes():
     drives = planted_drives(TRUTH, episodes=2, seconds=5.0)
-    number = stretches(drives)
+    number = number_stretches(drives)
     assert len(np.unique(number)) == 10
     for one in np.unique(number):
         own = number == one

@@ -11,14 +11,14 @@ sys.path.append(str(Path(__file__).parent))
 from planted import TRUTH, fitted, planted_drives
 
 from proxytune.diagnosis.model.events import random_effects
-from proxytune.diagnosis.model.sizing import _inverted, sized
+from proxytune.diagnosis.model.sizing import _invert, size_random_effect
 
 
 def told(effect, size, seed):
     """What is told of an effect at first, and in the end."""
     base = fitted(planted_drives({**TRUTH, effect: size}, seed=seed, episodes=6, seconds=30.0))
     (first,) = [one for one in random_effects(base, 1) if one.effect == effect]
-    return first, sized(base, first, 1)
+    return first, size_random_effect(base, first, 1)
 
 
 @pytest.mark.parametrize(("effect", "size"), [("dropped_commands", 0.3), ("delay_jitter", 0.15)])
@@ -38,6 +38,6 @@ def test_the_same_seed_says_the_same():
 def test_the_size_is_that_of_which_drives_say_what_is_measured():
     sizes = np.array([0.1, 0.2, 0.4])
     said = np.log(0.5 * sizes) + np.array([[-0.05], [0.05]])
-    value, low, high = _inverted(sizes, said, float(np.log(0.1)))
+    value, low, high = _invert(sizes, said, float(np.log(0.1)))
     assert value == pytest.approx(0.2)
     assert 0.1 < low < 0.2 < high < 0.4

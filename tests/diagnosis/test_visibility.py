@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import TRUTH, driven_log, drives_of, fitted, planted_drives
 
 from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS
-from proxytune.diagnosis.naming.visibility import unseen
+from proxytune.diagnosis.naming.visibility import invisible_effects
 
 DECLARED = {"trim", "delay"}
 
@@ -25,7 +25,7 @@ def swinging(level, swing):
 
 @pytest.fixture(scope="module")
 def slow():
-    return unseen(swinging(0.15, 0.03), DECLARED)
+    return invisible_effects(swinging(0.15, 0.03), DECLARED)
 
 
 def test_slow_drives_cannot_show_saturation(slow):
@@ -33,25 +33,25 @@ def test_slow_drives_cannot_show_saturation(slow):
 
 
 def test_driving_below_the_limit_of_both_wheels_cannot_show_saturation():
-    assert "saturation" in unseen(swinging(0.3, 0.05), DECLARED)
+    assert "saturation" in invisible_effects(swinging(0.3, 0.05), DECLARED)
 
 
 def test_fast_drives_can():
-    assert "saturation" not in unseen(swinging(0.9, 0.1), DECLARED)
+    assert "saturation" not in invisible_effects(swinging(0.9, 0.1), DECLARED)
 
 
 def test_straight_drives_cannot_show_what_turning_costs():
-    assert "turn_slip" in unseen(swinging(0.3, 0.0), DECLARED)
+    assert "turn_slip" in invisible_effects(swinging(0.3, 0.0), DECLARED)
 
 
 def test_rich_drives_show_nearly_everything():
-    hidden = unseen(fitted(planted_drives(TRUTH, episodes=6, seconds=30.0)), DECLARED)
+    hidden = invisible_effects(fitted(planted_drives(TRUTH, episodes=6, seconds=30.0)), DECLARED)
     assert len(hidden) <= 3
 
 
 def test_what_is_declared_or_adopted_is_not_told_as_unseen(slow):
     assert not DECLARED & set(slow)
-    assert "saturation" not in unseen(swinging(0.15, 0.03), {*DECLARED, "saturation"})
+    assert "saturation" not in invisible_effects(swinging(0.15, 0.03), {*DECLARED, "saturation"})
 
 
 def test_unseen_effects_are_effects_of_motion_in_the_catalogues_order(slow):
@@ -60,4 +60,4 @@ def test_unseen_effects_are_effects_of_motion_in_the_catalogues_order(slow):
 
 def test_commands_that_never_change_cannot_show_their_loss():
     steady = fitted(drives_of(driven_log(TRUTH, np.full((3, 600, 2), 0.4), np.zeros((3, 3)))))
-    assert {"dropped_commands", "delay_jitter"} <= set(unseen(steady, DECLARED))
+    assert {"dropped_commands", "delay_jitter"} <= set(invisible_effects(steady, DECLARED))

@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 from learnt_truth import MANY, TURNING
 from planted import TRUTH, planted_drives
 
-from proxytune.diagnosis.horizon.window_slopes import FITTED_S, POSES, compared, slopes_of
+from proxytune.diagnosis.horizon.window_slopes import FITTED_S, POSES, choose_windows, slopes_of
 from proxytune.effects.learnt.table import learnt_effect
 
 SIZE = 1e-4
@@ -43,7 +43,7 @@ def test_a_model_that_is_right_leaves_nothing(drives):
 
 
 def test_windows_are_thinned_to_a_few_poses_that_reach_their_end(drives):
-    windows = compared(drives)
+    windows = choose_windows(drives)
     counts = np.bincount(windows.window)
     assert counts.max() == POSES
     lasts = (drives.last[windows.increment] - drives.first[windows.begin][windows.window]) / drives.tick_hz

@@ -11,7 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import TRUTH, drives_of, planted_drives, planted_log
 
-from proxytune.diagnosis.horizon.windows import SHORTEST, chosen, cut, ratio, rmse, strays
+from proxytune.diagnosis.horizon.windows import SHORTEST, cut, pose_errors, ratio, rmse, select_windows
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_a_horizon_that_does_not_divide_a_drive_leaves_no_stub(drives, horizon_s
 def test_some_windows_are_chosen_with_all_their_poses(drives):
     windows = cut(drives, 2.0)
     kept = np.arange(len(windows.begin)) % 3 == 1
-    some = chosen(windows, kept)
+    some = select_windows(windows, kept)
     assert np.array_equal(some.begin, windows.begin[kept])
     assert np.array_equal(np.unique(some.window), np.arange(kept.sum()))
     for number, window in enumerate(np.flatnonzero(kept)):
@@ -78,8 +78,8 @@ def test_runs_shorter_than_most_of_the_horizon_have_no_window():
 
 def test_a_model_does_not_stray_from_its_own_noiseless_drives():
     quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
-    assert strays(quiet, TRUTH, cut(quiet, 2.0)).max() < 1e-9
-    assert strays(quiet, {**TRUTH, "trim": 0.1}, cut(quiet, 2.0))[:, 0].max() > 0.01
+    assert pose_errors(quiet, TRUTH, cut(quiet, 2.0)).max() < 1e-9
+    assert pose_errors(quiet, {**TRUTH, "trim": 0.1}, cut(quiet, 2.0))[:, 0].max() > 0.01
 
 
 def test_an_error_has_an_interval_round_it():

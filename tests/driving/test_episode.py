@@ -7,7 +7,8 @@ import pytest
 
 from proxytune.domain import make_episode
 from proxytune.driving.episode import TICK_HZ
-from proxytune.driving.family import LaneFollowing, lane_following
+from proxytune.driving.family import lane_following
+from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.robot import read_robot
 from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, Stage, theta_names
 from proxytune.errors import EpisodeError, SettingsError
@@ -229,7 +230,7 @@ def test_pictures_come_at_the_cameras_rate(tmp_path):
             seen.append(picture)
             return (0.3, 0.35), None
 
-    from proxytune.driving import family as module
+    from proxytune.driving import lane_following as module
 
     domain = family(tmp_path, plant="planar")
     original = module.load_agent

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from proxytune.driving import identity, lineage
-from proxytune.driving.family import LaneFollowing
+from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.robot import robot_home
 from proxytune.shipped import shipped
@@ -132,7 +132,9 @@ def test_the_versions_of_what_simulates_count(tmp_path, monkeypatch, plant, came
     before, installed = domain.identity, dict(domain.versions)
     for package in ("numpy", "pybullet"):
         other = {**installed, package: "0.0"}
-        monkeypatch.setattr("proxytune.driving.family.versions_of", lambda names, o=other: {n: o[n] for n in names})
+        monkeypatch.setattr(
+            "proxytune.driving.lane_following.versions_of", lambda names, o=other: {n: o[n] for n in names}
+        )
         assert (domain.identity != before) == (package in packages)
 
 

@@ -52,7 +52,7 @@ def wobble():
 
 
 def poses():
-    """Anywhere on the map and off it, and on its diagonals, tiles' edges and the first numbers beside them."""
+    """On the map and up to a metre off it; also on its diagonals, tiles' edges and the first numbers beside them."""
     random = np.random.default_rng(7)
     edges = np.array([0.0, 0.2925, 0.585, 0.8775, 1.17, 1.4625, 1.755])
     beside = (edges[:, None] + np.arange(-8, 9) * 2.0**-53).ravel()
@@ -61,6 +61,8 @@ def poses():
         (
             random.uniform(-0.5, 2.3, (30000, 2)),
             random.choice(beside, (5000, 2)),
+            np.stack((random.uniform(-1.0, 2.8, 5000), random.choice(beside, 5000)), axis=1),
+            np.stack((random.choice(beside, 5000), random.uniform(-1.0, 2.8, 5000)), axis=1),
             0.8775 + np.stack((diagonal, diagonal), axis=1),
             0.8775 + np.stack((diagonal, -diagonal), axis=1),
         )

@@ -11,7 +11,8 @@ from proxytune.domain import Classroom, DomainFamily, make_episode
 from proxytune.driving.agents.pupil import Pupil
 from proxytune.driving.episode import TICK_HZ, Course, Sight, drive
 from proxytune.driving.expert import Expert
-from proxytune.driving.family import LaneFollowing, lane_following
+from proxytune.driving.family import lane_following
+from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.road.lane import off_map
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.robot import read_robot

@@ -6,14 +6,14 @@ from schoolroom import SAMPLES_PER_S, Schoolroom
 from wobbly import Wobbly
 
 from proxytune.errors import LearnerError
-from proxytune.learning.lessons import Distribution, teach
+from proxytune.learning.lessons import Distribution, collect_samples
 
 ROOM = Schoolroom(Wobbly())
 WIDE = Distribution({"delay": (0.0, 0.3), "trim": (0.1, 0.1)})
 
 
 def test_a_longer_answer_begins_with_every_shorter_one():
-    short, long = (teach(ROOM, WIDE, count=count, seed=4, lesson_s=1.0) for count in (17, 60))
+    short, long = (collect_samples(ROOM, WIDE, count=count, seed=4, lesson_s=1.0) for count in (17, 60))
     assert len(short.commands) == len(short.observations) == 17
     assert len(long.commands) == 60
     assert np.array_equal(long.observations[:17], short.observations)
@@ -21,7 +21,7 @@ def test_a_longer_answer_begins_with_every_shorter_one():
 
 
 def test_another_seed_is_taught_by_other_lessons():
-    one, other = (teach(ROOM, WIDE, count=20, seed=seed, lesson_s=1.0) for seed in (1, 2))
+    one, other = (collect_samples(ROOM, WIDE, count=20, seed=seed, lesson_s=1.0) for seed in (1, 2))
     assert not np.array_equal(one.commands, other.commands)
 
 
@@ -33,7 +33,7 @@ def test_theta_is_drawn_anew_for_every_lesson_and_only_where_it_is_free(tmp_path
             thetas.append(dict(episode.theta))
             return super().demonstrate(episode, seconds)
 
-    teach(Spying(Wobbly()), WIDE, count=20 * SAMPLES_PER_S, seed=1, lesson_s=1.0)
+    collect_samples(Spying(Wobbly()), WIDE, count=20 * SAMPLES_PER_S, seed=1, lesson_s=1.0)
     delays = [theta["delay"] for theta in thetas]
     assert {theta["trim"] for theta in thetas} == {0.1}
     assert len(set(delays)) == len(delays) == 20
@@ -51,9 +51,9 @@ def test_a_distribution_without_width_is_one_theta():
 @pytest.mark.parametrize("blocked", [0.7, 1.0])
 def test_an_expert_that_cannot_drive_ends_it_with_where_and_how_badly(blocked):
     with pytest.raises(LearnerError, match=r"cannot drive here: .*% of \d+ lessons at delay in \[0, 0.3\], trim = 0.1"):
-        teach(Schoolroom(Wobbly(), blocked=blocked), WIDE, count=1000, seed=1, lesson_s=1.0)
+        collect_samples(Schoolroom(Wobbly(), blocked=blocked), WIDE, count=1000, seed=1, lesson_s=1.0)
 
 
 def test_steps_off_the_road_are_made_up_for_by_further_lessons():
-    samples = teach(Schoolroom(Wobbly(), blocked=0.4), WIDE, count=50, seed=1, lesson_s=1.0)
+    samples = collect_samples(Schoolroom(Wobbly(), blocked=0.4), WIDE, count=50, seed=1, lesson_s=1.0)
     assert len(samples.commands) == 50

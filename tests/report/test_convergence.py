@@ -77,9 +77,9 @@ def test_trials_that_were_cut_off_are_shown_at_what_they_cannot_be_below(result)
     cut = TrialRecord(8, result.trials[0].theta, "cut", decided=("agent0", "agent1"), bound=14.0, score=20.0)
     told = replace(result, trials=(*result.trials, cut), answers=(*result.answers, result.answers[-1]))
     drawn = lines(convergence(told))
-    assert drawn["stopped early (lower bound)"].get_xydata().tolist() == [[8.0, 14.0]]
+    assert drawn["stopped early, at least"].get_xydata().tolist() == [[8.0, 14.0]]
     assert "failed" not in drawn
-    assert "stopped early (lower bound)" not in lines(convergence(result))
+    assert "stopped early, at least" not in lines(convergence(result))
 
 
 def test_without_a_noise_floor_none_is_drawn(result):

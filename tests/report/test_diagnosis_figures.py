@@ -12,13 +12,13 @@ sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 import hidden
 
 from proxytune.diagnosis.diagnose import diagnose
-from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.model.innovations import huber
-from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, disturbed, increments
+from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, disturbed_increments, increments
 from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, candidates
-from proxytune.diagnosis.naming.found import Adopted
-from proxytune.diagnosis.naming.round import LEAST_GAIN
+from proxytune.diagnosis.naming.findings import AdoptedEffect
 from proxytune.diagnosis.naming.signals import signal_groups
+from proxytune.diagnosis.rules import RULES
 from proxytune.driving.robot import read_robot
 from proxytune.effects import Means, theta_names
 from proxytune.effects.catalogue import CATALOGUE
@@ -58,7 +58,7 @@ def without_effects(diagnosis, remainder=()):
 
 def with_effect(diagnosis, effect, form, theta):
     """The same drives, as if this effect had been added instead."""
-    adopted = (Adopted(effect, form, tuple(theta), (), 100.0, 0.001, (), None),)
+    adopted = (AdoptedEffect(effect, form, tuple(theta), (), 100.0, 0.001, (), None),)
     model = replace(diagnosis.found.declared, theta={**diagnosis.found.declared.theta, **theta})
     return replace(diagnosis, effects=adopted, found=replace(diagnosis.found, model=model, adopted=adopted))
 
@@ -136,7 +136,7 @@ def test_an_interval_without_end_is_not_drawn(diagnosis):
 def test_residuals_over_time_are_the_root_mean_squares_of_the_windows(diagnosis, figures):
     drives = diagnosis.parts.tested
     windows = cut(drives, 2.0)
-    squares = strays(drives, diagnosis.found.model.theta, windows)[:, 0] ** 2
+    squares = pose_errors(drives, diagnosis.found.model.theta, windows)[:, 0] ** 2
     expected = 1e3 * np.sqrt([squares[windows.window == w].mean() for w in range(len(windows.begin))])
     (axes,) = figures["residual_over_time"].axes
     drawn = [one.get_ydata() for one in axes.get_lines() if one.get_color() == line(axes, AFTER).get_color()]
@@ -199,7 +199,7 @@ def test_the_ranking_holds_every_gain_best_first(diagnosis, figures):
     assert upper.get_yticklabels()[0].get_text() == "dead band"
     assert [one.get_label() for one in upper.get_lines() if one.get_marker() == "o"].count("adopted") == 1
     threshold = [one for one in upper.get_lines() if one.get_linestyle() == ":"]
-    assert list(threshold[0].get_xdata()) == [LEAST_GAIN, LEAST_GAIN]
+    assert list(threshold[0].get_xdata()) == [RULES.least_gain_nats, RULES.least_gain_nats]
 
 
 def test_rivals_are_marked_in_the_ranking(diagnosis):
@@ -267,7 +267,7 @@ def test_declared_parameters_give_way_to_the_curve_that_was_fitted_with_them(dia
     declared, curve = diagnosis.found.declared, diagnosis.found.curves[0]
 
     def loss(theta):
-        said = disturbed(declared.drives, theta, curve.group.twists @ curve.weights)
+        said = disturbed_increments(declared.drives, theta, curve.group.twists @ curve.weights)
         return huber(declared.whiten.whiten(declared.drives.measured - said)).sum()
 
     assert loss(retuned(declared, curve)) < loss(declared.theta) - 5.0

@@ -5,17 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.diagnosis import Estimate
 from proxytune.diagnosis.horizon.polish import Polish
 from proxytune.diagnosis.horizon.windows import Ratio
 from proxytune.diagnosis.manoeuvres import LIBRARY, Manoeuvre
-from proxytune.diagnosis.naming.found import Adopted
+from proxytune.diagnosis.naming.findings import AdoptedEffect
 from proxytune.diagnosis.remainder.learning import Learning
 from proxytune.diagnosis.remainder.remainder import Remainder
+from proxytune.diagnosis.result import Estimate
 from proxytune.report.diagnosis.notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
 
-SLIP = Adopted("lateral_slip", "", ("lateral_slip",), (("lateral_slip",),), 75.2, 0.002, ())
-BAND = Adopted("dead_band", "left wheel", ("dead_band.width",), (("dead_band.width",),), 900.0, 0.002, ())
+SLIP = AdoptedEffect("lateral_slip", "", ("lateral_slip",), (("lateral_slip",),), 75.2, 0.002, ())
+BAND = AdoptedEffect("dead_band", "left wheel", ("dead_band.width",), (("dead_band.width",),), 900.0, 0.002, ())
 LITTLE = {2.0: Ratio(0.999, (0.98, 1.02)), 5.0: Ratio(1.01, (0.942, 1.083))}
 SURE = {2.0: Ratio(1.001, (0.98, 1.02)), 5.0: Ratio(1.01, (0.99, 1.03))}
 TIMES = np.arange(20) / 20.0

@@ -17,10 +17,10 @@ from proxytune.report.study.verdict import sentence
 from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
 from proxytune.storage.store import Store
-from proxytune.study.movement import Movement
-from proxytune.study.preflight import Preflight
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
+from proxytune.study.stages.movement import Movement
+from proxytune.study.stages.preflight import Preflight
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 
@@ -200,7 +200,7 @@ def test_what_was_cut_off_and_saved_is_told(result):
     assert cut_rows(result) == []
     assert study_document(result)["trials"][0]["cut_off"] is None
     first, *others = result.trials
-    cut = replace(first, state="cut", prpv=None, ppv=None, decided=("agent0", "agent2"), bound=12.0, estimate=17.5)
+    cut = replace(first, state="cut", score=17.5, measures={}, decided=("agent0", "agent2"), bound=12.0)
     found = replace(result, trials=(cut, *others), spared=(12, 3.456))
     (row,) = cut_rows(found)
     assert row == ("stopped early", "1 trial that could not be the best; saved 12 episodes (3.46 s)")

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis.diagnosis")
+HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis.result")
 
 
 @pytest.mark.parametrize(

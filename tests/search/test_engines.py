@@ -1,5 +1,6 @@
 import builtins
 import importlib.util
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -158,13 +159,30 @@ def test_every_engine_that_is_not_refused_can_be_made_and_has_a_digest_of_its_ow
 
 
 def test_an_unknown_engine_is_refused_with_the_nearest_name():
-    with pytest.raises(InputError, match="unknown engine 'sobool' .*; did you mean 'sobol'"):
+    with pytest.raises(
+        InputError, match=r"unknown engine 'sobool' \(your own is written module:attribute\); did you mean 'sobol'"
+    ):
         make_proposer("sobool", 3)
 
 
-def test_an_engine_in_a_file_that_is_not_there_is_refused_by_its_module(tmp_path):
-    with pytest.raises(InputError, match="engine 'not_there:ENGINE': no module 'not_there' in .* or installed"):
-        engine_of("not_there:ENGINE", tmp_path)
+def test_an_engine_in_a_file_of_ones_own_is_found_beside_and_goes_by_the_name_it_was_asked_for(tmp_path):
+    (tmp_path / "mine.py").write_text("from proxytune.search.engines.sobol import ENGINE\nNONE = 3\n")
+    assert engine_of("mine:ENGINE", tmp_path) == replace(engine_of("sobol"), name="mine:ENGINE")
+    with pytest.raises(InputError, match="engine 'mine:NONE' is a int; make it a proxytune"):
+        engine_of("mine:NONE", tmp_path)
+    with pytest.raises(InputError, match="engine 'nowhere:ENGINE': no module 'nowhere' installed"):
+        engine_of("nowhere:ENGINE")
+
+
+def test_the_code_of_ones_own_engine_is_part_of_what_its_runs_depend_on(tmp_path):
+    head = "from proxytune.search.engines.engine import Engine\n"
+    text = f"{head}class Mine:\n    step = 1\nENGINE = Engine('m', '', '', Mine)\n"
+    other, codes = text.replace("step = 1", "step = 2"), []
+    for place, source in (("one", text), ("same", f"# a comment\n{text}"), ("other", other)):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "mine.py").write_text(source)
+        codes.append(engine_code(engine_of("mine:ENGINE", tmp_path / place)))
+    assert codes[0] == codes[1] != codes[2]
 
 
 def test_every_engine_has_a_name_of_its_own_and_is_found_by_it():

@@ -13,11 +13,11 @@ from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import STUDY_ENGINES, make_proposer
 from proxytune.search.proposer import propose_batch
 from proxytune.storage.store import Store
-from proxytune.study.cutting import reference
 from proxytune.study.knowledge import goal_of
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
-from proxytune.study.stopping import stopped
+from proxytune.study.stages.cutting import reference
+from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import facts, open_study
 from proxytune.study.study_run import StudyRun
 
@@ -141,7 +141,7 @@ def test_rules_to_stop_are_asked_where_a_batch_has_ended(make_study):
     study = changed(folder, **hurried)
     with Store.read(folder) as store:
         assert stopped(StudyRun(study, store), trials) == ""
-        assert stopped(StudyRun(study, store), trials[:BATCH]).startswith("episodes have taken")
+        assert stopped(StudyRun(study, store), trials[:BATCH]).startswith("episodes took")
 
 
 class Listening(Silent):

@@ -14,19 +14,19 @@ from proxytune.search.engines.registry import make_proposer
 from proxytune.search.knowledge.misfit import Misfit
 from proxytune.seeds import fresh_seed
 from proxytune.storage.store import Store
-from proxytune.study import confirmation
-from proxytune.study.confirmation import (
+from proxytune.study.evaluation import plan, table
+from proxytune.study.knowledge import knowledge_of
+from proxytune.study.result import result_of
+from proxytune.study.run import run_study
+from proxytune.study.settings import StopRules
+from proxytune.study.stages import confirmation
+from proxytune.study.stages.confirmation import (
     CANDIDATES,
     candidates,
     confirmation_of,
     most_episodes,
     run_confirmation,
 )
-from proxytune.study.evaluation import plan, table
-from proxytune.study.knowledge import knowledge_of
-from proxytune.study.result import result_of
-from proxytune.study.run import run_study
-from proxytune.study.settings import StopRules
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import prpv

@@ -16,12 +16,12 @@ from proxytune.scores import Metric
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.cutting import reference, spared
 from proxytune.study.knowledge import goal_of
 from proxytune.study.outputs import score_trials
 from proxytune.study.rescoring import rescored
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
+from proxytune.study.stages.cutting import reference, spared
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

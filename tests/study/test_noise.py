@@ -5,9 +5,9 @@ import pytest
 
 from proxytune.storage.store import Store
 from proxytune.study.knowledge import goal_of
-from proxytune.study.noise import noise_of, shares_starts
-from proxytune.study.preflight import placement_pairs, run_preflight
 from proxytune.study.result import result_of
+from proxytune.study.stages.noise import noise_of, shares_starts
+from proxytune.study.stages.preflight import placement_pairs, run_preflight
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

@@ -10,9 +10,9 @@ from proxytune.errors import EpisodeError
 from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
 from proxytune.storage.store import Store
-from proxytune.study.movement import LEVEL, LOOKS, judge
-from proxytune.study.preflight import PAIRS, most_episodes, preflight_of, run_preflight
 from proxytune.study.run import run_study
+from proxytune.study.stages.movement import LEVEL, LOOKS, judge
+from proxytune.study.stages.preflight import PAIRS, most_episodes, preflight_of, run_preflight
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

@@ -7,7 +7,7 @@ from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.run import run_study
 from proxytune.study.settings import StopRules
-from proxytune.study.stopping import stopped
+from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

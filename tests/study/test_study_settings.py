@@ -74,10 +74,7 @@ BAD = {
     "no metric": ({"metrics": "[]"}, "metrics: is empty"),
     "a metric without direction": ({"metrics": '["distance"]'}, "metrics: metric 'distance': write NAME:max"),
     "a metric twice": ({"metrics": '["distance:max", "distance:min"]'}, "metrics: names a metric twice"),
-    "an unknown objective": ({"objective": '"prvp"'}, "objective: unknown value 'prvp'; did you mean 'prpv'?"),
     "an unknown rule": ({"on_failure": '"stopp"'}, "on_failure: unknown value 'stopp'; did you mean 'stop'?"),
-    "an unknown engine": ({"engine": '"tpr"'}, "engine: unknown value 'tpr'; did you mean 'tpe'?"),
-    "an engine for comparison only": ({"engine": '"skopt"'}, "engine: unknown value 'skopt'; known are: composite, gp"),
     "an unknown rule to stop": (
         {"stop": "{ wall_time = 5 }"},
         "stop.wall_time: unknown key; did you mean 'wall_time_s'",

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxytune.sweep.curves import Estimate, Series
-from proxytune.sweep.trend import shape_of, told
+from proxytune.sweep.trend import describe, shape_of
 from proxytune.usefulness.catalogue import PRPV
 from proxytune.usefulness.measure import ALL
 
@@ -68,7 +68,7 @@ def test_undefined_points_are_passed_over():
     assert (shape.best, shape.monotone) == ((2.0,), True)
     empty = series([None, None])
     assert shape_of(empty, 0.0).best == ()
-    assert told(empty, 0.0) == "PRPV: undefined at every point"
+    assert describe(empty, 0.0) == "PRPV: undefined at every point"
 
 
 def test_ties_for_the_best_are_all_named():
@@ -76,11 +76,11 @@ def test_ties_for_the_best_are_all_named():
 
 
 def test_the_line_says_where_it_is_lowest_and_what_each_side_does():
-    line = told(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
+    line = describe(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
     assert line.startswith("PRPV: lowest (1) at 2; not worse beyond noise: 2; from 2 downwards it worsens")
     assert "upwards it turns" in line
-    assert "from" not in told(series([9.0, 4.0, 1.0]), None)
-    assert "not worse beyond noise: 0, 2" in told(series([1.0, 5.0, 1.0]), None)
+    assert "from" not in describe(series([9.0, 4.0, 1.0]), None)
+    assert "not worse beyond noise: 0, 2" in describe(series([1.0, 5.0, 1.0]), None)
 
 
 @settings(derandomize=True, max_examples=50)

@@ -7,21 +7,21 @@ from taught import GRID, make_taught
 from proxytune.errors import EpisodeError, InputError, LearnerError, SettingsError
 from proxytune.running.progress import Silent
 from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import open_school, run_experiment
+from proxytune.teaching.experiment import load_setup, run_experiment
 
 
 def run(folder):
     settings = read_study_settings(folder)
-    return run_experiment(settings, open_school(settings), Silent())
+    return run_experiment(settings, load_setup(settings), Silent())
 
 
 def figures(found):
-    return {lesson.name: lesson.curve.scores.tolist() for lesson in found.lessons}
+    return {lesson.name: lesson.curve.scores.tolist() for lesson in found.teachers}
 
 
 def test_the_right_proxy_saves_target_samples_and_the_wrong_one_harms(make_study):
     found = run(make_taught(make_study))
-    worth = {lesson.name: lesson.worth for lesson in found.lessons}
+    worth = {lesson.name: lesson.worth for lesson in found.teachers}
     assert found.settled
     assert worth["right"].needed.value == 0.0
     assert worth["right"].plv.value == worth["right"].without.value > 0.0
@@ -44,7 +44,7 @@ def test_a_run_whose_cache_lost_any_of_its_pieces_comes_to_the_same(make_study, 
             path.unlink()
         again = run(folder)
         assert figures(again) == figures(whole)
-        assert [lesson.worth for lesson in again.lessons] == [lesson.worth for lesson in whole.lessons]
+        assert [lesson.worth for lesson in again.teachers] == [lesson.worth for lesson in whole.teachers]
 
 
 def test_what_is_cached_is_neither_driven_nor_trained_again(make_study, tmp_path):
@@ -73,7 +73,7 @@ def test_more_seeds_add_to_what_was_done(make_study, tmp_path):
 def test_a_target_budget_too_small_to_converge_is_no_plv(make_study):
     found = run(make_taught(make_study, grid=[0, 3, 6]))
     assert not found.settled
-    assert all(lesson.worth is None for lesson in found.lessons)
+    assert all(lesson.worth is None for lesson in found.teachers)
 
 
 def test_an_expert_that_cannot_drive_is_told_with_the_proxys_name(make_study):
@@ -119,7 +119,7 @@ def test_what_cannot_be_used_is_one_line_with_its_key(make_study, edit, says):
 
 def test_a_study_without_the_table_cannot_teach(make_study):
     with pytest.raises(SettingsError, match="teaching: is missing; add the table"):
-        open_school(read_study_settings(make_study()))
+        load_setup(read_study_settings(make_study()))
 
 
 def test_a_study_without_proxies_has_nothing_to_compare(make_study):

@@ -10,18 +10,19 @@ from proxytune.running.progress import Silent
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.store import Store
 from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import open_school
-from proxytune.teaching.search import OBJECTIVE, PlvSearch, distribution, search_space
+from proxytune.teaching.box import distribution, search_space
+from proxytune.teaching.experiment import load_setup
+from proxytune.teaching.search import OBJECTIVE, PlvSearch
 
 BOX = {"trim": "[-0.3, 0.3]"}
 
 
 def run(folder, left=None):
     settings = read_study_settings(folder)
-    school = open_school(settings)
-    space = search_space(settings, school.settings.widths, left or {})
+    setup = load_setup(settings)
+    space = search_space(settings, setup.settings.widths, left or {})
     with Store.open(folder) as store:
-        return PlvSearch(settings, school, store, space, Silent()).run(make_proposer("gp", settings.initial))
+        return PlvSearch(settings, setup, store, space, Silent()).run(make_proposer("gp", settings.initial))
 
 
 def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(make_study):
@@ -75,7 +76,7 @@ def test_a_batch_of_proxies_is_proposed_together_and_resumed_exactly(make_study)
 
 @pytest.mark.parametrize(
     ("rule", "reason"),
-    [("wall_time_s = 1e-9", "episodes have taken"), ("no_improvement = 1e9", "no θ is expected to improve PLV")],
+    [("wall_time_s = 1e-9", "episodes took"), ("no_improvement = 1e9", "no θ is expected to improve PLV")],
 )
 def test_a_rule_stops_it_and_without_the_rule_it_goes_on(make_study, rule, reason):
     folder = make_taught(make_study, parameters=BOX, more="budget = 4", initial="2")
@@ -111,8 +112,8 @@ def test_the_width_of_a_parameter_is_searched_beside_its_centre(make_study):
 
 
 def test_a_distribution_is_cut_off_at_what_a_parameter_can_be(make_study):
-    school = open_school(read_study_settings(make_taught(make_study)))
-    bounds = distribution(school, {"trim": 0.25, "trim width": 0.2, "delay": 0.1}).bounds
+    setup = load_setup(read_study_settings(make_taught(make_study)))
+    bounds = distribution(setup, {"trim": 0.25, "trim width": 0.2, "delay": 0.1}).bounds
     assert bounds["trim"] == pytest.approx((0.15, 0.3))
     assert bounds["delay"] == (0.1, 0.1)
 

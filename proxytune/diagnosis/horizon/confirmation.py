@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from proxytune.diagnosis.horizon.windows import Windows, strays_along
+from proxytune.diagnosis.horizon.windows import Windows, pose_errors_along
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.replay import measured_paths, twists_of
 from proxytune.driving.bullet.plant import BulletPlant
@@ -14,7 +14,7 @@ def has_body(drives: Drives) -> bool:
     return drives.robot.urdf is not None
 
 
-def bullet_strays(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+def bullet_pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """How far the bullet plant's pose is from the measured one (M, 2): distance [m], heading [rad].
 
     Each episode is driven in one go from its first command; windows compare the motion since their beginning.
@@ -25,4 +25,4 @@ def bullet_strays(drives: Drives, theta: Theta, windows: Windows) -> Floats:
         last = int(drives.last[drives.episode == episode].max())
         with BulletPlant(drives.robot, np.zeros(3), 1.0 / drives.tick_hz) as plant:
             poses[episode, :last], _ = plant.move(twists[episode, :last])
-    return strays_along(drives, measured_paths(drives, theta, poses), windows)
+    return pose_errors_along(drives, measured_paths(drives, theta, poses), windows)

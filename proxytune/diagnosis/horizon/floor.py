@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import chi2
 
-from proxytune.diagnosis.horizon.windows import Windows, measured_since
+from proxytune.diagnosis.horizon.windows import Windows, measured_motion
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.replay import increments
 from proxytune.space import Theta
@@ -51,7 +51,7 @@ def pose_noise(drives: Drives, theta: Theta) -> PoseNoise:
 
 
 def _third_differences(drives: Drives, steps: Floats, lag: int) -> Floats:
-    """Of the path that these steps make, over runs of unbroken poses (rows, 3)."""
+    """Third differences of the path that these steps make, over runs of unbroken poses (rows, 3)."""
     path = np.concatenate((np.zeros((1, 3)), np.cumsum(steps, axis=0)))
     start = np.arange(len(steps) - 3 * lag + 1)
     run = np.cumsum(~drives.linked)
@@ -85,6 +85,6 @@ def noise_floor(drives: Drives, windows: Windows, noise: PoseNoise) -> tuple[flo
 
     Both ends of a motion are measured, each with noise in x and y; the heading at its beginning turns all of it.
     """
-    chords = np.square(measured_since(drives, windows)[:, :2]).sum(axis=1).mean()
+    chords = np.square(measured_motion(drives, windows)[:, :2]).sum(axis=1).mean()
     place = 4.0 * noise.place**2 + noise.turn**2 * chords
     return float(np.sqrt(place)), float(np.sqrt(2.0) * noise.turn)

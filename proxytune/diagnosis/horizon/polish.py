@@ -14,16 +14,17 @@ from proxytune.diagnosis.horizon.windows import (
     Ratio,
     Windows,
     blocks_of,
-    chosen,
     cut,
-    measured_since,
-    misses,
+    measured_motion,
+    pose_differences,
+    pose_errors,
     ratio,
-    strays,
+    select_windows,
 )
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
-from proxytune.diagnosis.model.coordinates import Coordinate, placed, smooth, span
+from proxytune.diagnosis.model.coordinates import Coordinate, smooth_coordinates, span, theta_at
 from proxytune.diagnosis.model.fitting import STEP, Fit, evaluate
+from proxytune.diagnosis.rules import RULES
 from proxytune.space import Theta
 
 HORIZONS_S = (1.0, 2.0, 5.0)
@@ -31,9 +32,6 @@ HORIZONS_S = (1.0, 2.0, 5.0)
 
 FITTED_S = (5.0, 2.0)
 """Windows of these lengths are fitted to."""
-
-FEWEST_BLOCKS = 3
-"""No error is told over windows from fewer blocks: it would have no interval."""
 
 FOLDS = 4
 """Blocks are dealt out to so many folds; each is predicted by what was fitted to the others."""
@@ -45,13 +43,9 @@ MOST_WINDOWS = 400
 MOST_TRIALS = 20
 """A fit takes no more windows, and looks no more often: it stays within seconds on long logs."""
 
-HELPS, HARMS = 0.98, 1.02
-"""Fitted values are taken where they lower the held-out error to this share at some horizon and raise it so far at
-none: where they change nothing, single steps tell the parameters more sharply."""
-
 
 class Polish(NamedTuple):
-    """What fitting to windows came to.
+    """The result of fitting parameters to windows.
 
     Attributes:
         horizon_s: Length of the windows [s].
@@ -66,11 +60,11 @@ class Polish(NamedTuple):
 
 def horizons(drives: Drives) -> tuple[float, ...]:
     """The horizons of which these drives have windows in enough blocks."""
-    return tuple(h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= FEWEST_BLOCKS)
+    return tuple(h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= RULES.fewest_blocks)
 
 
 def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
-    """θ with its free coordinates where the model misses the poses in these windows least.
+    """Fit the free coordinates of θ to these windows: where the model misses their poses least.
 
     Args:
         drives: The measured drives.
@@ -78,10 +72,10 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
         free: What is fitted, except where it changes the motion by steps: single steps tell that far more sharply.
         windows: Windows over the drives; long logs are thinned to MOST_WINDOWS of them.
     """
-    fitted = smooth(free, drives.robot)
+    fitted = smooth_coordinates(free, drives.robot)
     if not fitted or len(windows.begin) == 0:
         return dict(theta)
-    problem = _problem(drives, theta, fitted, _thinned(windows))
+    problem = _problem(drives, theta, fitted, _thin(windows))
     found = least_squares(
         problem.left,
         problem.start,
@@ -116,10 +110,10 @@ class _Problem(NamedTuple):
 
     def at(self, fractions: Floats) -> dict[str, float]:
         low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
-        return placed(self.theta, self.free, low + fractions * (high - low))
+        return theta_at(self.theta, self.free, low + fractions * (high - low))
 
     def left(self, fractions: Floats) -> Floats:
-        return np.asarray((misses(self.drives, self.at(fractions), self.windows) * self.weights).ravel())
+        return np.asarray((pose_differences(self.drives, self.at(fractions), self.windows) * self.weights).ravel())
 
     def slopes(self, fractions: Floats) -> Floats:
         here, columns = self.left(fractions), []
@@ -132,17 +126,17 @@ class _Problem(NamedTuple):
 
 
 def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows) -> _Problem:
-    """Headings count as the way that they lead astray over the median chord."""
-    chord = float(np.median(np.hypot(*measured_since(drives, windows)[:, :2].T)))
+    """The least-squares problem of these windows; a heading error counts as the way it makes over the median chord."""
+    chord = float(np.median(np.hypot(*measured_motion(drives, windows)[:, :2].T)))
     return _Problem(drives, theta, free, windows, np.array((1.0, 1.0, max(chord, 1e-3))))
 
 
-def _thinned(windows: Windows) -> Windows:
+def _thin(windows: Windows) -> Windows:
     every = -(-len(windows.begin) // MOST_WINDOWS)
-    return chosen(windows, np.arange(len(windows.begin)) % every == 0)
+    return select_windows(windows, np.arange(len(windows.begin)) % every == 0)
 
 
-def held_out(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
+def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
     """Squared distance [m²] at every compared pose, by horizon [s].
 
     No pose is predicted by what was fitted to its own fold.
@@ -158,11 +152,11 @@ def held_out(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s:
     asked = {horizon: cut(drives, horizon) for horizon in horizons(drives)}
     found = {horizon: np.zeros(len(one.increment)) for horizon, one in asked.items()}
     for own in range(fold.max() + 1):
-        values = fit_windows(drives, theta, free, chosen(windows, fold[windows.begin] != own))
+        values = fit_windows(drives, theta, free, select_windows(windows, fold[windows.begin] != own))
         for horizon, one in asked.items():
             here = fold[one.begin] == own
             if here.any():
-                found[horizon][here[one.window]] = strays(drives, values, chosen(one, here))[:, 0] ** 2
+                found[horizon][here[one.window]] = pose_errors(drives, values, select_windows(one, here))[:, 0] ** 2
     return found
 
 
@@ -171,26 +165,27 @@ def _folds(drives: Drives) -> Whole:
     return np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
 
 
-def compared(drives: Drives, one: Mapping[float, Floats], other: Mapping[float, Floats]) -> dict[float, Ratio]:
+def compare_errors(drives: Drives, one: Mapping[float, Floats], other: Mapping[float, Floats]) -> dict[float, Ratio]:
     """The ratio of two errors over the same windows, by horizon [s]."""
     return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h))) for h, squares in one.items()}
 
 
-def polished(fitted: Fit) -> tuple[Fit, Polish | None]:
-    """The model with its parameters fitted to windows, if held-out windows show that this helps and nowhere harms."""
+def polish_fit(fitted: Fit) -> tuple[Fit, Polish | None]:
+    """Fit the parameters to windows, and keep that if held-out windows show that it helps and nowhere harms."""
     drives = fitted.drives
-    plain = {h: strays(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
+    plain = {h: pose_errors(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
     best: tuple[float, float, dict[float, Ratio]] | None = None
     for length in [s for s in FITTED_S if s in plain]:
-        ratios = compared(drives, held_out(drives, fitted.theta, fitted.free, length), plain)
+        ratios = compare_errors(drives, held_out_squares(drives, fitted.theta, fitted.free, length), plain)
         values = [one.value for one in ratios.values()]
-        if min(values) < HELPS and max(values) <= HARMS and (best is None or sum(values) < best[0]):
+        helps = min(values) < RULES.polish_helps and max(values) <= RULES.polish_harms
+        if helps and (best is None or sum(values) < best[0]):
             best = (sum(values), length, ratios)
     if best is None:
         return fitted, None
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
-    polish = Polish(best[1], best[2], _intervals(drives, theta, smooth(fitted.free, drives.robot), windows))
+    polish = Polish(best[1], best[2], _intervals(drives, theta, smooth_coordinates(fitted.free, drives.robot), windows))
     return evaluate(drives, theta, fitted.free, fitted.noise), polish
 
 

@@ -39,7 +39,7 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
     ticks = round(whole.tick_hz / log.rate_hz)
     windows = _windows(whole, log.episodes, starts, ticks)
     walked = window_paths(windows, theta, np.arange(len(windows.first)), reach * ticks)[:, ::ticks]
-    poses = _placed(windows.poses[:, 0], walked)
+    poses = _place_at(windows.poses[:, 0], walked)
     cuts = np.cumsum([len(rows) for rows in starts])[:-1]
     parts = zip(log.episodes, starts, np.split(poses, cuts), strict=True)
     return pd.concat([_rows(*part) for part in parts if len(part[1])], ignore_index=True)
@@ -75,7 +75,7 @@ def _windows(whole: Drives, episodes: Sequence[LogEpisode], starts: Sequence[Who
     return replace(whole, episode=number, first=first, last=first, poses=both, block=np.zeros_like(first))
 
 
-def _placed(start: Floats, walked: Floats) -> Floats:
+def _place_at(start: Floats, walked: Floats) -> Floats:
     """Paths (W, rows, 3) from the origin, put where they start (W, 3)."""
     turn = start[:, None, 2] - walked[:, :1, 2]
     cosine, sine = np.cos(turn), np.sin(turn)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.horizon.windows import Ratio, Windows, cut, measured_since, ratio, strays
+from proxytune.diagnosis.horizon.windows import Ratio, Windows, cut, measured_motion, pose_errors, ratio
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, sum_by
 from proxytune.space import Theta
 
@@ -16,7 +16,7 @@ ALIKE = 1e-6
 
 
 class Repeated(NamedTuple):
-    """What drives from the same commands say of a model.
+    """The scatter of drives from the same commands, beside the error of a model.
 
     Attributes:
         share: What they do not repeat, by the model's error over the same windows: at 1 it predicts all that repeats.
@@ -29,8 +29,8 @@ class Repeated(NamedTuple):
     part: float
 
 
-def repeated(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
-    """What drives do not repeat, and a model's error over the same windows; None where too little was driven twice.
+def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
+    """Compare a model's error with what drives do not repeat; None where too little was driven twice.
 
     Of windows driven n times the mean is taken off, and n/(n − 1) gives back
     what that takes: for two drives, √(½ mean square of their difference).
@@ -43,19 +43,19 @@ def repeated(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
     windows = cut(drives, horizon_s)
     if len(windows.begin) < FEWEST:
         return None
-    label, counts = _again(drives, windows)
+    label, counts = _label_repeats(drives, windows)
     kept = counts[label] > 1
     if len(np.unique(windows.window[kept])) < FEWEST:
         return None
-    apart = _apart(measured_since(drives, windows)[:, :2], label, counts)
-    missed = strays(drives, theta, windows)[:, 0] ** 2
+    apart = _scatter_of_repeats(measured_motion(drives, windows)[:, :2], label, counts)
+    missed = pose_errors(drives, theta, windows)[:, 0] ** 2
     first = np.flatnonzero(np.diff(windows.window, prepend=-1))
     share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])
     return Repeated(share, float(np.sqrt(apart[kept].mean())), float(kept.mean()))
 
 
-def _again(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
-    """For each compared pose what it is a repeat of (M,), and how often each of those was driven.
+def _label_repeats(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
+    """Label each compared pose by what it repeats (M,), and count how often each of those was driven.
 
     A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero.
     """
@@ -73,7 +73,7 @@ def _histories(drives: Drives) -> Whole:
     return np.asarray(np.cumsum((rounded * weights).sum(axis=-1), axis=1))
 
 
-def _apart(moved: Floats, label: Whole, counts: Whole) -> Floats:
+def _scatter_of_repeats(moved: Floats, label: Whole, counts: Whole) -> Floats:
     """Squared distance [m²] of each motion (M, 2) from the mean of its repeats, as if that were known without error."""
     mean = sum_by(label, moved, len(counts)) / counts[:, None]
     share = np.maximum(1, counts - 1)[label] / counts[label]

@@ -1,12 +1,12 @@
-"""How far windows stray, and how each weight of a learnt effect would move them."""
+"""The errors of windows, and how each weight of a learnt effect would move them."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.horizon.windows import Windows, chosen, cut
+from proxytune.diagnosis.horizon.windows import Windows, cut, select_windows
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, relative
-from proxytune.diagnosis.model.replay import tracked, window_features, window_twists
+from proxytune.diagnosis.model.replay import tracked_paths, window_features, window_twists
 from proxytune.driving.planar import integrate
 from proxytune.effects.learnt.effect import Learnt
 from proxytune.effects.learnt.table import is_learnt
@@ -36,11 +36,11 @@ class Slopes(NamedTuple):
     block: Whole
 
 
-def compared(drives: Drives) -> Windows:
-    """The windows and poses that are fitted."""
+def choose_windows(drives: Drives) -> Windows:
+    """Choose the windows and poses that are fitted: few enough, and evenly spread."""
     windows = cut(drives, FITTED_S)
     step = int(np.ceil(len(windows.begin) / MOST_WINDOWS))
-    windows = chosen(windows, np.arange(len(windows.begin)) % step == 0)
+    windows = select_windows(windows, np.arange(len(windows.begin)) % step == 0)
     tick = drives.last[windows.increment] - drives.first[windows.begin][windows.window]
     part = windows.window * POSES + np.minimum(POSES - 1, tick * POSES // (FITTED_S * drives.tick_hz)).astype(int)
     last = np.concatenate((part[1:] != part[:-1], [True]))
@@ -48,32 +48,32 @@ def compared(drives: Drives) -> Windows:
 
 
 def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
-    """Linearised round a model, which may have a learnt effect itself.
+    """Linearise windows in the weights of learnt curves, around a model that may have a learnt effect itself.
 
     Args:
         drives: What is fitted.
         theta: The model.
         offered: The curves whose weights may change.
     """
-    windows = compared(drives)
+    windows = choose_windows(drives)
     begin, window = windows.begin, windows.window
     tick = drives.last[windows.increment] - drives.first[begin][window]
     length = int(tick.max())
     named = {name: value for name, value in theta.items() if not is_learnt(name)}
     twists = window_twists(drives, theta, begin, length)
-    walked = tracked(drives, theta, twists)
-    said = relative(walked[window, 0], walked[window, tick])
-    seen = relative(drives.poses[begin[window], 0], drives.poses[windows.increment, 1])
-    way = float(np.median(np.hypot(seen[:, 0], seen[:, 1])))
+    walked = tracked_paths(drives, theta, twists)
+    predicted = relative(walked[window, 0], walked[window, tick])
+    measured = relative(drives.poses[begin[window], 0], drives.poses[windows.increment, 1])
+    way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
     features = window_features(drives, named, offered, begin, length)
-    parts = [_moved(drives, twists, walked, basis, unit)[window, tick - 1] for basis, unit in features]
+    parts = [_pose_slopes(drives, twists, walked, basis, unit)[window, tick - 1] for basis, unit in features]
     turn = walked[window, 0, 2]
-    columns = _turned(np.concatenate(parts, axis=-1), -turn)
+    columns = _turn_frames(np.concatenate(parts, axis=-1), -turn)
     scale = np.array((1.0, 1.0, way))
-    return Slopes((seen - said) * scale, columns * scale[:, None], drives.block[begin[window]])
+    return Slopes((measured - predicted) * scale, columns * scale[:, None], drives.block[begin[window]])
 
 
-def _moved(drives: Drives, twists: Floats, walked: Floats, basis: Floats, unit: Floats) -> Floats:
+def _pose_slopes(drives: Drives, twists: Floats, walked: Floats, basis: Floats, unit: Floats) -> Floats:
     """Change of the poses after each tick (W, length, 3, knots) per weight of a curve, to first order."""
     tick_s = 1.0 / drives.tick_hz
     poses = integrate(np.zeros((len(twists), 3)), twists, tick_s)
@@ -88,7 +88,7 @@ def _moved(drives: Drives, twists: Floats, walked: Floats, basis: Floats, unit: 
     return np.stack((shifted.real, shifted.imag, unit[2] * turned), axis=2)
 
 
-def _turned(changes: Floats, angle: Floats) -> Floats:
+def _turn_frames(changes: Floats, angle: Floats) -> Floats:
     """Changes of poses (M, 3, knots) seen from frames turned by minus an angle (M,)."""
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x = cosine * changes[:, 0] - sine * changes[:, 1]

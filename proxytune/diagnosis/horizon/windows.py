@@ -1,4 +1,4 @@
-"""Windows of prediction: how far a model that starts from a measured pose strays from what was measured."""
+"""Windows of prediction: the errors of a model that starts each window from the measured pose."""
 
 from typing import NamedTuple
 
@@ -9,13 +9,11 @@ from scipy.stats import wilcoxon
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, relative
 from proxytune.diagnosis.model.replay import window_paths
+from proxytune.diagnosis.rules import RULES
 from proxytune.space import Theta
 
 SHORTEST = 0.9
 """Windows that cover less of the horizon are left out: poses seldom end exactly at it, but a stub is no window."""
-
-P_VALUE = 0.025
-"""Ratios of so many blocks on one side of 1 are no chance."""
 
 
 class Windows(NamedTuple):
@@ -33,7 +31,7 @@ class Windows(NamedTuple):
 
 
 def cut(drives: Drives, horizon_s: float) -> Windows:
-    """Windows one after another, each within an unbroken run of poses."""
+    """Cut drives into windows one after another, each within an unbroken run of poses."""
     ticks = horizon_s * drives.tick_hz
     run = np.cumsum(~drives.linked) - 1
     start = drives.first[np.flatnonzero(~drives.linked)][run]
@@ -42,11 +40,11 @@ def cut(drives: Drives, horizon_s: float) -> Windows:
     begin = np.flatnonzero(np.concatenate(([True], label[1:] != label[:-1])))
     covered = np.maximum.reduceat(drives.last, begin) - drives.first[begin]
     long = covered >= SHORTEST * ticks - 1e-9
-    return chosen(Windows(begin, label, np.arange(len(label))), long)
+    return select_windows(Windows(begin, label, np.arange(len(label))), long)
 
 
-def chosen(windows: Windows, kept: NDArray[np.bool_]) -> Windows:
-    """Some of the windows (W,)."""
+def select_windows(windows: Windows, kept: NDArray[np.bool_]) -> Windows:
+    """Keep some of the windows (W,), renumbered."""
     entries = kept[windows.window]
     renumbered = np.cumsum(kept) - 1
     return Windows(windows.begin[kept], renumbered[windows.window[entries]], windows.increment[entries])
@@ -57,25 +55,25 @@ def blocks_of(drives: Drives, windows: Windows) -> Whole:
     return np.asarray(drives.block[windows.begin][windows.window])
 
 
-def misses(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    """By how much the model's motion since each window's beginning misses the measured one (M, 3): [m], [m], [rad]."""
+def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """The model's motion since each window's beginning less the measured one (M, 3): [m], [m], [rad]."""
     begin = windows.begin
     tick = drives.last[windows.increment] - drives.first[begin][windows.window]
     walked = window_paths(drives, theta, begin, int(tick.max()))
-    return relative(walked[windows.window, 0], walked[windows.window, tick]) - measured_since(drives, windows)
+    return relative(walked[windows.window, 0], walked[windows.window, tick]) - measured_motion(drives, windows)
 
 
-def strays(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """How far the model's pose is from the measured one (M, 2): distance [m], heading [rad]."""
-    return _size(misses(drives, theta, windows))
+    return _size(pose_differences(drives, theta, windows))
 
 
-def strays_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
-    """The same for paths that were driven in one go (E, T + 1, 3)."""
-    return _size(moved_along(drives, walked, windows) - measured_since(drives, windows))
+def pose_errors_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
+    """The errors (M, 2) of paths that were driven in one go (E, T + 1, 3)."""
+    return _size(motion_along(drives, walked, windows) - measured_motion(drives, windows))
 
 
-def moved_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
+def motion_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
     """Motion along such paths since each window's beginning (M, 3)."""
     begin = windows.begin[windows.window]
     return relative(
@@ -84,7 +82,7 @@ def moved_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
     )
 
 
-def measured_since(drives: Drives, windows: Windows) -> Floats:
+def measured_motion(drives: Drives, windows: Windows) -> Floats:
     """Measured motion since each window's beginning (M, 3)."""
     return relative(drives.poses[windows.begin[windows.window], 0], drives.poses[windows.increment, 1])
 
@@ -101,7 +99,7 @@ class Rmse(NamedTuple):
 
 
 class Ratio(NamedTuple):
-    """One error by another over the same windows.
+    """The ratio of two errors over the same windows.
 
     Attributes:
         value: The ratio of the two root mean squares.
@@ -118,22 +116,22 @@ class Ratio(NamedTuple):
     @property
     def below(self) -> bool:
         """Whether it is shown to be below 1, by its interval or, where few blocks weigh most, by signed ranks."""
-        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < P_VALUE)
+        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < RULES.ratio_p_value)
 
     @property
     def above(self) -> bool:
         """Whether it is shown to be above 1."""
-        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < P_VALUE)
+        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < RULES.ratio_p_value)
 
 
 def rmse(squares: Floats, blocks: Whole) -> Rmse:
     """The root mean square, with a t-interval on its logarithm from leaving blocks out in turn."""
-    return _root(float(np.log(squares.mean())), _half_width(_left_out(squares, blocks)))
+    return _root(float(np.log(squares.mean())), _half_width(_log_means_without_each(squares, blocks)))
 
 
 def ratio(after: Floats, before: Floats, blocks: Whole) -> Ratio:
     """The ratio of two root mean squares over the same windows, with its interval."""
-    half = _half_width(_left_out(after, blocks) - _left_out(before, blocks))
+    half = _half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
     value, interval = _root(float(np.log(after.mean() / before.mean())), half)
     return Ratio(value, interval, *_signed_ranks(after, before, blocks))
 
@@ -154,7 +152,7 @@ def _root(log: float, half: float) -> Rmse:
     return Rmse(value, (low, high))
 
 
-def _left_out(squares: Floats, blocks: Whole) -> Floats:
+def _log_means_without_each(squares: Floats, blocks: Whole) -> Floats:
     """Logarithm of the mean without each block."""
     _, label = np.unique(blocks, return_inverse=True)
     sums, counts = np.bincount(label, squares), np.bincount(label)

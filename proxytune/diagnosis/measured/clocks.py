@@ -1,4 +1,4 @@
-"""Do commands and poses share one clock? What shows that they do not, and drives put right.
+"""Whether commands and poses share one clock, and drives put right where they do not.
 
 Motion before its command is proof of two clocks; so is motion so late that no delay accounts for it, a drive that
 answers at another time than the others, and a drive that changes its time to answer in the middle. A constant offset
@@ -17,14 +17,23 @@ from proxytune.diagnosis.measured.latency import (
     Latency,
     Reaction,
     Speeds,
-    in_blocks_of,
-    likeliest,
+    likeliest_latency,
     measured_speeds,
     reaction,
     reaction_at,
     squares_by_latency,
+    sum_in_blocks,
 )
-from proxytune.diagnosis.measured.stretches import BLOCK_S, LEAST_S, SURE, Blocks, Jump, deviants, stretches, within
+from proxytune.diagnosis.measured.stretches import (
+    BLOCK_S,
+    LEAST_S,
+    SURE,
+    Blocks,
+    Jump,
+    blocks_within,
+    deviants,
+    stretches,
+)
 from proxytune.driving.robot import Robot
 from proxytune.effects import PARAMETERS
 from proxytune.logs import Log
@@ -85,7 +94,7 @@ class Clocks:
 
     @property
     def differ(self) -> bool:
-        """Whether there is anything to tell."""
+        """Whether any clock differs from another."""
         return bool(self.offset.value or self.drives or self.jumps)
 
 
@@ -107,16 +116,16 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
         return _one_clock(len(log.episodes))
     squares, latencies, apart = _squares(log, drives, speeds)
     kept, jumps = stretches(log, squares, latencies)
-    varied = not _rare(len({jump.drive for jump in jumps}), len(log.episodes))
+    varied = not _is_rare(len({jump.drive for jump in jumps}), len(log.episodes))
     if varied:
         kept, jumps = [(0.0, np.inf)] * len(log.episodes), ()
-    own = [squares.squares[within(squares, e, kept[e])] for e in range(len(log.episodes))]
+    own = [squares.squares[blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
     common, others = deviants(own, latencies)
-    others = {} if varied or not _rare(len(others), len(log.episodes)) else others
-    latency = likeliest(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
+    others = {} if varied or not _is_rare(len(others), len(log.episodes)) else others
+    latency = likeliest_latency(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
     unlike = like is not None and abs(latency.value - assumed) > max(LEAST_S, SURE * latency.deviation)
-    taken = unlike or (apart and _impossible(latency))
+    taken = unlike or (apart and _is_impossible(latency))
     later = np.full(len(own), assumed - latency.value if taken else 0.0)
     for e, one in others.items():
         later[e] -= one.value - common
@@ -131,7 +140,7 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     )
 
 
-def _rare(count: int, drives: int) -> bool:
+def _is_rare(count: int, drives: int) -> bool:
     """Whether so few drives are odd that it may be their clocks.
 
     A robot whose lag is another in every manoeuvre, as one that ramps its duties, has many.
@@ -140,18 +149,18 @@ def _rare(count: int, drives: int) -> bool:
 
 
 def _one_clock(episodes: int) -> Clocks:
-    """What is said of drives too short to tell."""
+    """The clocks of drives too short to tell: taken as one."""
     kept = np.tile((0.0, np.inf), (episodes, 1))
     return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), np.zeros(episodes), kept)
 
 
 def _squares(log: Log, drives: Drives, speeds: Speeds) -> tuple[Blocks, Floats, bool]:
-    """What the best reaction leaves of blocks at each latency, these, and whether its own is one that no delay has."""
+    """What the best reaction leaves of blocks, the latencies that is given at, and whether its own is impossible."""
     best, apart = _reaction(drives, speeds)
     latencies = best.latency_s + _grid(_reach(drives))
     ends = np.array([len(e.times) for e in log.episodes]) * round(drives.tick_hz / log.rate_hz)
     squares = squares_by_latency(drives, speeds, best, latencies, ends)
-    return Blocks(*in_blocks_of(BLOCK_S, drives, speeds, squares)), latencies, apart
+    return Blocks(*sum_in_blocks(BLOCK_S, drives, speeds, squares)), latencies, apart
 
 
 def _grid(reach_s: float) -> Floats:
@@ -169,7 +178,7 @@ def _offset(latency: Latency, besides: float) -> Offset:
     return Offset(middle, (middle - half, middle + half))
 
 
-def _impossible(latency: Latency) -> bool:
+def _is_impossible(latency: Latency) -> bool:
     """Whether no delay accounts for this latency."""
     half = 1.96 * latency.deviation
     early = latency.value + half < 0.0 and latency.value < -EARLIEST_S
@@ -183,13 +192,13 @@ def _reaction(drives: Drives, speeds: Speeds) -> tuple[Reaction, bool]:
     if 0.0 <= free.latency_s <= most:
         return free, False
     usual = min((reaction_at(drives, speeds, end) for end in (0.0, most)), key=lambda one: one.squares.sum())
-    _, _, better = in_blocks_of(PROOF_BLOCK_S, drives, speeds, usual.squares - free.squares)
+    _, _, better = sum_in_blocks(PROOF_BLOCK_S, drives, speeds, usual.squares - free.squares)
     sure = better.sum() > SURE * np.sqrt(len(better)) * better.std()
     return (free, True) if sure else (usual, False)
 
 
-def in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
-    """Drives on one clock: poses put later, jumping stretches left out.
+def put_in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
+    """Put drives on one clock: poses later, jumping stretches left out.
 
     Poses move by whole ticks, and commands by the fraction of a tick that is left.
 
@@ -207,7 +216,7 @@ def in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
         return drives if inside.all() else drives.only(inside)
     longer = max(0, int(ticks.max()))
     fraction = (ticks - later)[:, None, None]
-    duties = _longer(drives.duties, longer)
+    duties = _lengthen(drives.duties, longer)
     before = np.concatenate((drives.rest[:, None], duties[:, :-1]), axis=1)
     at = np.arange(duties.shape[1])
     known = np.arange(drives.headings.shape[1])
@@ -218,10 +227,10 @@ def in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
         headings=np.stack([np.interp(at - k, known, row) for k, row in zip(ticks, drives.headings, strict=True)]),
         first=drives.first + ticks[own],
         last=drives.last + ticks[own],
-        wheels=None if drives.wheels is None else _longer(drives.wheels, longer),
+        wheels=None if drives.wheels is None else _lengthen(drives.wheels, longer),
     )
     return moved.only(inside)
 
 
-def _longer(signal: Floats, ticks: int) -> Floats:
+def _lengthen(signal: Floats, ticks: int) -> Floats:
     return np.concatenate((signal, np.repeat(signal[:, -1:], ticks, axis=1)), axis=1)

@@ -87,18 +87,18 @@ def measured_speeds(drives: Drives) -> Speeds:
 
 
 def reaction(drives: Drives, speeds: Speeds, reach_s: float) -> Reaction:
-    """The best reaction with a latency of so much at most, either way: a rough look at all, a close one at the best."""
-    said = _Said(drives, reach_s + 1.0)
+    """The best reaction with a latency of at most `reach_s` either way: a rough look at all, then a close one."""
+    commanded = _CommandedSpeeds(drives, reach_s + 1.0)
     few = Speeds(*(part[::THINNED] for part in speeds))
     looks = [
-        (said.left(few, float(latency), constant), float(latency), constant)
+        (commanded.misfit(few, float(latency), constant), float(latency), constant)
         for constant in TIME_CONSTANTS_S
         for latency in np.arange(-reach_s, reach_s + 1e-9, ROUGH_STEP_S)
     ]
     _, latency, constant = min(looks)
 
     def left(point: Floats) -> float:
-        return said.left(speeds, float(np.clip(point[0], -reach_s, reach_s)), _constant(point[1]))
+        return commanded.misfit(speeds, float(np.clip(point[0], -reach_s, reach_s)), _constant(point[1]))
 
     root = float(np.sqrt(constant))
     corners = np.array([(latency, root), (latency + 0.06, root), (latency, root + 0.15)])
@@ -108,17 +108,20 @@ def reaction(drives: Drives, speeds: Speeds, reach_s: float) -> Reaction:
         method="Nelder-Mead",
         options={"xatol": 2e-3, "fatol": 1e-5, "maxfev": 60, "initial_simplex": corners},
     )
-    return said.reaction(speeds, float(np.clip(found.x[0], -reach_s, reach_s)), _constant(float(found.x[1])))
+    return commanded.reaction(speeds, float(np.clip(found.x[0], -reach_s, reach_s)), _constant(float(found.x[1])))
 
 
 def reaction_at(drives: Drives, speeds: Speeds, latency_s: float) -> Reaction:
     """The best reaction with this latency."""
-    said = _Said(drives, abs(latency_s))
+    commanded = _CommandedSpeeds(drives, abs(latency_s))
     top = float(np.sqrt(LONGEST_TIME_CONSTANT_S))
     found = minimize_scalar(
-        lambda root: said.left(speeds, latency_s, root**2), bounds=(0.0, top), method="bounded", options={"xatol": 5e-3}
+        lambda root: commanded.misfit(speeds, latency_s, root**2),
+        bounds=(0.0, top),
+        method="bounded",
+        options={"xatol": 5e-3},
     )
-    return said.reaction(speeds, latency_s, float(found.x) ** 2)
+    return commanded.reaction(speeds, latency_s, float(found.x) ** 2)
 
 
 def _constant(root: float) -> float:
@@ -126,8 +129,8 @@ def _constant(root: float) -> float:
     return float(min(root**2, LONGEST_TIME_CONSTANT_S))
 
 
-class _Said:
-    """What the commands say of speeds."""
+class _CommandedSpeeds:
+    """The speeds that commands ask for, at any latency and motor lag; the motion of the last lag is kept."""
 
     def __init__(self, drives: Drives, reach_s: float) -> None:
         self.drives = drives
@@ -157,15 +160,15 @@ class _Said:
             self.gone = {constant_s: gone}
         return self.gone[constant_s]
 
-    def left(self, speeds: Speeds, latency_s: float, constant_s: float) -> float:
+    def misfit(self, speeds: Speeds, latency_s: float, constant_s: float) -> float:
         """What the best gains leave of the speeds, as a share of their variances."""
         return float(self.reaction(speeds, latency_s, constant_s).squares.mean())
 
     def reaction(self, speeds: Speeds, latency_s: float, constant_s: float) -> Reaction:
         """The reaction with the best gains."""
-        told = self.speeds(speeds, latency_s, constant_s)
-        gains = np.linalg.pinv(told.T @ told, hermitian=True) @ (told.T @ speeds.values)
-        rest = speeds.values - told @ gains
+        asked = self.speeds(speeds, latency_s, constant_s)
+        gains = np.linalg.pinv(asked.T @ asked, hermitian=True) @ (asked.T @ speeds.values)
+        rest = speeds.values - asked @ gains
         size = speeds.values.std(axis=0) + 1e-9
         return Reaction(latency_s, constant_s, gains, rest.std(axis=0) + 1e-9, ((rest / size) ** 2).sum(axis=1))
 
@@ -179,21 +182,21 @@ def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencie
 
     Where the commands had ended, at tick `ends` (E,), nothing speaks for or against a latency.
     """
-    said = _Said(drives, float(np.abs(latencies).max()))
-    usual = _squares(said, speeds, robot, robot.latency_s)
+    commanded = _CommandedSpeeds(drives, float(np.abs(latencies).max()))
+    usual = _squares(commanded, speeds, robot, robot.latency_s)
     left = np.empty((len(speeds.episode), len(latencies)))
     for number, latency in enumerate(latencies):
         known = speeds.last - latency * drives.tick_hz <= ends[speeds.episode]
-        left[:, number] = np.where(known, _squares(said, speeds, robot, float(latency)), usual)
+        left[:, number] = np.where(known, _squares(commanded, speeds, robot, float(latency)), usual)
     return left
 
 
-def _squares(said: _Said, speeds: Speeds, robot: Reaction, latency_s: float) -> Floats:
-    rest = (speeds.values - said.speeds(speeds, latency_s, robot.time_constant_s) @ robot.gains) / robot.spread
+def _squares(commanded: _CommandedSpeeds, speeds: Speeds, robot: Reaction, latency_s: float) -> Floats:
+    rest = (speeds.values - commanded.speeds(speeds, latency_s, robot.time_constant_s) @ robot.gains) / robot.spread
     return np.asarray((rest**2).sum(axis=1))
 
 
-def likeliest(squares: Floats, latencies: Floats) -> Latency:
+def likeliest_latency(squares: Floats, latencies: Floats) -> Latency:
     """The latency at which squares summed over blocks (blocks, latencies) are least.
 
     Its deviation is that of the blocks' slopes there over the curvature; infinite where nothing tells it, as at either
@@ -211,7 +214,7 @@ def likeliest(squares: Floats, latencies: Floats) -> Latency:
     return Latency(float(latencies[middle]) - float(np.clip(slopes.sum() / curve, -1.0, 1.0)) * step, deviation)
 
 
-def in_blocks_of(seconds: float, drives: Drives, speeds: Speeds, values: Floats) -> tuple[Whole, Whole, Floats]:
+def sum_in_blocks(seconds: float, drives: Drives, speeds: Speeds, values: Floats) -> tuple[Whole, Whole, Floats]:
     """Sums of values of the spans (M, …) over blocks of time: episode and number in it (B,), sums (B, …)."""
     number = (speeds.first / drives.tick_hz / seconds).astype(int)
     most = int(number.max()) + 1

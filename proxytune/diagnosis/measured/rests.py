@@ -18,8 +18,8 @@ REST = 1e-3
 """A command below this share of the largest is none."""
 
 
-def without_long_rests(log: Log) -> Log:
-    """The log with a drive of its own for each stretch between long rests; the same log where there are none."""
+def cut_out_long_rests(log: Log) -> Log:
+    """Cut a log at its long rests into drives of their own; the same log where there are none."""
     if log.command == "none":
         return log
     pieces = tuple(piece for episode in log.episodes for piece in _pieces(episode, log.rate_hz))
@@ -29,15 +29,15 @@ def without_long_rests(log: Log) -> Log:
 
 def _pieces(episode: LogEpisode, rate_hz: float) -> tuple[LogEpisode, ...]:
     size = np.abs(episode.held).max(axis=1)
-    told = np.flatnonzero(size > REST * size.max())
-    if not len(told):
+    moving = np.flatnonzero(size > REST * size.max())
+    if not len(moving):
         return (episode,)
     most, rows = LONGEST_S * rate_hz, len(episode.times)
-    ends = np.flatnonzero(np.diff(told) > most)
-    begins = [int(row - BEFORE_S * rate_hz) for row in told[[0, *(ends + 1)]]]
-    stops = [int(row + AFTER_S * rate_hz) + 1 for row in told[[*ends, -1]]]
-    begins[0] = begins[0] if told[0] > most else 0
-    stops[-1] = stops[-1] if rows - 1 - told[-1] > most else rows
+    ends = np.flatnonzero(np.diff(moving) > most)
+    begins = [int(row - BEFORE_S * rate_hz) for row in moving[[0, *(ends + 1)]]]
+    stops = [int(row + AFTER_S * rate_hz) + 1 for row in moving[[*ends, -1]]]
+    begins[0] = begins[0] if moving[0] > most else 0
+    stops[-1] = stops[-1] if rows - 1 - moving[-1] > most else rows
     if (begins, stops) == ([0], [rows]):
         return (episode,)
     return tuple(_piece(episode, begin, stop) for begin, stop in zip(begins, stops, strict=True))

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.measured.clocks import Clocks, in_step
+from proxytune.diagnosis.measured.clocks import Clocks, put_in_step
 from proxytune.diagnosis.measured.drives import Drives, gather
-from proxytune.diagnosis.measured.thinning import thinned
+from proxytune.diagnosis.measured.thinning import thin
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
 from proxytune.logs import Log
@@ -38,7 +38,7 @@ class Parts(NamedTuple):
 
 
 def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = ()) -> Parts:
-    """Every third episode, or the second half of few, is kept to test on; or another log is.
+    """Keep every third episode to test on, or the second half of each where there are few, or another log.
 
     Args:
         log: What to fit, and to test on.
@@ -52,24 +52,27 @@ def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = (
     every = range(len(log.episodes))
     if test is not None:
         parts = Parts(
-            _gathered(log, robot, every, clocks[:1]), _gathered(test, robot, range(len(test.episodes)), clocks[1:])
+            _gather_on_one_clock(log, robot, every, clocks[:1]),
+            _gather_on_one_clock(test, robot, range(len(test.episodes)), clocks[1:]),
         )
     elif len(log.episodes) >= FEWEST_EPISODES:
-        fitted = _few(log, [i for i in every if i % 3 != 2])
-        parts = Parts(_gathered(log, robot, fitted, clocks), _gathered(log, robot, every[2::3], clocks))
+        fitted = _choose_some(log, [i for i in every if i % 3 != 2])
+        parts = Parts(
+            _gather_on_one_clock(log, robot, fitted, clocks), _gather_on_one_clock(log, robot, every[2::3], clocks)
+        )
     else:
-        parts = _halves(_gathered(log, robot, every, clocks))
+        parts = _halve(_gather_on_one_clock(log, robot, every, clocks))
     for name, drives in zip(("fit", "test on"), parts, strict=True):
         if drives.seconds < LEAST_S:
             raise LogError(
                 f"{log.name}: only {drives.seconds:.0f} s of measured motion to {name}, at least {LEAST_S:.0f} s are "
                 "needed for each; record more episodes"
             )
-    return Parts(thinned(in_blocks(parts.fitted)), in_blocks(parts.tested))
+    return Parts(thin(cut_into_blocks(parts.fitted)), cut_into_blocks(parts.tested))
 
 
-def _few(log: Log, chosen: Sequence[int]) -> list[int]:
-    """So many of these drives, spread evenly, that MOST_S are fitted; what is left over is not needed."""
+def _choose_some(log: Log, chosen: Sequence[int]) -> list[int]:
+    """Choose some of these drives, spread evenly, so that MOST_S are fitted; the rest is not needed."""
     seconds = sum(float(log.episodes[i].times[-1] - log.episodes[i].times[0]) for i in chosen)
     wanted = max(FEWEST_EPISODES, math.ceil(len(chosen) * min(1.0, MOST_S / max(seconds, 1.0))))
     count = min(len(chosen), wanted)
@@ -78,16 +81,16 @@ def _few(log: Log, chosen: Sequence[int]) -> list[int]:
 
 def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:
     """All of a log's drives, on one clock, in blocks."""
-    return in_blocks(_gathered(log, robot, range(len(log.episodes)), (clocks,)))
+    return cut_into_blocks(_gather_on_one_clock(log, robot, range(len(log.episodes)), (clocks,)))
 
 
-def _gathered(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:
-    """Some of a log's drives, on one clock."""
+def _gather_on_one_clock(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:
+    """Gather some of a log's drives, on one clock."""
     drives = gather(log, robot, [log.episodes[i] for i in chosen])
-    return in_step(drives, clocks[0], chosen) if clocks else drives
+    return put_in_step(drives, clocks[0], chosen) if clocks else drives
 
 
-def _halves(drives: Drives) -> Parts:
+def _halve(drives: Drives) -> Parts:
     early = np.zeros(len(drives.episode), dtype=bool)
     for episode in np.unique(drives.episode):
         own = drives.episode == episode
@@ -96,8 +99,8 @@ def _halves(drives: Drives) -> Parts:
     return Parts(drives.only(early), drives.only(~early))
 
 
-def in_blocks(drives: Drives) -> Drives:
-    """Drives whose episodes are cut into blocks until there are enough of them."""
+def cut_into_blocks(drives: Drives) -> Drives:
+    """Cut the episodes of drives into blocks until there are enough of them."""
     wanted = max(BLOCK_S, drives.seconds / BLOCKS)
     block = np.zeros(len(drives.episode), dtype=int)
     total = 0

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.measured.drives import Floats, Whole
-from proxytune.diagnosis.measured.latency import Latency, likeliest
+from proxytune.diagnosis.measured.latency import Latency, likeliest_latency
 from proxytune.logs import Log
 
 BLOCK_S = 2.0
@@ -51,7 +51,7 @@ class Blocks(NamedTuple):
     squares: Floats
 
 
-def within(blocks: Blocks, episode: int, kept: tuple[float, float]) -> Whole:
+def blocks_within(blocks: Blocks, episode: int, kept: tuple[float, float]) -> Whole:
     """The blocks of an episode that lie in a stretch [s]."""
     begin, end = blocks.number * BLOCK_S, (blocks.number + 1) * BLOCK_S
     return np.flatnonzero((blocks.episode == episode) & (begin >= kept[0]) & (end <= kept[1]))
@@ -83,7 +83,7 @@ def _jumps(squares: Floats, latencies: Floats, most: int) -> list[tuple[int, flo
     before = np.cumsum(squares, axis=0)[SIDE - 1 : len(squares) - SIDE]
     total = squares.sum(axis=0)
     at = int((before.min(axis=1) + (total - before).min(axis=1)).argmin()) + SIDE
-    one, other = (likeliest(part, latencies) for part in (squares[:at], squares[at:]))
+    one, other = (likeliest_latency(part, latencies) for part in (squares[:at], squares[at:]))
     by = other.value - one.value
     clear = abs(by) > max(LEAST_S, SURE_OF_A_JUMP * float(np.hypot(one.deviation, other.deviation)))
     shares = [_share(part, latencies, away.value) for part, away in ((squares[:at], other), (squares[at:], one))]
@@ -101,7 +101,7 @@ def _share(squares: Floats, latencies: Floats, elsewhere: float) -> float:
 
 def deviants(own: Sequence[Floats], latencies: Floats) -> tuple[float, dict[int, Latency]]:
     """The latency that most drives have, and the drives that clearly have another."""
-    judged = {e: likeliest(squares, latencies) for e, squares in enumerate(own) if len(squares) >= 2 * SIDE}
+    judged = {e: likeliest_latency(squares, latencies) for e, squares in enumerate(own) if len(squares) >= 2 * SIDE}
     judged = {e: one for e, one in judged.items() if np.isfinite(one.deviation)}
     if len(judged) < 2:
         return 0.0, {}

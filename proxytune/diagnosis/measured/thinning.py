@@ -19,19 +19,19 @@ JOINED_S = 0.1
 """Increments are joined up to this length; motors are slower."""
 
 
-def thinned(drives: Drives) -> Drives:
-    """Drives with at most about MOST increments: joined, then a stretch of each block, then fewer blocks."""
+def thin(drives: Drives) -> Drives:
+    """Thin drives to about MOST increments: join them, then keep a stretch of each block, then fewer blocks."""
     count = len(drives.episode)
     if count <= MOST:
         return drives
     usual = float(np.median(drives.last - drives.first)) / drives.tick_hz
-    shorter = joined(drives, min(-(-count // MOST), max(1, round(JOINED_S / usual))))
+    shorter = join_increments(drives, min(-(-count // MOST), max(1, round(JOINED_S / usual))))
     least = round(STRETCH_S * drives.tick_hz / float(np.median(shorter.last - shorter.first)))
-    return shorter.only(_stretches(shorter.block, MOST / len(shorter.episode), least))
+    return shorter.only(_choose_stretches(shorter.block, MOST / len(shorter.episode), least))
 
 
-def joined(drives: Drives, times: int) -> Drives:
-    """Every so many increments in a row as one, within unbroken runs of poses and blocks."""
+def join_increments(drives: Drives, times: int) -> Drives:
+    """Join every `times` increments in a row, within unbroken runs of poses and blocks."""
     if times == 1:
         return drives
     run = np.cumsum(~drives.linked | np.concatenate(([True], drives.block[1:] != drives.block[:-1])))
@@ -44,11 +44,12 @@ def joined(drives: Drives, times: int) -> Drives:
     return replace(whole, last=drives.last[ends], poses=poses, travel=travel, linked=drives.linked[begins])
 
 
-def _stretches(block: Whole, share: float, least: int) -> NDArray[np.bool_]:
+def _choose_stretches(block: Whole, share: float, least: int) -> NDArray[np.bool_]:
     """This share of each block in one piece, somewhere within it, of no fewer than `least` increments (N,)."""
     number = number_of(block)
     size = np.bincount(number)
     kept = np.minimum(size, np.maximum(np.ceil(min(1.0, share) * size).astype(int), least))
+    # Multiples of the golden ratio spread stretches evenly, in step with nothing that drives repeat.
     spread = np.arange(len(size)) * 0.6180339887 % 1.0
     begin = (spread * (size - kept)).astype(int)
     chosen = spread < max(MOST / kept.sum(), FEWEST_BLOCKS / len(size))

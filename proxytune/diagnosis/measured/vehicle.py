@@ -47,12 +47,12 @@ def _full_speed(log: Log) -> float:
     elif log.command == "wheel_speed":
         fastest = np.abs(commands).max(axis=1) * log.geometry["wheel_radius"]
     else:
-        fastest = _driven(log)
+        fastest = _speed_per_duty(log)
     digit = 10.0 ** (np.floor(np.log10(max(float(fastest.max(initial=0.0)), 1e-3))) - 1)
     return float(np.ceil(float(fastest.max(initial=1e-3)) / digit - 1e-9) * digit)
 
 
-def _driven(log: Log) -> Floats:
+def _speed_per_duty(log: Log) -> Floats:
     """Metres a second that the robot drove per unit of duty, over all drives together (1,)."""
     every = max(1, round(log.rate_hz / 2.0))
     way = duty = 0.0

@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, sum_by
 from proxytune.diagnosis.model.fitting import Fit
-from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, between, paths
+from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, increments_along, paths
 from proxytune.effects.trace import Draws
 
 MEMORY_S = 2.5
@@ -46,7 +46,7 @@ class RandomEffect(NamedTuple):
         effect: Its name in the catalogue.
         parameter: The name of its parameter in θ.
         value: Its likeliest size.
-        interval: Where the size lies; all sizes that are looked for, until `sized` has told.
+        interval: Where the size lies; all sizes that are looked for, until `size_random_effect` narrows them.
         gain: Its gain in log-likelihood beyond what chance gives on average [nats].
         p_value: How often chance gains as much.
     """
@@ -67,7 +67,7 @@ def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
     if len(answered.size) == 0:
         return ()
     rate = fitted.drives.rate_hz
-    return tuple(_weighed(name, draws, rate, answered) for name, draws in RANDOM_EFFECTS.items())
+    return tuple(_weigh(name, draws, rate, answered) for name, draws in RANDOM_EFFECTS.items())
 
 
 def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats:
@@ -76,7 +76,7 @@ def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats
     return np.asarray(np.logaddexp.reduce(ratios, axis=0))
 
 
-def _weighed(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
+def _weigh(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
     best, gain = likeliest_size(draws, rate_hz, answered.pull, answered.size)
     chance = np.max([_ratio(draws, rate_hz, size, answered.others, answered.size) for size in _grid(draws)], axis=0)
     p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
@@ -116,9 +116,9 @@ def responses(fitted: Fit, others: Floats) -> Responses:
         others: Other innovations, for which the same is asked (3N, columns).
     """
     drives = fitted.drives
-    changed, phase = _changed(drives)
-    here = between(drives, paths(drives, fitted.theta))
-    found = [_lost_together(fitted, changed[phase == number], here, others) for number in np.unique(phase)]
+    changed, phase = _changed_commands(drives)
+    here = increments_along(drives, paths(drives, fitted.theta))
+    found = [_respond_to_phase(fitted, changed[phase == number], here, others) for number in np.unique(phase)]
     if not found:
         return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
     pull, size, pulls = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
@@ -126,7 +126,7 @@ def responses(fitted: Fit, others: Floats) -> Responses:
     return Responses(pull[kept], size[kept], pulls[:, kept])
 
 
-def _changed(drives: Drives) -> tuple[Whole, Whole]:
+def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
     """Episode and tick of every command that differs from the one before it (C, 2), and its phase (C,).
 
     Those of one phase are at least MEMORY_S apart: of commands closer together than usual the first counts.
@@ -138,7 +138,7 @@ def _changed(drives: Drives) -> tuple[Whole, Whole]:
     return found[first], number[first] % math.ceil(MEMORY_S * drives.rate_hz)
 
 
-def _without(drives: Drives, lost: Whole) -> Floats:
+def _lose_commands(drives: Drives, lost: Whole) -> Floats:
     """Duties without some commands: the one before stays in force until the next."""
     duties = drives.duties.copy()
     for episode, tick in lost:
@@ -148,11 +148,11 @@ def _without(drives: Drives, lost: Whole) -> Floats:
     return duties
 
 
-def _lost_together(fitted: Fit, lost: Whole, here: Floats, others: Floats) -> tuple[Floats, Floats, Floats]:
+def _respond_to_phase(fitted: Fit, lost: Whole, here: Floats, others: Floats) -> tuple[Floats, Floats, Floats]:
     """Pull, size and other pulls of commands of one phase."""
     drives = fitted.drives
-    other = replace(drives, duties=_without(drives, lost))
-    change = fitted.whiten.whiten(here - between(other, paths(other, fitted.theta)))
+    other = replace(drives, duties=_lose_commands(drives, lost))
+    change = fitted.whiten.whiten(here - increments_along(other, paths(other, fitted.theta)))
     label = np.repeat(_label(drives, lost), 3)
     size = sum_by(label, change**2, len(lost))
     both = np.concatenate((fitted.innovations[:, None], others), axis=1)

@@ -7,13 +7,13 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, sum_by
-from proxytune.diagnosis.model.coordinates import Coordinate, is_stepwise, placed, smooth, span
+from proxytune.diagnosis.model.coordinates import Coordinate, is_stepwise, smooth_coordinates, span, theta_at
 from proxytune.diagnosis.model.innovations import (
     FIRST_GUESS,
     HUBER,
     Noise,
     Whitener,
-    clipped,
+    clip_outliers,
     fit_noise,
     huber,
     whitener,
@@ -62,25 +62,25 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
 
     Within a round the filter's gains are frozen: otherwise flat gains would pass for evidence.
     """
-    sloped = smooth(free, drives.robot)
+    sloped = smooth_coordinates(free, drives.robot)
     rough = tuple(coordinate for coordinate in free if coordinate not in sloped)
     for number in range(ROUNDS):
         whiten = whitener(drives, noise)
-        theta = _scanned(drives, theta, rough, whiten, SCANS[min(number, len(SCANS) - 1)])
+        theta = _scan(drives, theta, rough, whiten, SCANS[min(number, len(SCANS) - 1)])
         theta = _fit_theta(drives, theta, sloped, whiten)
         noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
     return evaluate(drives, theta, free, noise)
 
 
 def evaluate(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise) -> Fit:
-    """Residuals of fixed parameters on these drives; nothing is fitted."""
+    """Evaluate a model with its noise on these drives: innovations and slopes; nothing is fitted."""
     whiten = whitener(drives, noise)
     left = whiten.whiten(drives.measured - increments(drives, theta))
     return Fit(drives, theta, free, noise, whiten, left, slopes(drives, theta, free, whiten))
 
 
-def renoised(fitted: Fit, noise: Noise) -> Fit:
-    """The same model with another noise."""
+def replace_noise(fitted: Fit, noise: Noise) -> Fit:
+    """Evaluate the same model with another noise."""
     return evaluate(fitted.drives, fitted.theta, fitted.free, noise)
 
 
@@ -90,21 +90,21 @@ def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], white
     low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T
 
     def left(fractions: Floats) -> Floats:
-        moved = placed(theta, free, low + fractions * (high - low))
+        moved = theta_at(theta, free, low + fractions * (high - low))
         return whiten.whiten(drives.measured - increments(drives, moved))
 
     def slope(fractions: Floats) -> Floats:
-        return slopes(drives, placed(theta, free, low + fractions * (high - low)), free, whiten)
+        return slopes(drives, theta_at(theta, free, low + fractions * (high - low)), free, whiten)
 
     start = (np.array([theta[coordinate[0]] for coordinate in free]) - low) / (high - low)
     found = least_squares(
         left, np.clip(start, 1e-6, 1.0 - 1e-6), slope, (0.0, 1.0), loss="huber", f_scale=HUBER, ftol=1e-7, max_nfev=30
     )
-    return placed(theta, free, low + np.clip(found.x, 0.0, 1.0) * (high - low))
+    return theta_at(theta, free, low + np.clip(found.x, 0.0, 1.0) * (high - low))
 
 
-def _scanned(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats) -> Theta:
-    """The best value of each coordinate in which the motion changes by steps, all others held.
+def _scan(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats) -> Theta:
+    """Scan for the best value of each coordinate in which the motion changes by steps, all others held.
 
     Round numbers near by are looked at first: people set thresholds and steps to them, and a duty that lies just on one
     goes the other way at a value a hair beside it.
@@ -112,13 +112,13 @@ def _scanned(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten
     for coordinate in rough:
         low, high = span(coordinate, drives.robot)
         here = theta[coordinate[0]]
-        values = np.clip(np.concatenate((_round(here), [here], here * multiples)), low, high)
-        losses = [loss_of(drives, placed(theta, (coordinate,), np.array([value])), whiten) for value in values]
-        theta = placed(theta, (coordinate,), values[[int(np.argmin(losses))]])
+        values = np.clip(np.concatenate((_round_numbers(here), [here], here * multiples)), low, high)
+        losses = [loss_of(drives, theta_at(theta, (coordinate,), np.array([value])), whiten) for value in values]
+        theta = theta_at(theta, (coordinate,), values[[int(np.argmin(losses))]])
     return theta
 
 
-def _round(value: float) -> list[float]:
+def _round_numbers(value: float) -> list[float]:
     """The value with one, two and three significant figures."""
     return [float(f"{value:.{figures}g}") for figures in (1, 2, 3)]
 
@@ -143,28 +143,28 @@ def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: W
             continue
         low, high = span(coordinate, drives.robot)
         step = STEP if theta[coordinate[0]] + STEP * (high - low) <= high else -STEP
-        there = placed(theta, (coordinate,), np.array([theta[coordinate[0]] + step * (high - low)]))
+        there = theta_at(theta, (coordinate,), np.array([theta[coordinate[0]] + step * (high - low)]))
         columns.append((here - increments(drives, there)) / step)
     return whiten.whiten(np.stack(columns, axis=-1))
 
 
-def by_block(drives: Drives, values: Floats) -> Floats:
+def sum_by_block(drives: Drives, values: Floats) -> Floats:
     """Sums over the innovations of each block, (3N, …) to (blocks, …)."""
     return sum_by(np.repeat(drives.block, 3), values, int(drives.block.max()) + 1)
 
 
-def predictive(fitted: Fit) -> Floats:
+def held_out_log_likelihood(fitted: Fit) -> Floats:
     """Each block's log-likelihood under the model fitted to all others (blocks,), in nats.
 
     Leaving a block out moves the parameters by one Newton step.
     """
     sums = slopes_by_block(fitted, fitted.slopes)
-    shifted = left_out(fitted, fitted.slopes, sums, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
+    shifted = held_out_innovations(fitted, fitted.slopes, sums, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
     loss = huber(shifted).reshape(-1, 3).sum(axis=1) + fitted.whiten.log_determinant
     return sum_by(fitted.drives.block, -loss, int(fitted.drives.block.max()) + 1)
 
 
-def left_out(fitted: Fit, columns: Floats, sums: tuple[Floats, Floats], penalty: Floats) -> Floats:
+def held_out_innovations(fitted: Fit, columns: Floats, sums: tuple[Floats, Floats], penalty: Floats) -> Floats:
     """The innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it.
 
     Args:
@@ -184,6 +184,6 @@ def slopes_by_block(fitted: Fit, columns: Floats) -> tuple[Floats, Floats]:
     """Gradient (blocks, columns) and curvature (blocks, columns, columns) of each block's loss along the columns."""
     z, label = fitted.innovations, np.repeat(fitted.drives.block, 3)
     inner = columns * (np.abs(z) < HUBER)[:, None]
-    pull = by_block(fitted.drives, columns * clipped(z)[:, None])
+    pull = sum_by_block(fitted.drives, columns * clip_outliers(z)[:, None])
     curve = [columns[own].T @ inner[own] for own in (label == block for block in range(len(pull)))]
     return pull, np.stack(curve)

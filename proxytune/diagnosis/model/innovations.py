@@ -132,7 +132,7 @@ def huber(innovations: Floats) -> Floats:
     return np.where(size <= HUBER, 0.5 * size**2, HUBER * (size - 0.5 * HUBER))
 
 
-def clipped(innovations: Floats) -> Floats:
+def clip_outliers(innovations: Floats) -> Floats:
     """The slope of the loss: innovations, with outliers cut to HUBER."""
     return np.clip(innovations, -HUBER, HUBER)
 
@@ -148,15 +148,16 @@ def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
     A start from a model that misses much can end where all noise is too large. Of long drives a part is taken, the same
     for every model.
     """
-    kept = _part(len(errors))
+    kept = _choose_part(len(errors))
     if not kept.all():
         drives, errors = drives.only(kept), errors[kept]
     found = [_fit_noise(drives, errors, noise) for noise in dict.fromkeys((start, FIRST_GUESS))]
     return min(found, key=lambda pair: pair[0])[1]
 
 
-def _part(count: int) -> NDArray[np.bool_]:
+def _choose_part(count: int) -> NDArray[np.bool_]:
     """Runs of increments, spread evenly but in step with nothing that drives repeat."""
+    # Multiples of the golden ratio are spread evenly whatever their number.
     number = np.arange(count) // RUN
     return np.asarray(number * 0.6180339887 % 1.0 < THINNED / max(count, 1))
 
@@ -167,14 +168,14 @@ def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noi
     parts = _parts(drives)
 
     def surprise(logs: Floats) -> float:
-        return -float(log_likelihood(errors, _factor(parts, _scaled(scale, logs))).sum()) / len(errors)
+        return -float(log_likelihood(errors, _factor(parts, _scale_noise(scale, logs))).sum()) / len(errors)
 
     found = minimize(
         surprise, np.zeros(5), method="L-BFGS-B", bounds=bounds, options={"eps": 1e-4, "ftol": 1e-9, "maxiter": 60}
     )
-    return float(found.fun), _scaled(scale, found.x)
+    return float(found.fun), _scale_noise(scale, found.x)
 
 
-def _scaled(scale: Floats, logs: Floats) -> Noise:
+def _scale_noise(scale: Floats, logs: Floats) -> Noise:
     values = (scale * np.exp(logs)).tolist()
     return replace(FIRST_GUESS, drive=tuple(values[:3]), pose=tuple(values[3:]))

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from proxytune.diagnosis.measured.drives import Floats
-from proxytune.diagnosis.model.coordinates import Coordinate, is_stepwise, placed, span
-from proxytune.diagnosis.model.fitting import KEPT_SOLVABLE, Fit, by_block, slopes_by_block
+from proxytune.diagnosis.model.coordinates import Coordinate, is_stepwise, span, theta_at
+from proxytune.diagnosis.model.fitting import KEPT_SOLVABLE, Fit, slopes_by_block, sum_by_block
 from proxytune.diagnosis.model.innovations import huber
 from proxytune.diagnosis.model.replay import increments
 
@@ -18,15 +18,15 @@ LEAST = 0.003
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """95 % intervals of the fitted parameters, from what blocks say differently."""
-    smooth = _smooth(fitted)
+    smooth = _smooth_intervals(fitted)
     rough = (coordinate for coordinate in fitted.free if is_stepwise(coordinate, fitted.drives.robot))
     for coordinate in rough:
-        ends = _of_steps(fitted, coordinate)
+        ends = _stepwise_interval(fitted, coordinate)
         smooth |= dict.fromkeys(coordinate, ends)
     return smooth
 
 
-def _of_steps(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
+def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
     """From the best values without each block in turn (jackknife)."""
     low, high = span(coordinate, fitted.drives.robot)
     here = fitted.theta[coordinate[0]]
@@ -44,12 +44,12 @@ def _of_steps(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
 def _losses(fitted: Fit, coordinate: Coordinate, value: float) -> Floats:
     """Each block's loss at a value (blocks,) [nats]."""
     drives = fitted.drives
-    theta = placed(fitted.theta, (coordinate,), np.array([value]))
+    theta = theta_at(fitted.theta, (coordinate,), np.array([value]))
     left = fitted.whiten.whiten(drives.measured - increments(drives, theta))
-    return by_block(drives, huber(left))
+    return sum_by_block(drives, huber(left))
 
 
-def _smooth(fitted: Fit) -> dict[str, tuple[float, float]]:
+def _smooth_intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """From the spread between blocks (sandwich)."""
     pull, curve = slopes_by_block(fitted, fitted.slopes)
     blocks, count = pull.shape

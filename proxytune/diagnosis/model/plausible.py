@@ -50,19 +50,20 @@ def check_units(name: str, drives: Drives, theta: Theta) -> None:
     Raises:
         LogError: Saying which.
     """
-    said = increments(drives, theta)
-    told, driven = float(np.abs(said[:, 0]).sum()), float(drives.travel[:, 0].sum())
-    if told > LEAST_TRAVEL_M and not 1.0 / MOST_TIMES < driven / told < MOST_TIMES:
+    asked = increments(drives, theta)
+    way, driven = float(np.abs(asked[:, 0]).sum()), float(drives.travel[:, 0].sum())
+    if way > LEAST_TRAVEL_M and not 1.0 / MOST_TIMES < driven / way < MOST_TIMES:
         raise LogError(
-            f"{name}: the poses say that the robot drove {driven:.3g} m where its commands say {told:.3g} m; check the "
+            f"{name}: the poses say that the robot drove {driven:.3g} m where its commands say {way:.3g} m; check the "
             "units (m, rad) and the robot's figures"
         )
-    seen = drives.measured
-    course = float(np.degrees(np.arctan2(said[:, 0] @ seen[:, 1], said[:, 0] @ seen[:, 0])))
+    moved = drives.measured
+    course = float(np.degrees(np.arctan2(asked[:, 0] @ moved[:, 1], asked[:, 0] @ moved[:, 0])))
     if abs(course) > MOST_ASKEW_DEG:
         raise LogError(
             f"{name}: the robot drives {course:.0f}° from where its heading points; check the heading's zero, and "
             "which way x and y go"
         )
-    if said[:, 2] @ seen[:, 2] < -0.5 * np.sqrt((said[:, 2] @ said[:, 2]) * (seen[:, 2] @ seen[:, 2])):
+    turn, turned = asked[:, 2], moved[:, 2]
+    if turn @ turned < -0.5 * np.sqrt((turn @ turn) * (turned @ turned)):
         raise LogError(f"{name}: the robot turns the other way than its commands say; check the signs, left and right")

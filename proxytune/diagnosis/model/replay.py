@@ -1,4 +1,4 @@
-"""What a model says of the recorded commands: the planar plant over whole batches of drives."""
+"""Replaying recorded commands through a model: the planar plant over whole batches of drives."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,7 +25,7 @@ def lateness(theta: Theta, rate_hz: float) -> float:
     return sum((draws.lateness(value, rate_hz).mean_s for draws, value in drawn if value > 0.0), 0.0)
 
 
-def expected(theta: Theta, rate_hz: float) -> dict[str, float]:
+def expected_theta(theta: Theta, rate_hz: float) -> dict[str, float]:
     """θ without random effects, their mean lateness added to the delay."""
     late = lateness(theta, rate_hz)
     calm = {name: value for name, value in theta.items() if name not in RANDOM_EFFECTS}
@@ -44,7 +44,7 @@ def paths(drives: Drives, theta: Theta) -> Floats:
     Raises:
         SettingsError: If a value is out of its parameter's bounds.
     """
-    return _seen(drives, twists_of(drives, theta), _model(drives, theta)[1])
+    return _integrate_and_track(drives, twists_of(drives, theta), _model(drives, theta)[1])
 
 
 def twists_of(drives: Drives, theta: Theta) -> Floats:
@@ -55,27 +55,27 @@ def twists_of(drives: Drives, theta: Theta) -> Floats:
 
 def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
     """Poses after each tick (E, T, 3) from the origin on, as a model's tracker sees them (E, T + 1, 3)."""
-    return _tracked(drives, poses, _model(drives, theta)[1])
+    return _track(drives, poses, _model(drives, theta)[1])
 
 
 def increments(drives: Drives, theta: Theta) -> Floats:
     """The motion between the measured poses (N, 3): forward, left [m], turn [rad], in the body frame."""
-    return between(drives, paths(drives, theta))
+    return increments_along(drives, paths(drives, theta))
 
 
-def between(drives: Drives, walked: Floats) -> Floats:
+def increments_along(drives: Drives, walked: Floats) -> Floats:
     """The increments of paths (E, T + 1, 3) between the measured poses."""
     return relative(walked[drives.episode, drives.first], walked[drives.episode, drives.last])
 
 
-def moved_by(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+def increments_of_twists(drives: Drives, theta: Theta, twists: Floats) -> Floats:
     """The increments that these twists of every tick (E, T, 3) make, as a model's tracker sees them."""
-    return between(drives, _seen(drives, twists, _model(drives, theta)[1]))
+    return increments_along(drives, _integrate_and_track(drives, twists, _model(drives, theta)[1]))
 
 
-def disturbed(drives: Drives, theta: Theta, extra: Floats) -> Floats:
+def disturbed_increments(drives: Drives, theta: Theta, extra: Floats) -> Floats:
     """The increments when something adds to the twist of every tick (E, T, 3)."""
-    return moved_by(drives, theta, twists_of(drives, theta) + extra)
+    return increments_of_twists(drives, theta, twists_of(drives, theta) + extra)
 
 
 def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
@@ -90,7 +90,7 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
         begin: The increments at whose beginnings the windows start (W,).
         length: Ticks to go on for; commands after an episode's end are those at its end.
     """
-    return _seen(drives, window_twists(drives, theta, begin, length), _model(drives, theta)[1])
+    return _integrate_and_track(drives, window_twists(drives, theta, begin, length), _model(drives, theta)[1])
 
 
 def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
@@ -107,7 +107,7 @@ def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Fl
     else:
         turning = replace(setting, rest=drives.wheels[episode, start])
         wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
-    ahead = _ahead(drives, begin, _before(drives, theta, train))
+    ahead = _window_setting(drives, begin, _twists_before(drives, theta, train))
     driven = replace(setting, rest=np.zeros((len(whole), 3)))
     past = train.motion.begin_amid(ahead, driven, train.ideal(whole), episode, start)
     return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
@@ -122,17 +122,17 @@ def window_features(
         Features (W, length, knots) and the twist that one unit of them makes (3,).
     """
     whole = twists_of(drives, theta)
-    past = learnt.recall(_ahead(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
+    past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
     return learnt.features(window_twists(drives, theta, begin, length), past)
 
 
-def tracked(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:
     """Measured poses, from the origin on, that twists lead to (W, length + 1, 3)."""
-    return _seen(drives, twists, _model(drives, theta)[1])
+    return _integrate_and_track(drives, twists, _model(drives, theta)[1])
 
 
-def _ahead(drives: Drives, begin: Whole, before: Floats) -> Setting:
-    """What the motion effects of windows are told: the motion before each one, where it is, and how its wheels are."""
+def _window_setting(drives: Drives, begin: Whole, before: Floats) -> Setting:
+    """The setting of motion effects in windows: the motion before each, its place, and the angles of its wheels."""
     episode, start = drives.episode[begin], drives.first[begin]
     return replace(
         _setting(drives),
@@ -143,7 +143,7 @@ def _ahead(drives: Drives, begin: Whole, before: Floats) -> Setting:
     )
 
 
-def _before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:
+def _twists_before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:
     """The motion in the tick before each (E, T, 3), as effects that remember it need it; none before the first."""
     still = np.zeros((*drives.duties.shape[:2], 3))
     if train.motion.effects:
@@ -152,12 +152,12 @@ def _before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:
 
 
 def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
-    """The wheel speeds that a model says (E, T, 2), as fractions of full speed."""
+    """The wheel speeds of a model (E, T, 2), as fractions of full speed."""
     return _wheel_speeds(drives, _model(drives, theta)[0], _setting(drives))
 
 
 def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
-    """The same with random effects as one seed draws them, instead of as expected."""
+    """The wheel speeds (E, T, 2) with random effects as one seed draws them, instead of as expected."""
     robot = drives.robot
     train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue))
     return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
@@ -169,7 +169,7 @@ def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
     effects = effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue)
     train = drivetrain(robot, effects)
     twists, _ = train.apply(drives.duties, train.begin(replace(_setting(drives), seed=seed)))
-    return _seen(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
+    return _integrate_and_track(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
 
 
 def _wheel_speeds(drives: Drives, train: Drivetrain, setting: Setting) -> Floats:
@@ -186,7 +186,7 @@ def arrived_commands(drives: Drives, theta: Theta) -> Floats:
 
 def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
     robot = drives.robot
-    effects = effects_from(expected({**robot.theta, **theta}, drives.rate_hz), robot.figures, robot.catalogue)
+    effects = effects_from(expected_theta({**robot.theta, **theta}, drives.rate_hz), robot.figures, robot.catalogue)
     return drivetrain(robot, effects), stage_chain(effects, Stage.MEASUREMENT)
 
 
@@ -196,11 +196,11 @@ def _setting(drives: Drives) -> Setting:
     return replace(setting, headings=drives.headings, places=drives.places, angles=drives.angles)
 
 
-def _seen(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
-    return _tracked(drives, integrate(np.zeros((len(twists), 3)), twists, 1.0 / drives.tick_hz), measurement)
+def _integrate_and_track(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
+    return _track(drives, integrate(np.zeros((len(twists), 3)), twists, 1.0 / drives.tick_hz), measurement)
 
 
-def _tracked(drives: Drives, poses: Floats, measurement: Chain) -> Floats:
+def _track(drives: Drives, poses: Floats, measurement: Chain) -> Floats:
     start = np.zeros((len(poses), 1, 3))
     walked = np.concatenate((start, poses), axis=1)
     if not measurement.effects:

@@ -3,56 +3,56 @@
 import numpy as np
 
 from proxytune.diagnosis.model.events import RandomEffect
-from proxytune.diagnosis.model.fitting import Fit, fit, predictive
+from proxytune.diagnosis.model.fitting import Fit, fit, held_out_log_likelihood
 from proxytune.diagnosis.naming.candidates import Candidate
-from proxytune.diagnosis.naming.choice import Choice, no_worse
-from proxytune.diagnosis.naming.found import Adopted, Variant, lacking
-from proxytune.diagnosis.naming.round import LEAST_GAIN, Round
+from proxytune.diagnosis.naming.choice import Choice, predicts_no_worse
+from proxytune.diagnosis.naming.evidence import Evidence, FittedLead
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Variant, without_effect
 from proxytune.diagnosis.naming.screening import Lead
-
-NATS_APART = 3.0
-COSINE_APART = 0.95
-"""Effects closer than this in evidence, or in what they do to the innovations, are rivals."""
-
-RIVAL_SHARE = 0.7
-"""Effects are rivals too if the second has this share of the evidence and predicts no worse."""
+from proxytune.diagnosis.rules import RULES
 
 
-def adopt(adopted: list[Adopted], best: Choice, looked: Round) -> list[Adopted]:
-    """The effects of a model with another, which has its rivals."""
-    return [*adopted, _drawn(best.random, looked) if best.random else _steady(best, looked)]
+def adopt(adopted: list[AdoptedEffect], best: Choice, evidence: Evidence) -> list[AdoptedEffect]:
+    """The effects of a model and one more, with the rivals that the same evidence leaves it.
+
+    Args:
+        adopted: The effects so far.
+        best: The effect that is adopted.
+        evidence: What spoke for it and for all others.
+    """
+    return [*adopted, _adopt_random(best.random, evidence) if best.random else _adopt_lead(best, evidence)]
 
 
-def _steady(best: Choice, looked: Round) -> Adopted:
+def _adopt_lead(best: Choice, evidence: Evidence) -> AdoptedEffect:
     assert best.lead is not None
     candidate = best.lead.candidate
     names = tuple(dict.fromkeys([name for names in candidate.free for name in names] + list(candidate.fixed)))
-    rivals = _rivals(best.lead, best.fitted, best.gain, looked)
-    return Adopted(candidate.effect, candidate.form, names, candidate.free, best.gain, best.lead.p_value, rivals)
+    rivals = _rivals(best.lead, best.fitted, best.gain, evidence)
+    return AdoptedEffect(candidate.effect, candidate.form, names, candidate.free, best.gain, best.lead.p_value, rivals)
 
 
-def _drawn(effect: RandomEffect, looked: Round) -> Adopted:
-    least = min(effect.gain - NATS_APART, RIVAL_SHARE * effect.gain)
-    close = [other for other in looked.random if other.effect != effect.effect and other.gain > least]
+def _adopt_random(effect: RandomEffect, evidence: Evidence) -> AdoptedEffect:
+    least = min(effect.gain - RULES.rival_nats, RULES.rival_share * effect.gain)
+    close = [other for other in evidence.random if other.effect != effect.effect and other.gain > least]
     rivals = tuple(Candidate(other.effect, "", ((other.parameter,),), {}, (0.0,), ((other.value,),)) for other in close)
-    return Adopted(
+    return AdoptedEffect(
         effect.effect, "", (effect.parameter,), (), effect.gain, effect.p_value, rivals, interval=effect.interval
     )
 
 
-def _rivals(best: Lead, chosen: Fit, gain: float, looked: Round) -> tuple[Candidate, ...]:
-    found: dict[str, Candidate] = {}
-    for lead in looked.leads:
-        other = looked.fits.get(lead.candidate.label)
-        close = other is not None and (other[2] > gain - NATS_APART or _as_good(other, gain, chosen))
-        if lead.candidate.effect != best.candidate.effect and (close or _cosine(lead, best) > COSINE_APART):
-            found.setdefault(lead.candidate.effect, lead.candidate)
-    return tuple(found.values())
+def _rivals(best: Lead, chosen: Fit, gain: float, evidence: Evidence) -> tuple[Candidate, ...]:
+    rivals: dict[str, Candidate] = {}
+    for lead in evidence.leads:
+        other = evidence.fits.get(lead.candidate.label)
+        close = other is not None and (other.gain > gain - RULES.rival_nats or _is_as_good(other, gain, chosen))
+        if lead.candidate.effect != best.candidate.effect and (close or _cosine(lead, best) > RULES.rival_cosine):
+            rivals.setdefault(lead.candidate.effect, lead.candidate)
+    return tuple(rivals.values())
 
 
-def _as_good(other: tuple[Lead, Fit, float], gain: float, chosen: Fit) -> bool:
-    """Whether it has most of the evidence and predicts no worse, block by block."""
-    return other[2] >= RIVAL_SHARE * gain and no_worse(other[1], chosen)
+def _is_as_good(other: FittedLead, gain: float, chosen: Fit) -> bool:
+    """Whether another effect has most of the evidence and predicts no worse, block by block."""
+    return other.gain >= RULES.rival_share * gain and predicts_no_worse(other.fitted, chosen)
 
 
 def _cosine(one: Lead, other: Lead) -> float:
@@ -60,12 +60,18 @@ def _cosine(one: Lead, other: Lead) -> float:
     return float(one.column @ other.column) / size if size > 0.0 else 0.0
 
 
-def without_idle(model: Fit, adopted: list[Adopted]) -> tuple[Fit, list[Adopted]]:
-    """Drop what no longer pays beside the effect adopted last."""
+def drop_idle(model: Fit, adopted: list[AdoptedEffect]) -> tuple[Fit, list[AdoptedEffect]]:
+    """Drop the first effect that no longer pays beside the one adopted last; at most one a round.
+
+    Random effects stay: they move no mean, so the likelihood of the mean cannot speak for them.
+    """
     for effect in adopted[:-1]:
         if effect.free and len(adopted) > 1:
-            rest = lacking(Variant(model.theta, model.free), effect, model.drives.rate_hz)
+            rest = without_effect(Variant(model.theta, model.free), effect, model.drives.rate_hz)
             without = fit(model.drives, rest.theta, rest.free, model.noise)
-            if float(predictive(model).sum() - predictive(without).sum()) < LEAST_GAIN:
+            if (
+                float(held_out_log_likelihood(model).sum() - held_out_log_likelihood(without).sum())
+                < RULES.least_gain_nats
+            ):
                 return without, [other for other in adopted if other is not effect]
     return model, adopted

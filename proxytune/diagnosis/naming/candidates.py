@@ -84,7 +84,9 @@ def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, 
     parameters = {parameter.name: parameter for parameter in kind.parameters}
     held = {name for coordinate in form.free for name in coordinate}
     tried = [
-        _away(parameters[first], known[first]) if first in form.moved or not form.moved else repeat(known[first])
+        _other_probes(parameters[first], known[first])
+        if first in form.moved or not form.moved
+        else repeat(known[first])
         for first, *_ in form.free
     ]
     return Candidate(
@@ -97,6 +99,6 @@ def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, 
     )
 
 
-def _away(parameter: Parameter, here: float) -> tuple[float, ...]:
+def _other_probes(parameter: Parameter, here: float) -> tuple[float, ...]:
     """The probes that differ from where the model is."""
     return tuple(value for value in parameter.probes if not math.isclose(value, here, abs_tol=1e-9))

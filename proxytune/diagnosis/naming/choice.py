@@ -1,41 +1,22 @@
-"""Which of the effects that were looked at is adopted next, if any."""
+"""The choice of the effect that is adopted next, if any."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.horizon.windows import blocks_of, cut, ratio, strays
+from proxytune.diagnosis.horizon.windows import blocks_of, cut, pose_errors, ratio
 from proxytune.diagnosis.model.coordinates import at_edge
 from proxytune.diagnosis.model.events import RandomEffect
 from proxytune.diagnosis.model.fitting import Fit, fit
 from proxytune.diagnosis.model.replay import lateness
-from proxytune.diagnosis.naming.round import Round
+from proxytune.diagnosis.naming.evidence import Evidence
 from proxytune.diagnosis.naming.screening import Lead
-
-CLEAR_GAIN = 30.0
-"""Nats that a random effect must gain: its chance is drawn from shifted innovations, which is rough."""
-
-P_VALUE = 0.01
-"""Chance must gain as much as rarely as this."""
-
-PLAIN_SHARE = 0.8
-"""An effect of both wheels is preferred to one of a single wheel if it gains this share."""
-
-WITHIN_SHARE = 0.8
-"""An effect within its range is preferred to one at an end of it if it gains this share and predicts no worse."""
-
-MOST_PLACES = 0.9
-"""A part of the map that holds more of the drives than this is no part."""
-
-ERROR_HORIZON_S = 2.0
-ERROR_FACTOR = 1.05
-"""A model predicts worse if its error over windows of this horizon is shown to be larger by more than this factor: such
-an effect is not adopted, whatever the evidence of single steps."""
+from proxytune.diagnosis.rules import RULES
 
 
 class Choice(NamedTuple):
-    """An effect that may be adopted: one that draws (`random`) or another (`lead`), and the model with it.
+    """An effect that may be adopted, and the model with it; either `lead` or `random` is given.
 
     Attributes:
         gain: Evidence for it [nats].
@@ -50,35 +31,44 @@ class Choice(NamedTuple):
     random: RandomEffect | None = None
 
 
-def best_of(model: Fit, looked: Round, least: float) -> Choice | None:
-    """The effect with most evidence, if that is more than chance and predicts no worse."""
-    fits = [Choice(gain, fitted, lead) for lead, fitted, gain in looked.fits.values() if lead.p_value <= P_VALUE]
+def choose_best(model: Fit, evidence: Evidence, least: float) -> Choice | None:
+    """The effect with most evidence, if that is more than chance and predicts no worse.
+
+    Args:
+        model: The model without it.
+        evidence: What speaks for each effect.
+        least: Evidence that it needs [nats].
+    """
+    leads = [one for one in evidence.fits.values() if one.lead.p_value <= RULES.p_value]
+    fits = [Choice(one.gain, one.fitted, one.lead) for one in leads]
     named = [choice for choice in fits if not _is_everywhere(choice)]
-    clear = [effect for effect in looked.random if effect.p_value <= P_VALUE and effect.gain >= CLEAR_GAIN]
+    rare = [effect for effect in evidence.random if effect.p_value <= RULES.p_value]
+    clear = [effect for effect in rare if effect.gain >= RULES.least_random_gain_nats]
     everything: list[Choice | RandomEffect] = [*named, *clear]
     ranked = sorted(everything, key=lambda one: -one.gain)
-    enough = (choice_of(model, found) for found in ranked if found.gain >= least)
-    best = next((choice for choice in enough if no_worse(choice.fitted, model)), None)
+    # Generators, here and below: a random effect costs a fit, which is made only once its turn comes.
+    enough = (fit_choice(model, one) for one in ranked if one.gain >= least)
+    best = next((choice for choice in enough if predicts_no_worse(choice.fitted, model)), None)
     if best is None:
         return None
     plain = next((choice for choice in named if _is_plain_form_of(choice, best)), best)
-    return plain if not _is_at_edge(plain) else _within(model, plain, ranked)
+    return plain if not _is_at_edge(plain) else _prefer_inside(model, plain, ranked)
 
 
-def choice_of(model: Fit, found: Choice | RandomEffect) -> Choice:
-    """A choice, for a random effect too, whose model is only fitted once it is asked for."""
-    return found if isinstance(found, Choice) else Choice(found.gain, _drawing(model, found), random=found)
+def fit_choice(model: Fit, effect: Choice | RandomEffect) -> Choice:
+    """The choice of an effect; the model with a random effect is fitted here."""
+    return effect if isinstance(effect, Choice) else Choice(effect.gain, _fit_random(model, effect), random=effect)
 
 
-def _within(model: Fit, best: Choice, ranked: Sequence[Choice | RandomEffect]) -> Choice:
+def _prefer_inside(model: Fit, best: Choice, ranked: Sequence[Choice | RandomEffect]) -> Choice:
     """The first that gains nearly as much as the best, is not at an end of its range, and predicts no worse."""
-    near = (choice_of(model, found) for found in ranked if found.gain > WITHIN_SHARE * best.gain)
+    near = (fit_choice(model, one) for one in ranked if one.gain > RULES.inside_share * best.gain)
     inside = next((choice for choice in near if not _is_at_edge(choice)), None)
-    return inside if inside is not None and no_worse(inside.fitted, best.fitted) else best
+    return inside if inside is not None and predicts_no_worse(inside.fitted, best.fitted) else best
 
 
 def _is_everywhere(choice: Choice) -> bool:
-    """Whether it acts in a part of the map that holds most of the drives: then it is no matter of place."""
+    """Whether an effect of a place acts where most of the drives were: then it is no matter of place."""
     if choice.lead is None:
         return False
     name, catalogue = choice.lead.candidate.effect, choice.fitted.drives.robot.catalogue
@@ -87,36 +77,39 @@ def _is_everywhere(choice: Choice) -> bool:
         return False
     _, x, y, radius = (choice.fitted.theta[name] for name in catalogue.theta_names(name))
     places = choice.fitted.drives.poses[:, 0, :2]
-    return float((np.hypot(*(places - (x, y)).T) < radius).mean()) > MOST_PLACES
+    return float((np.hypot(*(places - (x, y)).T) < radius).mean()) > RULES.patch_share
 
 
 def _is_at_edge(choice: Choice) -> bool:
-    """Whether a value of it was fitted to an end of its range: it then stands for something else."""
+    """Whether one of its values was fitted to an end of its range: the effect then stands for something else."""
     free = choice.lead.candidate.free if choice.lead else ()
     robot = choice.fitted.drives.robot
     return any(at_edge(name, choice.fitted.theta[name], robot) for names in free for name in names)
 
 
 def _is_plain_form_of(choice: Choice, best: Choice) -> bool:
-    """Whether it says the same of both wheels what the best says of one, at little loss."""
+    """Whether it is the best effect's form for both wheels alike, at little loss of evidence."""
     if choice.lead is None or best.lead is None or choice is best or choice.lead.candidate.form:
         return False
     same = choice.lead.candidate.effect == best.lead.candidate.effect
-    return same and choice.gain > PLAIN_SHARE * best.gain
+    return same and choice.gain > RULES.plain_share * best.gain
 
 
-def _drawing(model: Fit, effect: RandomEffect) -> Fit:
-    """The model with an effect that draws; its mean lateness has so far passed for a part of the delay."""
+def _fit_random(model: Fit, effect: RandomEffect) -> Fit:
+    """The model with an effect that draws.
+
+    The delay gives up the mean lateness of the draws, which it had to stand for without the effect.
+    """
     theta = {**model.theta, effect.parameter: effect.value}
     late = lateness(theta, model.drives.rate_hz) - lateness(model.theta, model.drives.rate_hz)
     theta["delay"] = max(0.0, model.theta["delay"] - late)
     return fit(model.drives, theta, model.free, model.noise)
 
 
-def no_worse(one: Fit, other: Fit) -> bool:
-    """Whether one model's error over windows is not shown to be larger than the other's by more than ERROR_FACTOR."""
-    windows = cut(other.drives, ERROR_HORIZON_S)
+def predicts_no_worse(one: Fit, other: Fit) -> bool:
+    """Whether one model's error over windows is not shown to be larger than the other's beyond the guard's factor."""
+    windows = cut(other.drives, RULES.guard_horizon_s)
     if len(windows.begin) < 2:
-        return True
-    squares = [strays(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
-    return ratio(squares[0], squares[1], blocks_of(other.drives, windows)).interval[0] <= ERROR_FACTOR
+        return True  # drives too short for windows: single steps are all there is to go by
+    squares = [pose_errors(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
+    return ratio(squares[0], squares[1], blocks_of(other.drives, windows)).interval[0] <= RULES.guard_factor

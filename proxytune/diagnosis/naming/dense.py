@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats
-from proxytune.diagnosis.model.coordinates import placed, span
+from proxytune.diagnosis.model.coordinates import span, theta_at
 from proxytune.diagnosis.model.fitting import Fit, evaluate
-from proxytune.diagnosis.model.innovations import HUBER, clipped
+from proxytune.diagnosis.model.innovations import HUBER, clip_outliers
 from proxytune.diagnosis.model.replay import increments
 from proxytune.diagnosis.naming.candidates import Candidate
 from proxytune.driving.robot import Robot
@@ -38,43 +38,43 @@ Values = tuple[float, ...]
 
 def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     """The forms, those of stepwise effects and of effects of a place with the best of many more probes."""
-    dense = [form for form in forms if not form.form and _offers(form, base.drives.robot) is not None]
+    dense = [form for form in forms if not form.form and _dense_along(form, base.drives.robot) is not None]
     if not dense:
         return list(forms)
-    part = part_of(base.drives)
-    left = _left_by(evaluate(part, base.theta, base.free, base.noise))
-    best = {form.effect: _best(left, form) for form in dense}
+    part = cut_part(base.drives)
+    left = _residual_of(evaluate(part, base.theta, base.free, base.noise))
+    best = {form.effect: _best_probe(left, form) for form in dense}
     return [replace(form, probes=(*form.probes, *best.get(form.effect, ()))) for form in forms]
 
 
-def _offers(form: Candidate, robot: Robot) -> str | None:
-    """Why an effect needs more probes: for its `steps`, or its `place`."""
+def _dense_along(form: Candidate, robot: Robot) -> str | None:
+    """What further probes of an effect lie along: its `steps`, or its `place`; None where it needs none."""
     trace = robot.catalogue.effect(form.effect).trace
     if trace is None:
         return None
     return "steps" if trace.stepwise else "place" if trace.placed else None
 
 
-class _Left(NamedTuple):
-    """What a model leaves over: its increments, which innovations count, and how free parameters answer to columns."""
+class _Residual(NamedTuple):
+    """A model, its increments, which of its innovations count, and how its free parameters answer columns."""
 
     model: Fit
-    said: Floats
+    predicted: Floats
     weight: Floats
     answer: Floats
 
 
-def _left_by(model: Fit) -> _Left:
+def _residual_of(model: Fit) -> _Residual:
     weight = (np.abs(model.innovations) < HUBER).astype(float)
     weighted = model.slopes * weight[:, None]
     answer = np.linalg.pinv(model.slopes.T @ weighted, hermitian=True) @ weighted.T
-    return _Left(model, increments(model.drives, model.theta), weight, answer)
+    return _Residual(model, increments(model.drives, model.theta), weight, answer)
 
 
-def _best(left: _Left, form: Candidate) -> tuple[Values, ...]:
+def _best_probe(left: _Residual, form: Candidate) -> tuple[Values, ...]:
     """The probe that gains most, none where none gains anything."""
     robot = left.model.drives.robot
-    steps = _offers(form, robot) == "steps"
+    steps = _dense_along(form, robot) == "steps"
     offers = list(_sizes(form, robot) if steps else _places(left.model.drives, form))
     gains = [_gain(left, form, values) for values in offers]
     return (offers[int(np.argmax(gains))],) if gains and max(gains) > 0.0 else ()
@@ -97,19 +97,19 @@ def _places(drives: Drives, form: Candidate) -> Iterable[Values]:
         yield (size, x, y, radius)
 
 
-def _gain(left: _Left, form: Candidate, values: Values) -> float:
+def _gain(left: _Residual, form: Candidate, values: Values) -> float:
     """What one step towards a probe gains, the free parameters having done what they can [nats]."""
     model = left.model
-    theta = placed({**model.theta, **form.fixed}, form.free, np.array(values))
-    column = model.whiten.whiten(left.said - increments(model.drives, theta))
+    theta = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
+    column = model.whiten.whiten(left.predicted - increments(model.drives, theta))
     column = column - model.slopes @ (left.answer @ column)
-    pull, size = float(column @ clipped(model.innovations)), float(column**2 @ left.weight)
+    pull, size = float(column @ clip_outliers(model.innovations)), float(column**2 @ left.weight)
     step = min(max(-pull / size, 0.0), FURTHEST) if size > 1e-9 else 0.0
     return -step * pull - 0.5 * step**2 * size
 
 
-def part_of(drives: Drives) -> Drives:
-    """Stretches of the drives, evenly spread, each an episode of its own that goes on from the commands before it."""
+def cut_part(drives: Drives) -> Drives:
+    """Cut stretches out of drives, evenly spread, each an episode that goes on from the commands before it."""
     ticks, warm = round(STRETCH_S * drives.tick_hz), round(WARM_UP_S * drives.tick_hz)
     every = max(ticks, round(ticks * drives.seconds / PART_S))
     length = drives.duties.shape[1]

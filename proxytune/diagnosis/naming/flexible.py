@@ -5,9 +5,15 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.measured.drives import Floats
-from proxytune.diagnosis.model.fitting import Fit, left_out, predictive, renoised, slopes_by_block
+from proxytune.diagnosis.model.fitting import (
+    Fit,
+    held_out_innovations,
+    held_out_log_likelihood,
+    replace_noise,
+    slopes_by_block,
+)
 from proxytune.diagnosis.model.innovations import fit_noise, huber
-from proxytune.diagnosis.model.replay import increments, moved_by, twists_of
+from proxytune.diagnosis.model.replay import increments, increments_of_twists, twists_of
 from proxytune.diagnosis.naming.signals import SignalGroup, signal_groups
 
 RIDGES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
@@ -31,28 +37,28 @@ class Curve(NamedTuple):
     weights: Floats
 
 
-def curves(fitted: Fit) -> list[Curve]:
+def fit_curves(fitted: Fit) -> list[Curve]:
     """Every signal group fitted to what the model leaves over, best first.
 
     The best few are fitted again with the noise that they leave: a candidate's noise is fitted too.
     """
-    plain = float(predictive(fitted).sum())
-    found = [_curve(fitted, group, _columns(fitted, group), plain) for group in signal_groups(fitted)]
+    plain = float(held_out_log_likelihood(fitted).sum())
+    found = [_fit_curve(fitted, group, _columns(fitted, group), plain) for group in signal_groups(fitted)]
     found.sort(key=lambda curve: -curve.gain)
     promising = [curve for curve in found[:REFITTED] if curve.gain > 0.0]
-    again = [_with_own_noise(fitted, curve, plain) for curve in promising]
+    again = [_fit_with_own_noise(fitted, curve, plain) for curve in promising]
     return sorted(again + found[len(promising) :], key=lambda curve: -curve.gain)
 
 
-def _with_own_noise(fitted: Fit, curve: Curve, plain: float) -> Curve:
+def _fit_with_own_noise(fitted: Fit, curve: Curve, plain: float) -> Curve:
     changes = _columns(fitted, curve.group)
     left = fitted.drives.measured - increments(fitted.drives, fitted.theta) + changes @ curve.weights
-    quieter = renoised(fitted, fit_noise(fitted.drives, left, fitted.noise))
-    better = _curve(quieter, curve.group, changes, plain)
+    quieter = replace_noise(fitted, fit_noise(fitted.drives, left, fitted.noise))
+    better = _fit_curve(quieter, curve.group, changes, plain)
     return better if better.gain > curve.gain else curve
 
 
-def _curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -> Curve:
+def _fit_curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -> Curve:
     columns = fitted.whiten.whiten(changes)
     both = np.concatenate((fitted.slopes, columns), axis=1)
     size = np.sqrt((both**2).sum(axis=0)) + 1e-12
@@ -68,10 +74,10 @@ def _columns(fitted: Fit, group: SignalGroup) -> Floats:
     """Change of the errors per weight of each basis function (N, 3, columns)."""
     drives, theta = fitted.drives, fitted.theta
     twists = twists_of(drives, theta)
-    here = moved_by(drives, theta, twists)
+    here = increments_of_twists(drives, theta, twists)
     added = group.twists
     parts = (added[..., column] for column in range(added.shape[-1]))
-    return np.stack([here - moved_by(drives, theta, twists + part) for part in parts], axis=-1)
+    return np.stack([here - increments_of_twists(drives, theta, twists + part) for part in parts], axis=-1)
 
 
 def _ridge(fitted: Fit, unit: Floats, sums: tuple[Floats, Floats], ridge: Floats) -> tuple[float, Floats]:
@@ -79,5 +85,5 @@ def _ridge(fitted: Fit, unit: Floats, sums: tuple[Floats, Floats], ridge: Floats
     penalty = np.diag(ridge + 1e-9)
     pull, curve = sums
     weights = -np.linalg.solve(curve.sum(axis=0) + penalty, pull.sum(axis=0))
-    loss = huber(left_out(fitted, unit, sums, penalty)).sum() + fitted.whiten.log_determinant.sum()
+    loss = huber(held_out_innovations(fitted, unit, sums, penalty)).sum() + fitted.whiten.log_determinant.sum()
     return -float(loss), weights

@@ -8,18 +8,10 @@ import numpy as np
 from proxytune.diagnosis.measured.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.model.coordinates import Coordinate, span
 from proxytune.diagnosis.model.fitting import KEPT_SOLVABLE, Fit, evaluate, slopes
-from proxytune.diagnosis.model.innovations import HUBER, clipped
+from proxytune.diagnosis.model.innovations import HUBER, clip_outliers
+from proxytune.diagnosis.rules import RULES
 
 GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
-
-LEAST_DRIVES, LEAST_PART = 2, 0.3
-"""Each of two robots has driven at least so often, and this share of all drives: few may be alike by their commands."""
-
-LEAST_APART = 0.04
-"""Robots whose wheels are more alike than this are one."""
-
-CLEAR = 4.0
-"""Two groups of drives lie so many times further apart than drives of a group, and than each is sure of."""
 
 
 class Unlike(NamedTuple):
@@ -44,7 +36,7 @@ def two_robots(drives: Drives, model: Fit) -> Unlike | None:
     neutral = {name: model.theta.get(name, 1.0) for (name,) in GAINS}
     whole = evaluate(drives, {**model.theta, **neutral}, (), model.noise)
     episodes = np.unique(drives.episode)
-    if len(episodes) < 2 * LEAST_DRIVES:
+    if len(episodes) < 2 * RULES.robot_drives:
         return None
     gains, deviations = _own_gains(whole, episodes)
     found = [_groups(episodes, gains[:, side], deviations[:, side]) for side in range(2)]
@@ -62,10 +54,10 @@ def _own_gains(whole: Fit, episodes: Floats) -> tuple[Floats, Floats]:
     columns = slopes(drives, whole.theta, GAINS, whole.whiten)
     label = np.repeat(np.searchsorted(episodes, drives.episode), 3)
     z = whole.innovations
-    pull = sum_by(label, columns * clipped(z)[:, None], len(episodes))
+    pull = sum_by(label, columns * clip_outliers(z)[:, None], len(episodes))
     inner = columns * (np.abs(z) < HUBER)[:, None]
     curve = sum_by(label, columns[:, :, None] * inner[:, None, :], len(episodes)) + KEPT_SOLVABLE * np.eye(2)
-    loud = np.maximum(1.0, sum_by(label, clipped(z) ** 2, len(episodes)) / np.bincount(label))
+    loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, len(episodes)) / np.bincount(label))
     inverse = np.linalg.inv(curve)
     step = -np.einsum("eij,ej->ei", inverse, pull)
     low, high = np.array([span(coordinate, drives.robot) for coordinate in GAINS]).T
@@ -78,9 +70,9 @@ def _groups(
     episodes: Floats, gains: Floats, deviations: Floats
 ) -> tuple[float, tuple[tuple[int, ...], tuple[int, ...]]]:
     """How clearly drives fall in two groups at the widest gap between sorted gains, 1 where just so; and the groups."""
-    sure = np.flatnonzero(deviations < LEAST_APART)
+    sure = np.flatnonzero(deviations < RULES.robot_gain_apart)
     order = sure[np.argsort(gains[sure])]
-    least = max(LEAST_DRIVES, math.ceil(LEAST_PART * len(order)))
+    least = max(RULES.robot_drives, math.ceil(RULES.robot_share * len(order)))
     places = np.arange(least, len(order) - least + 1)
     if not len(places):
         return 0.0, ((), ())
@@ -88,6 +80,7 @@ def _groups(
     at = int(places[np.argmax(sorted_gains[places] - sorted_gains[places - 1])])
     gap = float(sorted_gains[at] - sorted_gains[at - 1])
     within = max(float(sorted_gains[:at].std(ddof=1)), float(sorted_gains[at:].std(ddof=1)))
-    clear = gap / max(LEAST_APART, CLEAR * within, CLEAR * float(np.median(deviations[order])))
+    unsure = max(within, float(np.median(deviations[order])))
+    clear = gap / max(RULES.robot_gain_apart, RULES.robot_gap * unsure)
     one, other = (tuple(sorted(int(e) for e in episodes[part])) for part in (order[:at], order[at:]))
     return clear, (one, other)

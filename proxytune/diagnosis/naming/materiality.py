@@ -11,15 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.horizon.polish import compared, fit_windows, held_out, horizons
-from proxytune.diagnosis.horizon.windows import Ratio, Windows, blocks_of, cut, moved_along, ratio, strays
+from proxytune.diagnosis.horizon.polish import compare_errors, fit_windows, held_out_squares, horizons
+from proxytune.diagnosis.horizon.windows import Ratio, Windows, blocks_of, cut, motion_along, pose_errors, ratio
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.fitting import fit
 from proxytune.diagnosis.model.replay import drawn_paths, paths
-from proxytune.diagnosis.naming.found import Adopted, Dropped, Found, Variant, lacking
-
-MATERIAL = 1.05
-"""An effect matters if without it the error at some horizon is so many times as large, being shown to be larger."""
+from proxytune.diagnosis.naming.findings import AdoptedEffect, DroppedEffect, Findings, Variant, without_effect
+from proxytune.diagnosis.rules import RULES
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
@@ -34,21 +32,21 @@ Worth = Mapping[float, Ratio]
 """The error without an effect by the error with it, by horizon [s]."""
 
 
-class Weighed(NamedTuple):
+class WeighedEffect(NamedTuple):
     """An effect, and the error without it by the error with it."""
 
-    effect: Adopted
+    effect: AdoptedEffect
     worth: Worth
 
     @property
     def material(self) -> bool:
         """Whether predictions are shown to need it."""
-        return any(one.value >= MATERIAL and one.above for one in self.worth.values())
+        return any(one.value >= RULES.material_factor and one.above for one in self.worth.values())
 
     @property
     def harmful(self) -> bool:
         """Whether predictions are shown to be better without it."""
-        return any(one.value <= 1.0 / MATERIAL and one.below for one in self.worth.values())
+        return any(one.value <= 1.0 / RULES.material_factor and one.below for one in self.worth.values())
 
     @property
     def largest(self) -> float:
@@ -56,8 +54,8 @@ class Weighed(NamedTuple):
         return max(one.value for one in self.worth.values())
 
 
-def without_immaterial(found: Found, seed: int) -> Found:
-    """What was found, less the effects that do not matter, the weakest dropped first.
+def drop_immaterial(found: Findings, seed: int) -> Findings:
+    """Drop the effects that do not matter, the weakest first.
 
     Args:
         found: What the search came to.
@@ -65,14 +63,14 @@ def without_immaterial(found: Found, seed: int) -> Found:
     """
     drives = found.model.drives
     variant, kept = Variant(found.model.theta, found.model.free), list(found.adopted)
-    dropped: list[Dropped] = []
+    dropped: list[DroppedEffect] = []
     while kept and horizons(drives):
-        weighed = _weighed(drives, variant, kept, seed)
+        weighed = _weigh_effects(drives, variant, kept, seed)
         weakest = min((one for one in weighed if not one.material), key=lambda one: one.largest, default=None)
         if weakest is None:
             break
-        dropped.append(Dropped(weakest.effect, variant, weakest.harmful))
-        variant = lacking(variant, weakest.effect, drives.rate_hz)
+        dropped.append(DroppedEffect(weakest.effect, variant, weakest.harmful))
+        variant = without_effect(variant, weakest.effect, drives.rate_hz)
         kept.remove(weakest.effect)
     if not dropped:
         return found
@@ -80,23 +78,25 @@ def without_immaterial(found: Found, seed: int) -> Found:
     return replace(found, model=model, adopted=tuple(kept), immaterial=tuple(dropped))
 
 
-def _weighed(drives: Drives, variant: Variant, effects: Sequence[Adopted], seed: int) -> list[Weighed]:
-    """Each effect of a model weighed on the drives that the model was fitted to, blocks in turn left out."""
+def _weigh_effects(
+    drives: Drives, variant: Variant, effects: Sequence[AdoptedEffect], seed: int
+) -> list[WeighedEffect]:
+    """Weigh each effect of a model on the drives it was fitted to, with blocks left out in turn."""
     length = _length(drives)
-    whole = held_out(drives, variant.theta, variant.free, length)
+    whole = held_out_squares(drives, variant.theta, variant.free, length)
     found = []
     for effect in effects:
         if effect.free:
-            theta, free = lacking(variant, effect, drives.rate_hz)
-            worth = compared(drives, held_out(drives, theta, free, length), whole)
+            theta, free = without_effect(variant, effect, drives.rate_hz)
+            worth = compare_errors(drives, held_out_squares(drives, theta, free, length), whole)
         else:
             worth = _worth_of_draws(drives, variant, effect, whole, seed)
-        found.append(Weighed(effect, worth))
+        found.append(WeighedEffect(effect, worth))
     return found
 
 
-def worth(fitted: Drives, tested: Drives, variant: Variant, effect: Adopted, seed: int) -> Worth:
-    """What an effect of a model is worth on drives that nothing was fitted to.
+def worth(fitted: Drives, tested: Drives, variant: Variant, effect: AdoptedEffect, seed: int) -> Worth:
+    """The error without an effect by the error with it, on drives that nothing was fitted to.
 
     Args:
         fitted: Drives that the model with the effect, and the one without it, are fitted to.
@@ -107,14 +107,14 @@ def worth(fitted: Drives, tested: Drives, variant: Variant, effect: Adopted, see
     """
     whole = _squares(fitted, tested, variant)
     if effect.free:
-        return compared(tested, _squares(fitted, tested, lacking(variant, effect, fitted.rate_hz)), whole)
+        return compare_errors(tested, _squares(fitted, tested, without_effect(variant, effect, fitted.rate_hz)), whole)
     return _worth_of_draws(tested, variant, effect, whole, seed)
 
 
 def _squares(fitted: Drives, tested: Drives, variant: Variant) -> dict[float, Floats]:
     windows = cut(fitted, _length(fitted))
     theta = fit_windows(fitted, variant.theta, variant.free, windows)
-    return {h: strays(tested, theta, cut(tested, h))[:, 0] ** 2 for h in horizons(tested)}
+    return {h: pose_errors(tested, theta, cut(tested, h))[:, 0] ** 2 for h in horizons(tested)}
 
 
 def _length(drives: Drives) -> float:
@@ -123,7 +123,7 @@ def _length(drives: Drives) -> float:
 
 
 def _worth_of_draws(
-    drives: Drives, variant: Variant, effect: Adopted, whole: Mapping[float, Floats], seed: int
+    drives: Drives, variant: Variant, effect: AdoptedEffect, whole: Mapping[float, Floats], seed: int
 ) -> dict[float, Ratio]:
     """What a random effect is worth: it moves no mean, so what counts is how much of the error its draws make up.
 
@@ -133,20 +133,20 @@ def _worth_of_draws(
     for horizon, squares in whole.items():
         windows = cut(drives, horizon)
         share = ratio(_drawn_squares(drives, variant, windows, seed), squares, blocks_of(drives, windows))
-        value, low, high = (_without_draws(end) for end in (share.value, *share.interval))
+        value, low, high = (_ratio_without_draws(end) for end in (share.value, *share.interval))
         found[horizon] = Ratio(value, (low, high))
     return found
 
 
-def _without_draws(share: float) -> float:
+def _ratio_without_draws(share: float) -> float:
     return float(1.0 / np.sqrt(1.0 - min(share, LARGEST_SHARE) ** 2))
 
 
 def _drawn_squares(drives: Drives, variant: Variant, windows: Windows, seed: int) -> Floats:
     """Mean squared distance [m²] of drawn and expected replays at every compared pose (M,)."""
-    expected = moved_along(drives, paths(drives, variant.theta), windows)
+    expected = motion_along(drives, paths(drives, variant.theta), windows)
     total = np.zeros(len(expected))
     for draw in range(DRAWS):
-        drawn = moved_along(drives, drawn_paths(drives, variant.theta, seed + draw), windows)
+        drawn = motion_along(drives, drawn_paths(drives, variant.theta, seed + draw), windows)
         total += np.square(drawn - expected)[:, :2].sum(axis=1)
     return total / DRAWS

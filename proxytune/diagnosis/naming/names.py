@@ -1,15 +1,15 @@
-"""The named effects of a model: those with evidence that matter, and were not chosen beside one that does harm."""
+"""Naming what a model lacks: search, drop what does not matter, and search again where a harmful effect misled."""
 
 from dataclasses import replace
 
 from proxytune.diagnosis.model.fitting import Fit
-from proxytune.diagnosis.naming.choice import no_worse
-from proxytune.diagnosis.naming.found import Dropped, Found
-from proxytune.diagnosis.naming.materiality import without_immaterial
-from proxytune.diagnosis.naming.search import Told, search
+from proxytune.diagnosis.naming.choice import predicts_no_worse
+from proxytune.diagnosis.naming.findings import DroppedEffect, Findings
+from proxytune.diagnosis.naming.materiality import drop_immaterial
+from proxytune.diagnosis.naming.search import Report, search
 
 
-def name_effects(base: Fit, seed: int, told: Told) -> Found:
+def name_effects(base: Fit, seed: int, report: Report) -> Findings:
     """Search for what a model is missing, and drop what does not matter.
 
     What was chosen beside an effect that does harm may be wrong. So the search is then made once more without that
@@ -18,22 +18,26 @@ def name_effects(base: Fit, seed: int, told: Told) -> Found:
     Args:
         base: The model with declared parameters only, fitted.
         seed: Of the null distributions and of draws.
-        told: Hears of progress.
+        report: Takes a line about each step, as it begins.
     """
-    first, misled = _weighed(base, seed, told, ())
+    first, misled = _search_and_weigh(base, seed, report, ())
     if not misled:
         return first
     names = tuple(dropped.effect.effect for dropped in misled)
-    told(f"searching again without {', '.join(names)}")
-    again, _ = _weighed(base, seed, told, names)
-    return replace(again, immaterial=again.immaterial + misled) if no_worse(again.model, first.model) else first
+    report(f"searching again without {', '.join(names)}")
+    again, _ = _search_and_weigh(base, seed, report, names)
+    return (
+        replace(again, immaterial=again.immaterial + misled) if predicts_no_worse(again.model, first.model) else first
+    )
 
 
-def _weighed(base: Fit, seed: int, told: Told, without: tuple[str, ...]) -> tuple[Found, tuple[Dropped, ...]]:
-    """What a search comes to, and what was dropped of it that did harm and that others had been chosen beside."""
-    found = search(base, seed, told, without)
-    told("weighing what each effect is worth")
-    kept = without_immaterial(found, seed)
+def _search_and_weigh(
+    base: Fit, seed: int, report: Report, without: tuple[str, ...]
+) -> tuple[Findings, tuple[DroppedEffect, ...]]:
+    """Search, drop what does not matter, and tell which effects did harm while others were chosen beside them."""
+    found = search(base, seed, report, without)
+    report("weighing what each effect is worth")
+    kept = drop_immaterial(found, seed)
     order = [effect.effect for effect in found.adopted]
     last = max((order.index(effect.effect) for effect in kept.adopted), default=-1)
     harmful = (dropped for dropped in kept.immaterial if dropped.harmful)

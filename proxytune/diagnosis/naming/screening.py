@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, sum_by
-from proxytune.diagnosis.model.coordinates import placed
-from proxytune.diagnosis.model.fitting import Fit, predictive
-from proxytune.diagnosis.model.innovations import HUBER, clipped
+from proxytune.diagnosis.model.coordinates import theta_at
+from proxytune.diagnosis.model.fitting import Fit, held_out_log_likelihood
+from proxytune.diagnosis.model.innovations import HUBER, clip_outliers
 from proxytune.diagnosis.model.replay import increments
 from proxytune.diagnosis.naming.candidates import Candidate
 from proxytune.diagnosis.naming.dense import with_dense_probes
@@ -63,20 +63,20 @@ def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[Lead]:
     if not probes:
         return []
     weight = np.abs(base.innovations) < HUBER
-    projected = [without(base.slopes, probe.columns, weight) for probe in probes]
-    number = stretches(base.drives)
+    projected = [project_out(base.slopes, probe.columns, weight) for probe in probes]
+    number = number_stretches(base.drives)
     flips = _signs(int(number.max()) + 1, seed)
     best: dict[str, tuple[float, Floats, _Probe, Floats]] = {}
     chance = np.zeros(FLIPS)
     for probe, columns in zip(probes, projected, strict=True):
-        pulls = _by_stretch(number, columns * clipped(base.innovations)[:, None])
+        pulls = _by_stretch(number, columns * clip_outliers(base.innovations)[:, None])
         curve = columns.T @ (columns * weight[:, None])
         gain, step = _step(pulls.sum(axis=0), curve)
         chance = np.maximum(chance, _gains(flips @ pulls, curve))
         old = best.get(probe.candidate.label)
         if old is None or gain > old[0]:
             best[probe.candidate.label] = (gain, step, probe, columns)
-    plain = float(predictive(base).sum())
+    plain = float(held_out_log_likelihood(base).sum())
     leads = [_lead(base, *found, chance, plain) for found in best.values()]
     return sorted(leads, key=lambda lead: -lead.gain)
 
@@ -89,8 +89,8 @@ def _lead(base: Fit, gain: float, step: Floats, probe: _Probe, columns: Floats, 
         slopes=np.concatenate((base.slopes, columns), axis=1) if step.any() else base.slopes,
     )
     p_value = float((1 + (chance >= gain).sum()) / (1 + FLIPS))
-    held_out = float(predictive(stepped).sum()) - plain
-    return Lead(probe.candidate, _landed(probe, step), probe.values, gain, held_out, p_value, columns @ step)
+    held_out = float(held_out_log_likelihood(stepped).sum()) - plain
+    return Lead(probe.candidate, _values_after(probe, step), probe.values, gain, held_out, p_value, columns @ step)
 
 
 def _probes(base: Fit, form: Candidate) -> list[_Probe]:
@@ -99,7 +99,7 @@ def _probes(base: Fit, form: Candidate) -> list[_Probe]:
     found = []
     for values in form.probes:
         begin = _begin(form, values, base.drives.robot.catalogue.parameters)
-        moved = [placed(start, form.free, np.array((*begin[:j], v, *begin[j + 1 :]))) for j, v in enumerate(values)]
+        moved = [theta_at(start, form.free, np.array((*begin[:j], v, *begin[j + 1 :]))) for j, v in enumerate(values)]
         columns = np.stack([here - increments(base.drives, theta) for theta in moved], -1)
         if np.abs(columns).max() > 1e-9:
             found.append(_Probe(form, begin, values, base.whiten.whiten(columns)))
@@ -114,8 +114,8 @@ def _begin(form: Candidate, values: tuple[float, ...], parameters: Mapping[str, 
     return tuple(value if parameters[first].shape else neutral for (first, *_), value, neutral in pairs)
 
 
-def without(slopes: Floats, columns: Floats, weight: Floats) -> Floats:
-    """Columns with everything that the free parameters can do projected out."""
+def project_out(slopes: Floats, columns: Floats, weight: Floats) -> Floats:
+    """Project out of columns everything that the free parameters can do."""
     if slopes.shape[1] == 0:
         return columns
     weighted = slopes * weight[:, None]
@@ -123,8 +123,8 @@ def without(slopes: Floats, columns: Floats, weight: Floats) -> Floats:
     return np.asarray(columns - slopes @ (inverse @ (weighted.T @ columns)))
 
 
-def stretches(drives: Drives) -> Whole:
-    """The number of the stretch of FLIP_S that each increment is in (N,)."""
+def number_stretches(drives: Drives) -> Whole:
+    """Number the stretches of FLIP_S that the increments are in (N,)."""
     second = np.floor(drives.first / drives.tick_hz / FLIP_S).astype(int)
     _, number = np.unique(drives.episode * (second.max() + 1) + second, return_inverse=True)
     return number
@@ -154,7 +154,7 @@ def _gains(pulls: Floats, curve: Floats) -> Floats:
     return np.asarray(-((pulls * best).sum(axis=1) + 0.5 * np.einsum("ni,ij,nj->n", best, curve, best)))
 
 
-def _landed(probe: _Probe, step: Floats) -> tuple[float, ...]:
-    """Where a step from the beginning ends, the probes being one step long."""
+def _values_after(probe: _Probe, step: Floats) -> tuple[float, ...]:
+    """The values at which a step ends; to a probe is one step."""
     pairs = zip(probe.begin, probe.values, step, strict=True)
     return tuple(float(begin + m * (value - begin)) for begin, value, m in pairs)

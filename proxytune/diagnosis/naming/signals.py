@@ -22,7 +22,7 @@ MOST_PATCHES = 14
 """Over a position, corners lie this far apart [m], but there are no more than so many."""
 
 
-class _Made(NamedTuple):
+class _Signal(NamedTuple):
     """A signal (E, T), its unit, and the motion that depends on it, per basis function (E, T, 3, columns)."""
 
     name: Cue
@@ -45,7 +45,7 @@ class SignalGroup:
     name: Cue
     signal: Floats
     unit: str
-    make: Callable[[], _Made]
+    make: Callable[[], _Signal]
 
     @property
     def twists(self) -> Floats:
@@ -129,43 +129,43 @@ def _of_wheels(motion: _Motion, left: Floats | None, right: Floats | None) -> Fl
     return np.concatenate(parts, axis=-1)
 
 
-def _command_level(motion: _Motion) -> _Made:
+def _command_level(motion: _Motion) -> _Signal:
     full = motion.drives.robot.figures["full_speed"]
     lagged = [side / full for side in (motion.left, motion.right)]
     columns = [hats(side, 9) * full for side in lagged]
-    return _Made(Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns))
+    return _Signal(Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns))
 
 
-def _wheel_difference(motion: _Motion) -> _Made:
+def _wheel_difference(motion: _Motion) -> _Signal:
     signal = motion.commands[..., 1] - motion.commands[..., 0]
     columns = hats(signal)
-    return _Made(Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns))
+    return _Signal(Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns))
 
 
-def _transients(motion: _Motion) -> _Made:
+def _transients(motion: _Motion) -> _Signal:
     rate = motion.drives.tick_hz
     parts = []
     for side in range(2):
         command = motion.commands[..., side]
-        slow = [_smoothed(command, seconds * rate) for seconds in (0.05, 0.15, 0.45, 1.2)]
+        slow = [_smooth(command, seconds * rate) for seconds in (0.05, 0.15, 0.45, 1.2)]
         parts.append(np.stack([command - slow[0]] + [a - b for a, b in pairwise(slow)], axis=-1))
     full = motion.drives.robot.figures["full_speed"]
     signal = parts[0].sum(axis=-1)
-    return _Made(Cue.TRANSIENTS, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
+    return _Signal(Cue.TRANSIENTS, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
 
 
-def _smoothed(signal: Floats, ticks: float) -> Floats:
+def _smooth(signal: Floats, ticks: float) -> Floats:
     kept = np.exp(-1.0 / ticks)
     return np.asarray(lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=kept * signal[:, :1])[0])
 
 
-def _after_reversal(motion: _Motion) -> _Made:
+def _after_reversal(motion: _Motion) -> _Signal:
     columns = []
     for speed in (motion.left, motion.right):
         gone = _since_reversal(speed) / motion.drives.tick_hz
         columns.append(np.stack([np.exp(-gone / reach) for reach in (0.005, 0.015, 0.04, 0.12)], -1) * speed[..., None])
     signal = _since_reversal(motion.left) / motion.drives.tick_hz
-    return _Made(Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns))
+    return _Signal(Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns))
 
 
 def _since_reversal(speed: Floats) -> Floats:
@@ -180,42 +180,42 @@ def _since_reversal(speed: Floats) -> Floats:
     return np.asarray(way - np.take_along_axis(way, start, axis=1))
 
 
-def _time(motion: _Motion) -> _Made:
+def _time(motion: _Motion) -> _Signal:
     signal = np.broadcast_to(np.arange(motion.left.shape[1]) / motion.drives.tick_hz, motion.left.shape)
     columns = hats(signal)[..., 1:]
     wheels = _of_wheels(motion, columns * motion.left[..., None], columns * motion.right[..., None])
-    return _Made(Cue.TIME, signal, "s", wheels)
+    return _Signal(Cue.TIME, signal, "s", wheels)
 
 
-def _use(motion: _Motion) -> _Made:
+def _use(motion: _Motion) -> _Signal:
     use = np.cumsum(np.abs(motion.commands).mean(axis=-1), axis=1) / motion.drives.tick_hz
     columns = hats(use)[..., 1:]
     twists = _twists(columns * motion.forward[..., None], yaw=columns * motion.yaw[..., None])
-    return _Made(Cue.USE, use, "s at full duty", twists)
+    return _Signal(Cue.USE, use, "s at full duty", twists)
 
 
-def _turning(motion: _Motion) -> _Made:
+def _turning(motion: _Motion) -> _Signal:
     columns = hats(motion.yaw)
     bend = hats(motion.forward * motion.yaw)
     sideways = np.concatenate((bend[..., :-1] - bend[..., 1:], columns), axis=-1)
     twists = _twists(columns * motion.forward[..., None], sideways, columns)
-    return _Made(Cue.TURN_RATE, motion.yaw, "rad/s", twists)
+    return _Signal(Cue.TURN_RATE, motion.yaw, "rad/s", twists)
 
 
-def _heading(motion: _Motion) -> _Made:
+def _heading(motion: _Motion) -> _Signal:
     angle = motion.drives.headings
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1)
     moving = np.minimum(1.0, np.abs(motion.forward) / 0.02)[..., None]
     twists = _twists(waves * moving, waves * motion.forward[..., None], waves * np.abs(motion.forward)[..., None])
-    return _Made(Cue.HEADING, np.mod(angle, 2.0 * np.pi), "rad", twists)
+    return _Signal(Cue.HEADING, np.mod(angle, 2.0 * np.pi), "rad", twists)
 
 
-def _position(motion: _Motion) -> _Made:
+def _position(motion: _Motion) -> _Signal:
     places = motion.drives.places
     columns = np.concatenate([_patches(places[..., axis]) for axis in range(2)], axis=-1)
     forward, yaw = columns * motion.forward[..., None], columns * motion.yaw[..., None]
     twists = _twists(forward, yaw=np.concatenate((yaw, columns * np.abs(motion.forward)[..., None]), axis=-1))
-    return _Made(Cue.POSITION, places[..., 0], "m", twists)
+    return _Signal(Cue.POSITION, places[..., 0], "m", twists)
 
 
 def _patches(signal: Floats) -> Floats:
@@ -225,17 +225,17 @@ def _patches(signal: Floats) -> Floats:
     return np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))[1:]], axis=-1)
 
 
-def _wheel_angle(motion: _Motion, side: int, name: Cue) -> _Made:
+def _wheel_angle(motion: _Motion, side: int, name: Cue) -> _Signal:
     angle = motion.drives.angles[..., side]
     speed = (motion.left, motion.right)[side]
     waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1) * speed[..., None]
     own: Mapping[int, Floats] = {side: waves}
-    return _Made(name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
+    return _Signal(name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
 
 
-def _direction(motion: _Motion) -> _Made:
+def _direction(motion: _Motion) -> _Signal:
     back = (motion.forward < 0.0)[..., None]
     twists = _twists(
         back * motion.forward[..., None], yaw=np.concatenate((back * motion.yaw[..., None], back), axis=-1)
     )
-    return _Made(Cue.DIRECTION, np.sign(motion.forward), "", twists)
+    return _Signal(Cue.DIRECTION, np.sign(motion.forward), "", twists)

@@ -1,39 +1,34 @@
-"""What these drives could have shown: effects whose usual sizes would have left too little trace."""
+"""The effects that these drives could not have shown: their usual sizes leave too little trace."""
 
 import numpy as np
 
 from proxytune.diagnosis.measured.drives import Floats
-from proxytune.diagnosis.model.coordinates import placed
+from proxytune.diagnosis.model.coordinates import theta_at
 from proxytune.diagnosis.model.events import responses
 from proxytune.diagnosis.model.fitting import Fit
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, increments
 from proxytune.diagnosis.naming.candidates import Candidate, candidates, motion_effects
-from proxytune.diagnosis.naming.screening import without
-
-CLEAR_NATS = 10.0
-"""An effect counts as visible if its middle probe changes the log-likelihood by so much."""
-
-LOST_SHARE = 0.1
-"""A random effect is asked to strike one command in ten."""
+from proxytune.diagnosis.naming.screening import project_out
+from proxytune.diagnosis.rules import RULES
 
 
-def unseen(model: Fit, taken: set[str]) -> tuple[str, ...]:
-    """The motion effects that would have left fewer than CLEAR_NATS at the middle of their probes."""
+def invisible_effects(model: Fit, taken: set[str]) -> tuple[str, ...]:
+    """The motion effects that would have left too few nats to be seen at the middle of their probes."""
     forms = candidates(model.drives.robot, model.theta, taken)
     best: dict[str, float] = {}
     plain = {form.effect for form in forms if not form.form}
     for form in (form for form in forms if not form.form or form.effect not in plain):
-        best[form.effect] = max(best.get(form.effect, 0.0), _trace(model, form))
-    strike = LOST_SHARE * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
+        best[form.effect] = max(best.get(form.effect, 0.0), _nats_of_trace(model, form))
+    strike = RULES.struck_share * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
     best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}
     return tuple(
         name
         for name in motion_effects(model.drives.robot.catalogue)
-        if name not in taken and best.get(name, 0.0) < CLEAR_NATS
+        if name not in taken and best.get(name, 0.0) < RULES.visible_nats
     )
 
 
-def _trace(model: Fit, form: Candidate) -> float:
+def _nats_of_trace(model: Fit, form: Candidate) -> float:
     """Nats that the middle probe would have changed, free parameters having done what they can."""
     if not form.probes:
         return 0.0
@@ -43,7 +38,7 @@ def _trace(model: Fit, form: Candidate) -> float:
 
 def trace_of(model: Fit, form: Candidate, values: tuple[float, ...]) -> Floats:
     """What a form of an effect does to the innovations that the free parameters cannot (3N,)."""
-    moved = placed({**model.theta, **form.fixed}, form.free, np.array(values))
+    moved = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
     change = increments(model.drives, model.theta) - increments(model.drives, moved)
     column = model.whiten.whiten(change)[:, None]
-    return without(model.slopes, column, np.ones(len(column)))[:, 0]
+    return project_out(model.slopes, column, np.ones(len(column)))[:, 0]

@@ -1,4 +1,4 @@
-"""Which groups of curves are worth having: ridge regression, one scale a group, judged on blocks that are left out."""
+"""The choice of groups of curves by ridge regression, one scale a group, on blocks that are left out."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -7,6 +7,7 @@ import numpy as np
 
 from proxytune.diagnosis.horizon.window_slopes import Slopes
 from proxytune.diagnosis.measured.drives import Floats, Whole, sum_by
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects.learnt.features import LEVEL
 
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)
@@ -17,12 +18,6 @@ FIRMEST_ONLY = {"speed_and_turn": 0.1}
 
 FREE = 1e-6
 """The level is hardly pulled."""
-
-LEAST_SHARE = 0.02
-"""A group is added if it takes away at least this share of the squared error on blocks that it was not fitted to."""
-
-LEAST_T = 2.0
-"""And if that gain is so many times its standard error between the blocks."""
 
 ROBUST = 1.5
 """Errors beyond so many medians count less and less."""
@@ -48,7 +43,7 @@ class Choice(NamedTuple):
 
 
 def sums(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
-    """Sums over the poses of each part, whose errors are counted from weights of 0.
+    """Sum over the poses of each part; errors are counted from weights of 0.
 
     Args:
         slopes: Linearised round the weights.
@@ -78,9 +73,9 @@ def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
     mean = given.curve.sum(axis=0).diagonal()
     pulls = {name: FREE for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
-    losses = _left_out(given, *_penalised(groups, pulls, mean))
+    losses = _held_out_losses(given, *_penalise(groups, pulls, mean))
     while True:
-        tried = {name: _tried(given, groups, pulls, name, mean) for name in groups if name not in pulls}
+        tried = {name: _try_group(given, groups, pulls, name, mean) for name in groups if name not in pulls}
         paying = {name: found for name, found in tried.items() if _pays(losses, found[1])}
         if not paying:
             break
@@ -89,18 +84,18 @@ def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
         gains[best] = float((losses - after).sum())
         losses = after
     weights = np.zeros(len(mean))
-    columns, penalty = _penalised(groups, pulls, mean)
+    columns, penalty = _penalise(groups, pulls, mean)
     total = given.curve.sum(axis=0)[np.ix_(columns, columns)]
     weights[columns] = np.linalg.solve(total + np.diag(penalty), given.pull.sum(axis=0)[columns])
     return Choice(weights, gains)
 
 
-def _tried(
+def _try_group(
     given: Sums, groups: Mapping[str, Whole], pulls: Mapping[str, float], name: str, mean: Floats
 ) -> tuple[float, Floats]:
     """The strongest ridge of a group within one standard error of its best, and the losses of the parts with it."""
     ridges = [ridge for ridge in RIDGES if ridge >= FIRMEST_ONLY.get(name, 0.0)]
-    found = [_left_out(given, *_penalised(groups, {**pulls, name: ridge}, mean)) for ridge in ridges]
+    found = [_held_out_losses(given, *_penalise(groups, {**pulls, name: ridge}, mean)) for ridge in ridges]
     best = min(found, key=lambda losses: float(losses.sum()))
     for ridge, losses in zip(reversed(ridges), reversed(found), strict=True):
         worse = losses - best
@@ -112,17 +107,17 @@ def _tried(
 def _pays(before: Floats, after: Floats) -> bool:
     gain = before - after
     spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-    return bool(gain.sum() > LEAST_SHARE * before.sum() and gain.sum() > LEAST_T * spread)
+    return bool(gain.sum() > RULES.group_share * before.sum() and gain.sum() > RULES.group_t * spread)
 
 
-def _penalised(groups: Mapping[str, Whole], pulls: Mapping[str, float], mean: Floats) -> tuple[Whole, Floats]:
+def _penalise(groups: Mapping[str, Whole], pulls: Mapping[str, float], mean: Floats) -> tuple[Whole, Floats]:
     """The columns of the groups that have a pull, and how hard each is pulled: alike within a group."""
     columns = np.concatenate([np.empty(0, int), *(groups[name] for name in pulls)])
     penalty = [np.full(len(groups[name]), pull * mean[groups[name]].mean() + 1e-9) for name, pull in pulls.items()]
     return columns, np.concatenate([np.empty(0), *penalty])
 
 
-def _left_out(given: Sums, columns: Whole, penalty: Floats) -> Floats:
+def _held_out_losses(given: Sums, columns: Whole, penalty: Floats) -> Floats:
     """The squared error of each part with weights from all others (P,)."""
     curve, pull = given.curve[:, columns][:, :, columns], given.pull[:, columns]
     rest = curve.sum(axis=0) - curve + np.diag(penalty)

@@ -7,15 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.horizon.window_slopes import FITTED_S
-from proxytune.diagnosis.horizon.windows import Ratio, Rmse, blocks_of, cut, ratio, rmse, strays
+from proxytune.diagnosis.horizon.windows import Ratio, Rmse, blocks_of, cut, pose_errors, ratio, rmse
 from proxytune.diagnosis.measured.drives import Drives
-from proxytune.diagnosis.naming.found import Found
+from proxytune.diagnosis.naming.findings import Findings
 from proxytune.diagnosis.remainder.lookalike import Lookalike, lookalike
 from proxytune.diagnosis.remainder.remainder import Remainder, remainder
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects import effect_of
-
-DOUBTFUL = 0.95
-"""Names are doubtful if curves beside what is declared alone bring the error beneath this share of that with names."""
 
 
 class LearntError(NamedTuple):
@@ -36,7 +34,7 @@ class LearntError(NamedTuple):
 
 @dataclass(frozen=True)
 class Learning:
-    """What was learnt.
+    """The learnt remainder and what it is worth.
 
     Attributes:
         remainder: The curves, beside all named effects.
@@ -61,7 +59,7 @@ class Learning:
         return tuple(dict.fromkeys([*sorted(share, key=lambda title: -share[title]), *others]))
 
 
-def learn(found: Found, tested: Drives, horizons_s: Iterable[float]) -> Learning:
+def learn(found: Findings, tested: Drives, horizons_s: Iterable[float]) -> Learning:
     """Learn what the named effects leave over, and test it.
 
     Args:
@@ -71,24 +69,24 @@ def learn(found: Found, tested: Drives, horizons_s: Iterable[float]) -> Learning
     """
     beside = remainder(found.model.drives, found.model.theta)
     errors = [_error(found, beside, tested, horizon_s) for horizon_s in horizons_s] if beside.used else []
-    told = tuple(error for error in errors if error is not None)
+    known = tuple(error for error in errors if error is not None)
     taken = {effect_of(name) for name in found.model.theta}
     like = lookalike(found.model.drives, found.model.theta, beside, taken) if beside.used else None
-    return Learning(beside, told, _doubtful(found, beside), like)
+    return Learning(beside, known, _names_are_doubtful(found, beside), like)
 
 
-def _error(found: Found, beside: Remainder, drives: Drives, horizon_s: float) -> LearntError | None:
+def _error(found: Findings, beside: Remainder, drives: Drives, horizon_s: float) -> LearntError | None:
     windows = cut(drives, horizon_s)
     blocks = blocks_of(drives, windows)
     if len(np.unique(blocks)) < 2:
         return None
-    names = strays(drives, found.model.theta, windows) ** 2
-    both = strays(drives, {**found.model.theta, **beside.theta}, windows) ** 2
+    names = pose_errors(drives, found.model.theta, windows) ** 2
+    both = pose_errors(drives, {**found.model.theta, **beside.theta}, windows) ** 2
     compared = ratio(both[:, 0], names[:, 0], blocks)
     return LearntError(horizon_s, rmse(both[:, 0], blocks), rmse(both[:, 1], blocks), compared)
 
 
-def _doubtful(found: Found, beside: Remainder) -> bool:
+def _names_are_doubtful(found: Findings, beside: Remainder) -> bool:
     if not found.adopted or not len(beside.held_out):
         return False
     drives = found.model.drives
@@ -96,4 +94,4 @@ def _doubtful(found: Found, beside: Remainder) -> bool:
     windows = cut(drives, FITTED_S)
     blocks = blocks_of(drives, windows)
     compared = ratio(alone.held_out, beside.held_out, blocks)
-    return alone.used and compared.value < DOUBTFUL and compared.below
+    return alone.used and compared.value < RULES.doubtful_names and compared.below

@@ -7,16 +7,14 @@ import numpy as np
 from scipy.optimize import minimize
 
 from proxytune.diagnosis.horizon.window_slopes import FITTED_S
-from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.measured.drives import Drives, Floats
-from proxytune.diagnosis.model.coordinates import placed, span
+from proxytune.diagnosis.model.coordinates import span, theta_at
 from proxytune.diagnosis.naming.candidates import Candidate, candidates
 from proxytune.diagnosis.remainder.remainder import Remainder
+from proxytune.diagnosis.rules import RULES
 from proxytune.driving.robot import Robot
 from proxytune.space import Theta
-
-KEPT = 0.9
-"""A name is told if it alone keeps this share of what the curves gain on blocks that are left out."""
 
 PROMISING = 3
 """So many forms are tuned, those whose probes gain most."""
@@ -54,25 +52,25 @@ def lookalike(drives: Drives, theta: Theta, beside: Remainder, taken: Iterable[s
 
     def loss(candidate: Candidate, values: Floats) -> float:
         low, high = np.array([span(coordinate, drives.robot) for coordinate in candidate.free]).T
-        moved = placed({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
-        return float(np.mean(strays(drives, moved, windows)[:, 0] ** 2))
+        moved = theta_at({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
+        return float(np.mean(pose_errors(drives, moved, windows)[:, 0] ** 2))
 
-    plain = float(np.mean(strays(drives, theta, windows)[:, 0] ** 2))
+    plain = float(np.mean(pose_errors(drives, theta, windows)[:, 0] ** 2))
     gained = plain - float(beside.held_out.mean())
     if gained <= 0.0:
         return None
     forms = candidates(drives.robot, theta, taken)
     probed = [min((loss(one, np.array(p)), number, p) for p in one.probes) for number, one in enumerate(forms)]
     tuned = [
-        _tuned(forms[number], np.array(probe), loss, drives.robot) for _, number, probe in sorted(probed)[:PROMISING]
+        _tune(forms[number], np.array(probe), loss, drives.robot) for _, number, probe in sorted(probed)[:PROMISING]
     ]
     least, form, values = min(tuned, key=lambda found: found[0])
     share = (plain - least) / gained
-    found = placed(form.fixed, form.free, values)
-    return Lookalike(form.effect, form.form, found, share) if share >= KEPT else None
+    found = theta_at(form.fixed, form.free, values)
+    return Lookalike(form.effect, form.form, found, share) if share >= RULES.lookalike_share else None
 
 
-def _tuned(
+def _tune(
     form: Candidate, probe: Floats, loss: Callable[[Candidate, Floats], float], robot: Robot
 ) -> tuple[float, Candidate, Floats]:
     """The least loss of a form near a probe, and where it is."""

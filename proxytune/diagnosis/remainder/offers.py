@@ -38,10 +38,10 @@ APART = 0.02
 """Knots nearer to each other or to 0 than this share of the range are one."""
 
 
-def offered(drives: Drives, theta: Theta) -> Learnt:
-    """Every group with knots for these drives, all weights 0."""
+def offer_curves(drives: Drives, theta: Theta) -> Learnt:
+    """Offer every group of curves with knots for these drives, all weights 0."""
     asked = twists_of(drives, theta)
-    used = _driven(drives)
+    used = _ticks_in_motion(drives)
     forward, yaw = asked[..., 0][used], asked[..., 2][used]
     turn = yaw * drives.robot.figures["effective_baseline"] / 2.0
     effort = (np.abs(forward - turn) + np.abs(forward + turn)) / 2.0 / drives.robot.figures["full_speed"]
@@ -54,7 +54,7 @@ def offered(drives: Drives, theta: Theta) -> Learnt:
         "transients": TRANSIENTS_S,
         "start": STARTS_S,
         "ringing": RINGING_HZ,
-        "play": tuple(_told(share * drives.robot.figures["full_speed"]) for share in PLAYS),
+        "play": tuple(_round_knot(share * drives.robot.figures["full_speed"]) for share in PLAYS),
         "reversal": REVERSALS_M,
         "direction": (-1.0,) if float((forward < -0.01 * drives.robot.figures["full_speed"]).mean()) > RARE else (),
         "time": _steps(seconds),
@@ -71,8 +71,8 @@ def offered(drives: Drives, theta: Theta) -> Learnt:
     return Learnt(Seen(_ends(forward), _ends(yaw)), tuple(curves))
 
 
-def _driven(drives: Drives) -> Floats:
-    """Which ticks (E, T) lie within measured motion."""
+def _ticks_in_motion(drives: Drives) -> Floats:
+    """The ticks (E, T) that lie within measured motion."""
     episodes, length = drives.duties.shape[:2]
     edges = np.zeros((episodes, length + 1))
     np.add.at(edges, (drives.episode, drives.first), 1.0)
@@ -82,7 +82,7 @@ def _driven(drives: Drives) -> Floats:
 
 def _ends(signal: Floats) -> tuple[float, float]:
     low, high = np.quantile(signal, (RARE, 1.0 - RARE)).tolist()
-    return _told(min(low, 0.0)), _told(max(high, 0.0))
+    return _round_knot(min(low, 0.0)), _round_knot(max(high, 0.0))
 
 
 def _corners(signal: Floats, count: int) -> tuple[float, ...]:
@@ -95,7 +95,7 @@ def _corners(signal: Floats, count: int) -> tuple[float, ...]:
     shares = np.linspace(0.0, 1.0, count)
     wanted = (np.quantile(np.clip(moving, low, high), shares) + low + shares * (high - low)) / 2.0
     kept: list[float] = []
-    for value in map(_told, wanted.tolist()):
+    for value in map(_round_knot, wanted.tolist()):
         if abs(value) > least and (not kept or value - kept[-1] > least):
             kept.append(value)
     return tuple(kept)
@@ -108,10 +108,10 @@ def _pairs(speeds: tuple[float, ...], turns: tuple[float, ...]) -> Knots:
 
 
 def _steps(last: float) -> tuple[float, ...]:
-    values = [_told(last * number / TIME_KNOTS) for number in range(1, TIME_KNOTS + 1)]
+    values = [_round_knot(last * number / TIME_KNOTS) for number in range(1, TIME_KNOTS + 1)]
     return tuple(dict.fromkeys(value for value in values if value > 1e-3))
 
 
-def _told(value: float) -> float:
-    """Three digits are enough for a knot."""
+def _round_knot(value: float) -> float:
+    """Round a knot to three digits: more say nothing."""
     return float(f"{value:.3g}")

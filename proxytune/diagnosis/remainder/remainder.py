@@ -7,10 +7,11 @@ import numpy as np
 
 from proxytune.diagnosis.horizon.polish import HORIZONS_S
 from proxytune.diagnosis.horizon.window_slopes import FITTED_S, slopes_of
-from proxytune.diagnosis.horizon.windows import Ratio, Windows, blocks_of, chosen, cut, ratio, strays
+from proxytune.diagnosis.horizon.windows import Ratio, Windows, blocks_of, cut, pose_errors, ratio, select_windows
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
 from proxytune.diagnosis.remainder.group_choice import Choice, Sums, choose, sums
-from proxytune.diagnosis.remainder.offers import offered
+from proxytune.diagnosis.remainder.offers import offer_curves
+from proxytune.diagnosis.rules import RULES
 from proxytune.effects.learnt.effect import Learnt
 from proxytune.effects.learnt.features import GROUPS, LEVEL
 from proxytune.effects.learnt.table import learnt_theta
@@ -24,12 +25,6 @@ FOLDS = 4
 
 ROUNDS = 2
 """It is linearised and its weights are made robust so often."""
-
-HELPS, HARMS = 0.95, 1.02
-"""It is used if it lowers the error beneath the first share at some horizon, and raises it above the second at none."""
-
-FEWEST_PARTS = 6
-"""With fewer blocks nothing is learnt: no held-out error would have an interval."""
 
 
 @dataclass(frozen=True)
@@ -60,30 +55,30 @@ def remainder(drives: Drives, theta: Theta) -> Remainder:
     """
     windows = cut(drives, FITTED_S)
     blocks = len(np.unique(drives.block[windows.begin]))
-    before = strays(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
-    if blocks < FEWEST_PARTS:
+    before = pose_errors(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
+    if blocks < RULES.remainder_parts:
         return Remainder(held_out=before)
-    whole, folds = _fitted(drives, theta)
+    whole, folds = _fit_curves(drives, theta)
     if not whole.gains:
         return Remainder(held_out=before)
     guard = _guard(drives, theta, folds)
     total = sum(whole.gains.values())
     share = {GROUPS[group].title: gain / total for group, gain in whole.gains.items()}
-    after = _crossed(drives, theta, folds, windows)
+    after = _cross_validate(drives, theta, folds, windows)
     return Remainder(whole.theta, share, guard, _helps(guard), after)
 
 
 @dataclass(frozen=True)
-class _Fitted:
+class _CurveFit:
     """A fit's values by their names in θ, and what each group gained."""
 
     theta: Mapping[str, float]
     gains: Mapping[str, float]
 
 
-def _fitted(drives: Drives, theta: Theta) -> tuple[_Fitted, list[_Fitted]]:
-    """The fit to all parts, and those without each fold."""
-    offer, parts = offered(drives, theta), _parts(drives)
+def _fit_curves(drives: Drives, theta: Theta) -> tuple[_CurveFit, list[_CurveFit]]:
+    """Fit the curves to all parts, and without each fold in turn."""
+    offer, parts = offer_curves(drives, theta), _parts(drives)
     groups = _columns(offer)
     weights = np.zeros(sum(len(curve.knots) for curve in offer.curves))
     now: Mapping[str, float] = {}
@@ -94,13 +89,13 @@ def _fitted(drives: Drives, theta: Theta) -> tuple[_Fitted, list[_Fitted]]:
         weights, now = choice.weights, _theta(offer, choice)
         if not choice.gains:
             break
-    folds = [_without(offer, given, groups, fold) for fold in range(FOLDS)] if now else []
-    return _Fitted(now, choice.gains), folds
+    folds = [_fit_without_fold(offer, given, groups, fold) for fold in range(FOLDS)] if now else []
+    return _CurveFit(now, choice.gains), folds
 
 
-def _without(offer: Learnt, given: Sums, groups: Mapping[str, Whole], fold: int) -> _Fitted:
+def _fit_without_fold(offer: Learnt, given: Sums, groups: Mapping[str, Whole], fold: int) -> _CurveFit:
     choice = choose(given.only(np.arange(len(given.size)) % FOLDS != fold), groups)
-    return _Fitted(_theta(offer, choice), choice.gains)
+    return _CurveFit(_theta(offer, choice), choice.gains)
 
 
 def _columns(offer: Learnt) -> dict[str, Whole]:
@@ -123,27 +118,27 @@ def _theta(offer: Learnt, choice: Choice) -> dict[str, float]:
     return learnt_theta(Learnt(offer.seen, curves))
 
 
-def _guard(drives: Drives, theta: Theta, folds: list[_Fitted]) -> dict[float, Ratio]:
+def _guard(drives: Drives, theta: Theta, folds: list[_CurveFit]) -> dict[float, Ratio]:
     found = {}
     for horizon_s in HORIZONS_S:
         windows = cut(drives, horizon_s)
         blocks = blocks_of(drives, windows)
-        if len(np.unique(blocks)) >= FEWEST_PARTS:
-            before = strays(drives, theta, windows)[:, 0] ** 2
-            after = _crossed(drives, theta, folds, windows)
+        if len(np.unique(blocks)) >= RULES.remainder_parts:
+            before = pose_errors(drives, theta, windows)[:, 0] ** 2
+            after = _cross_validate(drives, theta, folds, windows)
             found[horizon_s] = ratio(after, before, blocks)
     return found
 
 
-def _crossed(drives: Drives, theta: Theta, folds: list[_Fitted], windows: Windows) -> Floats:
+def _cross_validate(drives: Drives, theta: Theta, folds: list[_CurveFit], windows: Windows) -> Floats:
     """Squared distance at every compared pose (M,), each predicted by the fit that left its block out."""
     squares = np.empty(len(windows.increment))
     fold_of = drives.block[windows.begin] % _parts(drives) % FOLDS
     for number, fold in enumerate(folds):
         own = fold_of == number
         if own.any():
-            part = chosen(windows, own)
-            squares[own[windows.window]] = strays(drives, {**theta, **fold.theta}, part)[:, 0] ** 2
+            part = select_windows(windows, own)
+            squares[own[windows.window]] = pose_errors(drives, {**theta, **fold.theta}, part)[:, 0] ** 2
     return squares
 
 
@@ -153,5 +148,5 @@ def _parts(drives: Drives) -> int:
 
 
 def _helps(guard: Mapping[float, Ratio]) -> bool:
-    helps = any(one.value < HELPS and one.below for one in guard.values())
-    return helps and all(one.value <= HARMS for one in guard.values())
+    helps = any(one.value < RULES.remainder_helps and one.below for one in guard.values())
+    return helps and all(one.value <= RULES.remainder_harms for one in guard.values())

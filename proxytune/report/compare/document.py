@@ -27,7 +27,13 @@ def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -
         f"{name}: the answer after {budget} evaluations, {first.seeds} seeds",
         ("fresh score", f"less {first.engine}'s", "θ error", "s per\nproposal"),
         [
-            (one.engine, told(one.score, ".1f"), told(one.regret_difference, ".1f"), told(one.error, ".2f"), _time(one))
+            (
+                one.engine,
+                with_interval(one.score, ".1f"),
+                with_interval(one.regret_difference, ".1f"),
+                with_interval(one.error, ".2f"),
+                _time(one),
+            )
             for one in summaries
         ],
     )
@@ -49,7 +55,7 @@ def _time(one: EngineSummary) -> str:
 
 
 def _paired(one: EngineSummary) -> tuple[str, str]:
-    return told(one.ratio, ".2f"), told(one.saved, ".1f")
+    return with_interval(one.ratio, ".2f"), with_interval(one.saved, ".1f")
 
 
 def _of(count: int | None, seeds: int) -> str:
@@ -61,7 +67,7 @@ def _region(region: Region | None, seeds: int) -> tuple[str, ...]:
         return ("", "", "", "")
     by_parameter = (region.intervals_covered or {}).items()
     held = "\n".join(f"{name} {count}" for name, count in by_parameter)
-    return _of(region.covered, seeds), told(region.share, ".1%"), held, _of(region.misfits, seeds)
+    return _of(region.covered, seeds), with_interval(region.share, ".1%"), held, _of(region.misfits, seeds)
 
 
 def _table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
@@ -94,7 +100,7 @@ def verdict(summary: EngineSummary) -> str:
     return "needs no significantly fewer evaluations"
 
 
-def told(estimate: Estimate | None, digits: str) -> str:
+def with_interval(estimate: Estimate | None, digits: str) -> str:
     """A figure with its interval; empty where there is none."""
     if estimate is None:
         return ""

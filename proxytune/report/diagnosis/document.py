@@ -8,11 +8,11 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.diagnosis.diagnosis import Diagnosis, Estimate, main_error
 from proxytune.diagnosis.horizon.windows import Ratio
 from proxytune.diagnosis.horizon_error import HorizonError
-from proxytune.diagnosis.naming.found import Adopted
+from proxytune.diagnosis.naming.findings import AdoptedEffect
 from proxytune.diagnosis.naming.materiality import Worth
+from proxytune.diagnosis.result import Diagnosis, Estimate, main_error
 from proxytune.driving.robot import robot_names
 from proxytune.effects import Catalogue, Model, model_text
 from proxytune.logs import GEOMETRY
@@ -57,7 +57,7 @@ def _estimate(estimate: Estimate) -> dict[str, Any]:
     return {"value": estimate.value, "interval": list(estimate.interval), "unit": estimate.unit}
 
 
-def _effect(effect: Adopted, theta: Mapping[str, Estimate], catalogue: Catalogue) -> dict[str, Any]:
+def _effect(effect: AdoptedEffect, theta: Mapping[str, Estimate], catalogue: Catalogue) -> dict[str, Any]:
     kind = catalogue.effect(effect.effect)
     names = dict(zip(catalogue.theta_names(effect.effect), (one.name for one in kind.parameters), strict=True))
     return {
@@ -70,7 +70,7 @@ def _effect(effect: Adopted, theta: Mapping[str, Estimate], catalogue: Catalogue
     }
 
 
-def _added_document(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
+def _added_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
     worth = _worth(diagnosis.worth.get(effect.effect, {}))
     return _effect(effect, diagnosis.theta, diagnosis.robot.catalogue) | {
         "worth": worth,
@@ -78,7 +78,7 @@ def _added_document(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _immaterial_document(effect: Adopted, diagnosis: Diagnosis) -> dict[str, Any]:
+def _immaterial_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
     """An effect that was dropped; `changes_error_by` is for the horizon where it matters most."""
     worth = diagnosis.worth.get(effect.effect, {})
     horizon = decisive(worth) if worth else None

@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, drawn_wheel_speeds, wheel_speeds
+from proxytune.diagnosis.naming.findings import AdoptedEffect
 from proxytune.diagnosis.naming.flexible import Curve
-from proxytune.diagnosis.naming.found import Adopted
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.effects import Catalogue, Means, WheelCurve
 from proxytune.report.diagnosis.means import ANY, GROUPS, draw_means, means_figure, rates_of, retuned
 from proxytune.report.diagnosis.model_names import BEFORE, after
@@ -47,7 +47,7 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
     return _wheels_figure(diagnosis) if kind is WheelCurve.STEADY else _steps_figure(diagnosis)
 
 
-def _curve_kind(effect: Adopted, catalogue: Catalogue) -> WheelCurve | Means:
+def _curve_kind(effect: AdoptedEffect, catalogue: Catalogue) -> WheelCurve | Means:
     trace = catalogue.effect(effect.effect).trace
     return trace.shown_in(effect.form) if trace else WheelCurve.STEP
 

@@ -7,12 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.horizon.windows import Rmse
 from proxytune.diagnosis.horizon_error import HorizonError
-from proxytune.diagnosis.naming.choice import P_VALUE
-from proxytune.diagnosis.naming.found import Tried
-from proxytune.diagnosis.naming.round import LEAST_GAIN
+from proxytune.diagnosis.naming.findings import TriedEffect
+from proxytune.diagnosis.result import Diagnosis
+from proxytune.diagnosis.rules import RULES
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.learnt_figure import learnt_figure
 from proxytune.report.diagnosis.model_names import BEFORE, after
@@ -24,6 +23,8 @@ SHOWN = 15
 
 JUDGES = 6
 """So many signals are ranked beneath them."""
+
+LEAST_GAIN = RULES.least_gain_nats
 
 LINEAR = 20.0
 """Evidence of no more than so many thresholds is drawn on a linear axis."""
@@ -40,7 +41,7 @@ class _Role(NamedTuple):
 ADOPTED = _Role("adopted", BLUE, BLUE)
 RIVAL = _Role("rival of an adopted effect", LIGHT_BLUE, LIGHT_BLUE)
 OTHER = _Role("other named effect", GREY, GREY)
-CHANCE = _Role(f"named effect, p > {P_VALUE:g}", GREY, "white")
+CHANCE = _Role(f"named effect, p > {RULES.p_value:g}", GREY, "white")
 SIGNAL = _Role("free curve over this signal", PURPLE, PURPLE)
 
 
@@ -90,13 +91,13 @@ def _scale(axes: Axes, gains: Sequence[float]) -> None:
         axes.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
 
 
-def _role(diagnosis: Diagnosis, tried: Tried) -> _Role:
+def _role(diagnosis: Diagnosis, tried: TriedEffect) -> _Role:
     adopted = diagnosis.found.adopted
     if any((one.effect, one.form) == (tried.effect, tried.form) for one in adopted):
         return ADOPTED
     if any(rival.effect == tried.effect for one in adopted for rival in one.rivals):
         return RIVAL
-    return OTHER if tried.p_value <= P_VALUE else CHANCE
+    return OTHER if tried.p_value <= RULES.p_value else CHANCE
 
 
 def _dots(axes: Axes, ranked: Sequence[tuple[str, float]], roles: Sequence[_Role]) -> None:

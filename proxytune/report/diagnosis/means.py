@@ -7,13 +7,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.measured.drives import Drives, Floats
-from proxytune.diagnosis.model.coordinates import placed, span
+from proxytune.diagnosis.model.coordinates import span, theta_at
 from proxytune.diagnosis.model.fitting import Fit
 from proxytune.diagnosis.model.innovations import HUBER
-from proxytune.diagnosis.model.replay import disturbed, increments
+from proxytune.diagnosis.model.replay import disturbed_increments, increments
 from proxytune.diagnosis.naming.flexible import Curve
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.effects.trace import TURN, Panel
 from proxytune.report.diagnosis.model_names import BEFORE, after
 from proxytune.report.style import BLUE, GREY, PURPLE, VERMILLION, dress, legend_below
@@ -78,7 +78,8 @@ def rates_of(diagnosis: Diagnosis, curve: Curve | None) -> Rates:
     if found.adopted:
         added[after(diagnosis)] = increments(drives, found.model.theta) - declared
     if curve is not None and curve.gain > 0.0:
-        added[ANY] = disturbed(drives, retuned(found.declared, curve), curve.group.twists @ curve.weights) - declared
+        free = curve.group.twists @ curve.weights
+        added[ANY] = disturbed_increments(drives, retuned(found.declared, curve), free) - declared
     return Rates(_channels(drives, declared), {name: _channels(drives, moved) for name, moved in added.items()})
 
 
@@ -87,13 +88,13 @@ def retuned(declared: Fit, curve: Curve) -> Theta:
     drives, theta = declared.drives, declared.theta
     if not declared.free:
         return theta
-    moved = disturbed(drives, theta, curve.group.twists @ curve.weights) - increments(drives, theta)
+    moved = disturbed_increments(drives, theta, curve.group.twists @ curve.weights) - increments(drives, theta)
     left = declared.innovations - declared.whiten.whiten(moved)
     inner = np.abs(left) < HUBER
     step = -np.linalg.lstsq(declared.slopes[inner], left[inner], rcond=None)[0]
     low, high = np.array([span(coordinate, drives.robot) for coordinate in declared.free]).T
     here = np.array([theta[coordinate[0]] for coordinate in declared.free])
-    return placed(theta, declared.free, np.clip(here + step * (high - low), low, high))
+    return theta_at(theta, declared.free, np.clip(here + step * (high - low), low, high))
 
 
 def _channels(drives: Drives, moved: Floats) -> dict[str, Floats]:

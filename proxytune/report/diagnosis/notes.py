@@ -1,9 +1,10 @@
 """What a diagnosis says in sentences: each effect and its worth, what does not matter, what is left, what to drive."""
 
-from proxytune.diagnosis.diagnosis import Diagnosis
 from proxytune.diagnosis.horizon.windows import Ratio
-from proxytune.diagnosis.naming.found import Adopted
-from proxytune.diagnosis.naming.materiality import MATERIAL, Worth
+from proxytune.diagnosis.naming.findings import AdoptedEffect
+from proxytune.diagnosis.naming.materiality import Worth
+from proxytune.diagnosis.result import Diagnosis
+from proxytune.diagnosis.rules import RULES
 from proxytune.report.diagnosis.clocks import clocks_notes
 from proxytune.report.diagnosis.learnt import learnt_notes
 from proxytune.report.diagnosis.likeness import unlike_notes
@@ -56,10 +57,10 @@ def decisive(worth: Worth) -> float:
 
 def may_matter(worth: Worth) -> bool:
     """Whether these drives leave it open that an effect matters."""
-    return any(one.interval[1] >= MATERIAL for one in worth.values())
+    return any(one.interval[1] >= RULES.material_factor for one in worth.values())
 
 
-def _say_added(diagnosis: Diagnosis, effect: Adopted) -> str:
+def _say_added(diagnosis: Diagnosis, effect: AdoptedEffect) -> str:
     rivals = ", ".join(rival.label for rival in effect.rivals)
     beside = f"; these drives fit {rivals} as well" if rivals else ""
     worth = diagnosis.worth.get(effect.effect, {})
@@ -68,7 +69,7 @@ def _say_added(diagnosis: Diagnosis, effect: Adopted) -> str:
     return f"added {_label(effect)}: {_gain(effect)}, p = {effect.p_value:.3f}{larger}{beside}"
 
 
-def _say_immaterial(effect: Adopted, diagnosis: Diagnosis) -> str:
+def _say_immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
     worth = diagnosis.worth.get(effect.effect, {})
     if not worth:
         return f"not shown to matter: {_label(effect)}, {_gain(effect)}"
@@ -79,17 +80,17 @@ def _say_immaterial(effect: Adopted, diagnosis: Diagnosis) -> str:
     return f"{kind}: {_label(effect)}{_values(effect, diagnosis)}, {_gain(effect)}, {change}"
 
 
-def _values(effect: Adopted, diagnosis: Diagnosis) -> str:
+def _values(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
     """The fitted values of an effect that is no longer in the model."""
     estimates = {name: estimate for name, estimate in diagnosis.dropped_values.items() if name in effect.names}
     return "".join(f" {estimate.value:.3g} {estimate.unit}".rstrip() for estimate in estimates.values())
 
 
-def _gain(effect: Adopted) -> str:
+def _gain(effect: AdoptedEffect) -> str:
     return f"log-likelihood gain {effect.gain:.0f} nats"
 
 
-def _label(effect: Adopted) -> str:
+def _label(effect: AdoptedEffect) -> str:
     return f"{effect.effect} ({effect.form})" if effect.form else effect.effect
 
 

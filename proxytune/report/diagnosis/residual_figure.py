@@ -10,9 +10,9 @@ from matplotlib.collections import Collection, LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.diagnosis import Diagnosis
-from proxytune.diagnosis.horizon.windows import cut, strays
+from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
+from proxytune.diagnosis.result import Diagnosis
 from proxytune.report.diagnosis.model_names import BEFORE, after
 from proxytune.report.style import BLUE, GREY, VERMILLION, dress, legend_below
 from proxytune.space import Theta
@@ -72,7 +72,7 @@ def strayed(diagnosis: Diagnosis) -> dict[str, Strayed]:
 
 def _strayed(drives: Drives, theta: Theta, horizon_s: float) -> Strayed:
     windows = cut(drives, horizon_s)
-    distance = 1e3 * strays(drives, dict(theta), windows)[:, 0]
+    distance = 1e3 * pose_errors(drives, dict(theta), windows)[:, 0]
     rms = np.sqrt(np.bincount(windows.window, distance**2) / np.bincount(windows.window))
     return Strayed(horizon_s, windows.window, windows.increment, distance, rms)
 

@@ -59,7 +59,7 @@ def _trials(axes: Axes, result: StudyResult) -> None:
     if failed:
         axes.plot(failed, np.zeros(len(failed)), "x", color=VERMILLION, markersize=4, label="failed")
     if bounds:
-        axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="stopped early (lower bound)")
+        axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="stopped early, at least")
 
 
 def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) -> None:

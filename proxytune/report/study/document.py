@@ -8,11 +8,11 @@ from proxytune.report.study.knowledge_document import intervals_document, knowle
 from proxytune.report.study.verdict import sentence
 from proxytune.search.knowledge.importance import Importance
 from proxytune.storage.records import TrialRecord
-from proxytune.study.confirmation import Confirmation
 from proxytune.study.objective import PRPV
-from proxytune.study.preflight import Preflight
 from proxytune.study.result import StudyResult
 from proxytune.study.settings import as_document
+from proxytune.study.stages.confirmation import Confirmation
+from proxytune.study.stages.preflight import Preflight
 
 
 def study_document(result: StudyResult) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from proxytune.report.scores.document import document_of
 from proxytune.sweep.curves import Series, series_of
 from proxytune.sweep.discrepancy import METRICS
 from proxytune.sweep.sweep import Curve, PodMean, SweepPoint
-from proxytune.sweep.trend import shape_of, told
+from proxytune.sweep.trend import describe, shape_of
 from proxytune.usefulness import MEASURES
 from proxytune.usefulness.catalogue import PRPV
 
@@ -82,7 +82,7 @@ def curve_tables(curve: Curve) -> tuple[Table, Table]:
 def curve_lines(curve: Curve) -> list[str]:
     """What the curve shows, a line per measure: where it is best, and whether it worsens on both sides."""
     held_at = curve.base.get(curve.parameter)
-    return [f"{curve.parameter}: {told(series, held_at)}" for series in series_of(curve)]
+    return [f"{curve.parameter}: {describe(series, held_at)}" for series in series_of(curve)]
 
 
 def failures(curves: Sequence[Curve]) -> list[str]:

@@ -5,7 +5,7 @@ from typing import Any
 
 from proxytune.learning.plv import Curve, Estimate
 from proxytune.study.settings import as_document
-from proxytune.teaching.experiment import Experiment, Lesson, teaching_settings
+from proxytune.teaching.experiment import Experiment, TeacherResult, teaching_settings
 
 
 def teach_document(experiment: Experiment, prpv: Mapping[str, float | None]) -> dict[str, Any]:
@@ -20,12 +20,12 @@ def teach_document(experiment: Experiment, prpv: Mapping[str, float | None]) -> 
             "settled": experiment.settled,
         },
         "without": _curve(experiment.without),
-        "proxies": {lesson.name: _lesson(lesson, prpv.get(lesson.name)) for lesson in experiment.lessons},
+        "proxies": {lesson.name: _lesson(lesson, prpv.get(lesson.name)) for lesson in experiment.teachers},
         "settings": {**as_document(experiment.settings), "teaching": _settings(experiment)},
     }
 
 
-def _lesson(lesson: Lesson, prpv: float | None) -> dict[str, Any]:
+def _lesson(lesson: TeacherResult, prpv: float | None) -> dict[str, Any]:
     worth = lesson.worth
     figures = ("without", "needed", "plv", "factor", "reduction")
     return {

@@ -32,7 +32,7 @@ def teach_figure(experiment: Experiment) -> Figure:
     figure = Figure(figsize=(5.2, 3.6), layout="constrained")
     axes = figure.subplots()
     _curve(axes, experiment.without, NONE, ("black", ":", "x"))
-    for lesson, look in zip(experiment.lessons, LOOKS * len(experiment.lessons), strict=False):
+    for lesson, look in zip(experiment.teachers, LOOKS * len(experiment.teachers), strict=False):
         _curve(axes, lesson.curve, lesson.name, look)
     axes.axhline(experiment.when.threshold, color=GREY, linewidth=0.8, linestyle="--", label="converged")
     smallest = experiment.without.counts[1]

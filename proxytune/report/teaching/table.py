@@ -9,7 +9,7 @@ from rich.text import Text
 
 from proxytune.learning.plv import Estimate
 from proxytune.learning.settings import NONE
-from proxytune.teaching.experiment import Experiment, Lesson
+from proxytune.teaching.experiment import Experiment, TeacherResult
 
 COLUMNS = ("proxy", "PRPV", "zero-shot score", "samples needed", "PLV", "reduction")
 NOT_REACHED, UNKNOWN = "not converged", "unknown"
@@ -30,12 +30,12 @@ def teach_table(experiment: Experiment, prpv: Mapping[str, float | None], files:
 
 def table_rows(experiment: Experiment, prpv: Mapping[str, float | None]) -> list[tuple[str, ...]]:
     """The rows of table 1 as texts: the learner without a proxy, then one per proxy."""
-    worth = next((lesson.worth for lesson in experiment.lessons if lesson.worth), None)
+    worth = next((lesson.worth for lesson in experiment.teachers if lesson.worth), None)
     alone = (NONE, "", "", count(worth.without) if worth else NOT_REACHED, "", "")
-    return [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in experiment.lessons)]
+    return [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in experiment.teachers)]
 
 
-def _row(lesson: Lesson, prpv: float | None) -> tuple[str, ...]:
+def _row(lesson: TeacherResult, prpv: float | None) -> tuple[str, ...]:
     worth, zero_shot = lesson.worth, f"{lesson.curve.mean[0]:.1f}"
     predicts = "" if prpv is None else f"{prpv:g}"
     if worth is None:
@@ -48,7 +48,7 @@ def convergence_lines(experiment: Experiment) -> list[str]:
     when, last = experiment.when, experiment.without.counts[-1]
     converged = CONVERGED.format(f"{when.threshold:.1f} of {experiment.best_score:g}")
     if experiment.settled:
-        return [converged, *(line for lesson in experiment.lessons for line in _say_factor(lesson))]
+        return [converged, *(line for lesson in experiment.teachers for line in _say_factor(lesson))]
     return [
         converged,
         f"without a proxy the score still rises by more than {when.tolerance:g} up to {last} target samples: it has "
@@ -56,7 +56,7 @@ def convergence_lines(experiment: Experiment) -> list[str]:
     ]
 
 
-def _say_factor(lesson: Lesson) -> list[str]:
+def _say_factor(lesson: TeacherResult) -> list[str]:
     """The factor by which a proxy divides the target samples that are needed."""
     worth = lesson.worth
     if worth is None or worth.factor.value is None:

@@ -1,4 +1,4 @@
-"""What a search for missing effects came to."""
+"""What a search for missing effects finds: effects tried, adopted and dropped, and the models with them."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from proxytune.diagnosis.naming.flexible import Curve
 from proxytune.space import Theta
 
 
-class Tried(NamedTuple):
+class TriedEffect(NamedTuple):
     """An effect that was tried.
 
     Attributes:
@@ -28,7 +28,7 @@ class Tried(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Adopted:
+class AdoptedEffect:
     """An effect that was added to the model.
 
     Attributes:
@@ -59,8 +59,8 @@ class Variant(NamedTuple):
     free: tuple[Coordinate, ...]
 
 
-def lacking(variant: Variant, effect: Adopted, rate_hz: float) -> Variant:
-    """A model less an effect; the mean lateness of one that draws becomes a part of the delay again."""
+def without_effect(variant: Variant, effect: AdoptedEffect, rate_hz: float) -> Variant:
+    """A model without an effect; the mean lateness of an effect that draws becomes a part of the delay again."""
     theta = {name: value for name, value in variant.theta.items() if name not in effect.names}
     late = lateness(variant.theta, rate_hz) - lateness(theta, rate_hz)
     if late > 0.0:
@@ -68,17 +68,17 @@ def lacking(variant: Variant, effect: Adopted, rate_hz: float) -> Variant:
     return Variant(theta, tuple(coordinate for coordinate in variant.free if coordinate not in effect.free))
 
 
-class Dropped(NamedTuple):
+class DroppedEffect(NamedTuple):
     """An effect that was dropped, the model that had it, and whether it is shown to have done harm to predictions."""
 
-    effect: Adopted
+    effect: AdoptedEffect
     beside: Variant
     harmful: bool = False
 
 
 @dataclass(frozen=True)
-class Found:
-    """What the search came to.
+class Findings:
+    """What a search for missing effects finds.
 
     Attributes:
         declared: The model with declared parameters only.
@@ -92,8 +92,8 @@ class Found:
 
     declared: Fit
     model: Fit
-    adopted: tuple[Adopted, ...]
-    tried: tuple[Tried, ...]
+    adopted: tuple[AdoptedEffect, ...]
+    tried: tuple[TriedEffect, ...]
     remainder: tuple[Curve, ...]
     curves: tuple[Curve, ...]
-    immaterial: tuple[Dropped, ...] = ()
+    immaterial: tuple[DroppedEffect, ...] = ()

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from proxytune.domain import Episode, Outcome, make_episode
 from proxytune.seeds import preflight_noise_seed, preflight_seed
 from proxytune.space import Interval, Theta
-from proxytune.study.movement import LOOKS, Movement, judge
 from proxytune.study.settings import StudySettings
+from proxytune.study.stages.movement import LOOKS, Movement, judge
 from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
 

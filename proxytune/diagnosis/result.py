@@ -1,4 +1,4 @@
-"""What a log says of a model: the whole answer of a diagnosis."""
+"""The result of a diagnosis: everything that a log says of a model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from proxytune.diagnosis.measured.clocks import Clocks
 from proxytune.diagnosis.measured.split import Parts
 from proxytune.diagnosis.model.coordinates import at_edge
 from proxytune.diagnosis.model.innovations import Noise
-from proxytune.diagnosis.naming.found import Adopted, Found
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings
 from proxytune.diagnosis.naming.likeness import Unlike
 from proxytune.diagnosis.naming.materiality import Worth
 from proxytune.diagnosis.remainder.learning import Learning
@@ -61,8 +61,8 @@ class Diagnosis:
     verdict: str
     declared: Mapping[str, Estimate]
     theta: Mapping[str, Estimate]
-    effects: tuple[Adopted, ...]
-    immaterial: tuple[Adopted, ...]
+    effects: tuple[AdoptedEffect, ...]
+    immaterial: tuple[AdoptedEffect, ...]
     worth: Mapping[str, Worth]
     polish: Polish | None
     residual_depends_on: tuple[str, ...]
@@ -71,7 +71,7 @@ class Diagnosis:
     could_not_be_seen: tuple[str, ...]
     manoeuvre: Manoeuvre | None
     parts: Parts
-    found: Found
+    found: Findings
     clocks: tuple[Clocks, ...]
     unlike: Unlike | None
     drive_names: tuple[str, ...]
@@ -86,7 +86,7 @@ class Diagnosis:
             for name in effect.names
         }
 
-    def at_edge(self, effect: Adopted) -> tuple[str, ...]:
+    def at_edge(self, effect: AdoptedEffect) -> tuple[str, ...]:
         """Parameters of an effect, by name in θ, that were fitted to an end of their range which is not neutral.
 
         The effect then stands for something else.
@@ -102,5 +102,5 @@ class Diagnosis:
 
 
 def main_error(errors: Sequence[HorizonError]) -> HorizonError:
-    """The one error that stands for all."""
+    """The error at the main horizon, which stands for all."""
     return min(errors, key=lambda error: abs(error.horizon_s - MAIN_S))

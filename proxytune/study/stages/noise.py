@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proxytune.scores import Array
-from proxytune.study.preflight import placement_pairs
+from proxytune.study.stages.preflight import placement_pairs
 from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
 from proxytune.usefulness.repeats import start_of

@@ -11,11 +11,11 @@ sys.path.append(str(Path(__file__).parent))
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.model.fitting import evaluate
-from proxytune.diagnosis.naming.found import Adopted, Found
-from proxytune.diagnosis.naming.names import names as naming
+from proxytune.diagnosis.naming import names as naming
+from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings
 
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
-SLIP, SCRUB = (Adopted(name, "", (name,), ((name,),), 60.0, 0.002, ()) for name in ("lateral_slip", "yaw_scrub"))
+SLIP, SCRUB = (AdoptedEffect(name, "", (name,), ((name,),), 60.0, 0.002, ()) for name in ("lateral_slip", "yaw_scrub"))
 
 
 @pytest.fixture(scope="module")
@@ -26,24 +26,24 @@ def base():
 def searching(answers, asked):
     """A search that adopts what is given, in that order, less what it is to do without."""
 
-    def search(base, seed, told, without=()):
+    def search(base, seed, report, without=()):
         asked.append(without)
         effects = tuple(effect for effect in answers if effect.effect not in without)
         theta = {**TRUTH, **{effect.effect: MIXED[effect.effect] for effect in effects}}
         free = DECLARED + tuple(coordinate for effect in effects for coordinate in effect.free)
-        return Found(base, evaluate(base.drives, theta, free, NOISE), effects, (), (), ())
+        return Findings(base, evaluate(base.drives, theta, free, NOISE), effects, (), (), ())
 
     return search
 
 
 def named(base, monkeypatch, *answers, harmful=True):
-    whole = naming.without_immaterial
+    whole = naming.drop_immaterial
 
     def weighed(found, seed):
         kept = whole(found, seed)
         return replace(kept, immaterial=tuple(one._replace(harmful=harmful) for one in kept.immaterial))
 
-    monkeypatch.setattr(naming, "without_immaterial", weighed)
+    monkeypatch.setattr(naming, "drop_immaterial", weighed)
     asked, told = [], []
     monkeypatch.setattr(naming, "search", searching(answers, asked))
     return naming.name_effects(base, 1, told.append), asked, told
@@ -70,7 +70,7 @@ def test_an_effect_that_was_found_last_and_does_not_matter_misled_nobody(base, m
 
 
 def test_the_second_search_is_not_taken_where_it_predicts_worse(base, monkeypatch):
-    monkeypatch.setattr(naming, "no_worse", lambda one, other: False)
+    monkeypatch.setattr(naming, "predicts_no_worse", lambda one, other: False)
     found, asked, _ = named(base, monkeypatch, SLIP, SCRUB)
     assert len(asked) == 2
     assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]

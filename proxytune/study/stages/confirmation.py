@@ -21,7 +21,7 @@ from proxytune.storage.records import TrialRecord
 from proxytune.study.evaluation import plan, score, table
 from proxytune.study.knowledge import knowledge_of
 from proxytune.study.settings import StudySettings
-from proxytune.study.stopping import stopped
+from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import Assessment, assess, floor_of_repeats

@@ -1,0 +1,1 @@
+"""What commands share: their answer, progress, interruption, and the folder that a PATH means."""

@@ -1,0 +1,244 @@
+"""The lane-following domain family: a robot on a map, its plant, camera and effects."""
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.domain import Demonstration, Episode, Policy, Recording
+from proxytune.driving import task
+from proxytune.driving.agents import Picture
+from proxytune.driving.agents.loading import load_agent
+from proxytune.driving.agents.playback import Playback
+from proxytune.driving.agents.pupil import Pupil
+from proxytune.driving.bullet.plant import BulletPlant
+from proxytune.driving.bullet.renderer import BulletCamera
+from proxytune.driving.cameras import Camera, GroundPlaneCamera
+from proxytune.driving.drivetrain import drivetrain
+from proxytune.driving.episode import TICK_HZ, Course, Drive, Driver, Instance, Sight, drive, measured, picture_only
+from proxytune.driving.expert import Expert
+from proxytune.driving.identity import earlier_identities, identity_of
+from proxytune.driving.planar import PlanarPlant
+from proxytune.driving.plant import Plant
+from proxytune.driving.road.lane import off_map
+from proxytune.driving.road.maps import Road
+from proxytune.driving.road.reading import shipped_map
+from proxytune.driving.road.texture import draw_floor
+from proxytune.driving.robot import Robot, read_robot, robot_home
+from proxytune.effects import (
+    Catalogue,
+    Effect,
+    Setting,
+    Signal,
+    Stage,
+    effects_from,
+    stage_chain,
+)
+from proxytune.space import Parameter, Theta
+from proxytune.versions import versions_of
+
+PLANTS = ("bullet", "planar")
+CAMERAS = ("ground_plane", "renderer")
+
+
+class Observation(NamedTuple):
+    """What recorded commands lead to.
+
+    Attributes:
+        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
+        pictures: The picture before every command, (steps, rows, columns, 3).
+    """
+
+    poses: Signal
+    pictures: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class LaneFollowing:
+    """S_Θ of a robot that follows a lane.
+
+    Attributes:
+        robot: Name of the robot.
+        plant: One of PLANTS.
+        camera: One of CAMERAS.
+        map: The road, whether the package's or the user's own.
+        seconds: Longest time an episode takes [s].
+        position_noise_m: Standard deviation of where the robot is put down [m].
+        heading_noise_deg: Standard deviation of how it is turned [deg].
+        effects: Values of effects besides the robot's nominal ones, sorted by name.
+        folder: Where a user's own agents, effects and robots lie.
+    """
+
+    robot: str
+    plant: str
+    camera: str
+    map: Road
+    seconds: float
+    position_noise_m: float
+    heading_noise_deg: float
+    effects: tuple[tuple[str, float], ...]
+    folder: Path
+
+    @property
+    def identity(self) -> str:
+        """A digest of settings, of what robot, code and the user's modules mean, and of versions."""
+        settings = tuple(getattr(self, name) for name in self.__dataclass_fields__ if name != "folder")
+        return identity_of(settings, robot_home(self.robot, self.folder), self.folder, self.versions)
+
+    @property
+    def earlier_identities(self) -> tuple[str, ...]:
+        """Identities under which earlier code kept episodes that are the very same."""
+        # Maps were known by their names: one of another name, or changed since, has no earlier episodes.
+        name = self.map.name if self.map == shipped_map("small_loop") else "none of then"
+        world = (self.robot, self.plant, self.camera, name, self.seconds)
+        settings = (*world, self.position_noise_m, self.heading_noise_deg, self.effects)
+        return earlier_identities(settings, robot_home(self.robot, self.folder), self.folder)
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Versions of the packages that simulate."""
+        with_bullet = self.plant == "bullet" or self.camera == "renderer"
+        return versions_of(("numpy", "pybullet") if with_bullet else ("numpy",))
+
+    @property
+    def metrics(self) -> Mapping[str, str]:
+        """The task's metrics with their units."""
+        return task.METRICS
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Every parameter of the catalogue of effects, a user's own when asked for by name."""
+        return Catalogue(self.folder).parameters
+
+    @property
+    def starts(self) -> int:
+        """How many starting poses the map has."""
+        return len(self.map.starts)
+
+    def check_agent(self, name: str) -> None:
+        """Load the agent once.
+
+        Raises:
+            SettingsError: If there is no such agent.
+        """
+        load_agent(name, self.folder)
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        """Drive one episode and score it.
+
+        Raises:
+            EpisodeError: With the time at which the agent failed.
+        """
+        return task.score_trajectory(self.map, self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+
+    def record(self, episode: Episode) -> Recording:
+        """Drive one episode; its scores, the true pose at every tick, and the duties of both wheels.
+
+        Raises:
+            EpisodeError: With the time at which the agent failed.
+        """
+        driven, control_hz = self.drive(episode), read_robot(self.robot, self.folder).figures["control_rate"]
+        metrics = task.score_trajectory(self.map, driven.poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        return Recording(metrics, *driven.columns(control_hz))
+
+    def drive(self, episode: Episode) -> Drive:
+        """Drive one episode.
+
+        Raises:
+            EpisodeError: With the time at which the agent failed.
+        """
+        return self._drive(episode, load_agent(episode.agent, self.folder), self._course(episode, self.seconds))
+
+    @property
+    def best_score(self) -> float:
+        """Both wheels in the lane until time is over."""
+        return self.seconds
+
+    def demonstrate(self, episode: Episode, seconds: float) -> tuple[Demonstration, int]:
+        """Let the robot's expert drive for some time [s]; steps off the road are not worth imitating.
+
+        Raises:
+            SettingsError: If the robot has no expert.
+        """
+        robot = read_robot(self.robot, self.folder)
+        expert = Expert(self.map, *robot.expert_figures(), seed=episode.seed)
+        shown = self._drive(episode, expert, self._course(episode, seconds), Sight).memory
+        kept = np.array(shown.on_road)
+        samples = Demonstration(np.stack(shown.pictures)[kept], np.stack(shown.commands)[kept])
+        return samples, round(seconds * robot.figures["control_rate"])
+
+    def examine(self, episode: Episode, policy: Policy) -> float:
+        """The paper's driving score of a policy, from −`seconds` to `seconds`.
+
+        Raises:
+            EpisodeError: If the policy raises or does not answer with two finite duties.
+            SettingsError: If the robot does not state the distance between its wheels.
+        """
+        wheel_distance = read_robot(self.robot, self.folder).wheel_distance()
+        driven = self._drive(episode, Pupil(policy), self._course(episode, self.seconds))
+        return task.driving_score(
+            self.map,
+            driven.poses,
+            wheel_distance=wheel_distance,
+            tick_s=1.0 / TICK_HZ,
+            seconds=self.seconds,
+        )
+
+    def measured(self, episode: Episode, driven: Drive) -> Signal:
+        """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
+        return measured(self.instance(dict(episode.theta)), driven.poses, episode.seed)
+
+    def replay(self, episode: Episode, commands: Signal) -> Observation:
+        """Drive recorded commands (steps, 2), one per control step, in place of the episode's agent.
+
+        It goes on wherever it leads, so that two domains can be compared step by step.
+        """
+        seconds = len(commands) / read_robot(self.robot, self.folder).figures["control_rate"]
+        course = Course(self._start(episode), seconds, episode.seed, lambda x, y: False)
+        driven = self._drive(episode, Playback(commands), course)
+        return Observation(driven.poses, np.stack(driven.memory.pictures))
+
+    def _start(self, episode: Episode) -> Signal:
+        noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
+        return np.asarray(task.start_pose(self.map, episode.start, seed=episode.seed, **noise))
+
+    def _course(self, episode: Episode, seconds: float) -> Course:
+        return Course(self._start(episode), seconds, episode.seed, functools.partial(off_map, self.map))
+
+    def _drive(
+        self, episode: Episode, driver: Driver, course: Course, sees: Callable[[Picture, Signal], Any] = picture_only
+    ) -> Drive:
+        instance = self.instance(dict(episode.theta))
+        with self.plant_at(instance.robot, course.start) as plant:
+            return drive(instance, plant, driver, course, sees)
+
+    def instance(self, theta: Theta) -> Instance:
+        """The domain instance S_θ: nominal effects, then the family's, then θ."""
+        return _instance(self, tuple(sorted(theta.items())))
+
+    def plant_at(self, robot: Robot, start: Signal) -> Plant:
+        """The plant with the robot at a starting pose."""
+        return BulletPlant(robot, start, 1.0 / TICK_HZ) if self.plant == "bullet" else PlanarPlant(start, 1.0 / TICK_HZ)
+
+
+@functools.lru_cache(maxsize=4)
+def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
+    robot = read_robot(family.robot, family.folder)
+    effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
+    camera = _camera(family, robot, effects)
+    image, measurement = (stage_chain(effects, stage) for stage in (Stage.IMAGE, Stage.MEASUREMENT))
+    return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
+
+
+def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) -> Camera:
+    figures = robot.camera_figures()
+    mounting = stage_chain(effects, Stage.CAMERA)
+    nominal = figures.channels()
+    memory = mounting.begin(Setting(TICK_HZ, nominal, robot.figures))
+    mounted = figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
+    floor = draw_floor(family.map)
+    return GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)

@@ -1,0 +1,1 @@
+"""What happens to a study in turn: pre-flight, cutting trials off, stopping, confirmation."""

@@ -1,0 +1,136 @@
+"""A search box is asked and told: it finds an optimum, repeats itself, and refuses what was not asked."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune import Engine, InputError, SearchBox
+from proxytune.search.engines.random_points import RandomPoints
+from proxytune.search.engines.registry import WITH_OUTPUTS
+
+BOX = {"trim": (-0.3, 0.3), "delay": (0.0, 0.3)}
+
+
+def bowl(theta):
+    """Lowest, 0, at trim 0.1 and delay 0.2."""
+    return ((theta["trim"] - 0.1) / 0.6) ** 2 + ((theta["delay"] - 0.2) / 0.3) ** 2
+
+
+def searched(count, score=bowl, **options):
+    box = SearchBox(BOX, **options)
+    for _ in range(count):
+        theta = box.ask()
+        box.tell(theta, score(theta))
+    return box
+
+
+def test_the_optimum_of_a_toy_is_found_ten_times_better_than_by_the_design():
+    box = searched(18)
+    design = box.trials().score[:8].min()
+    theta, score = box.best()
+    assert score < 0.1 * design
+    assert score == bowl(theta) == box.trials().score.min()
+    assert theta["trim"] == pytest.approx(0.1, abs=0.05)
+    assert theta["delay"] == pytest.approx(0.2, abs=0.025)
+
+
+def test_what_is_maximised_is_asked_as_its_negative_is_minimised():
+    low, high = searched(12), searched(12, score=lambda theta: -bowl(theta), maximise=True)
+    assert low.trials()[["delay", "trim"]].equals(high.trials()[["delay", "trim"]])
+    assert high.best() == (low.best()[0], -low.best()[1])
+    assert (high.trials().score == -low.trials().score).all()
+
+
+def test_the_same_seed_asks_the_same_and_another_one_does_not():
+    assert searched(11).trials().equals(searched(11).trials())
+    assert not searched(11).trials().equals(searched(11, seed=2).trials())
+
+
+def test_several_asks_before_a_tell_are_a_batch_of_different_theta():
+    box = searched(10)
+    batch = [box.ask() for _ in range(4)]
+    assert len({tuple(theta.values()) for theta in batch}) == 4
+    assert len(box.trials()) == 10
+    for theta in reversed(batch):
+        box.tell(theta, bowl(theta))
+    assert box.trials()[["trim", "delay"]][10:].to_dict("records") == [
+        {"trim": theta["trim"], "delay": theta["delay"]} for theta in batch
+    ], "trials are in the order in which they were asked for"
+
+
+def test_what_is_asked_next_does_not_depend_on_the_order_of_the_tells():
+    boxes = [SearchBox(BOX, initial=4) for _ in range(2)]
+    for box, order in zip(boxes, (1, -1), strict=True):
+        for theta in [box.ask() for _ in range(6)][::order]:
+            box.tell(theta, bowl(theta))
+    assert boxes[0].ask() == boxes[1].ask()
+
+
+def test_a_failed_simulation_is_kept_and_the_search_goes_on_elsewhere():
+    box = searched(9)
+    failed = box.ask()
+    box.tell(failed, None)
+    assert math.isnan(box.trials().score.iloc[-1])
+    assert box.ask() != failed
+    assert box.best() == searched(9).best()
+
+
+@settings(max_examples=20, deadline=None)
+@given(low=st.floats(-1e3, 1e3), width=st.floats(1e-3, 1e3), seed=st.integers(0, 2**32 - 1), initial=st.integers(1, 9))
+def test_every_ask_lies_in_the_box(low, width, seed, initial):
+    box = SearchBox({"x": (low, low + width)}, seed=seed, initial=initial, engine="random")
+    for _ in range(5):
+        theta = box.ask()
+        assert low <= theta["x"] <= low + width
+        box.tell(theta, theta["x"])
+
+
+def test_an_engine_of_one_s_own_proposes():
+    own = Engine("own", "mine", "random, as mine is", RandomPoints)
+    assert searched(6, engine=own, initial=2).trials().equals(searched(6, engine="random", initial=2).trials())
+
+
+@pytest.mark.parametrize("engine", WITH_OUTPUTS)
+def test_an_engine_that_needs_outputs_is_refused_with_one_that_does_not(engine):
+    with pytest.raises(InputError, match=f"'{engine}' models what a score is computed from.*use 'gp'"):
+        SearchBox(BOX, engine=engine)
+
+
+WRONG = {
+    "an empty box": ({"box": {}}, "the box is empty; give at least one parameter"),
+    "inside out": ({"box": {"trim": (0.3, -0.3)}}, "trim: the lower bound must be below the upper one"),
+    "no pair": ({"box": {"trim": 0.3}}, r"trim: must be \(lowest, highest\), as in \(-0.3, 0.3\), got 0.3"),
+    "no end": ({"box": {"trim": (0.0, math.inf)}}, "trim: bounds must be finite"),
+    "an unknown engine": ({"engine": "gpp"}, "unknown engine 'gpp'.*did you mean 'gp'"),
+    "no design": ({"initial": 0}, "initial must be at least 1, got 0"),
+    "a negative seed": ({"seed": -1}, "seed must be at least 0, got -1"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_box_that_cannot_be_searched_is_refused(name):
+    changes, words = WRONG[name]
+    arguments = {"box": BOX, **changes}
+    with pytest.raises(InputError, match=words) as problem:
+        SearchBox(arguments.pop("box"), **arguments)
+    assert "\n" not in str(problem.value)
+
+
+def test_only_a_theta_that_was_asked_for_can_be_told_and_only_once():
+    box = SearchBox(BOX)
+    with pytest.raises(InputError, match="no score has been told; ask"):
+        box.best()
+    theta = box.ask()
+    with pytest.raises(InputError, match="was not asked for; tell what `ask` gave"):
+        box.tell({**theta, "trim": 0.0}, 1.0)
+    with pytest.raises(InputError, match="θ names trim; the box has delay, trim"):
+        box.tell({"trim": 0.0}, 1.0)
+    for wrong in (math.nan, math.inf):
+        with pytest.raises(InputError, match="a score must be a finite number, or None"):
+            box.tell(theta, wrong)
+    box.tell(theta, 1.0)
+    with pytest.raises(InputError, match="has a score already; ask for the next"):
+        box.tell(theta, 1.0)
+    assert box.trials().score.tolist() == [1.0]

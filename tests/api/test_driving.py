@@ -1,0 +1,115 @@
+"""One episode of a study's proxy: its scores are those of a trial, and what moved has times."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from proxytune import InputError, RunError, drive, run_study
+from proxytune.errors import EpisodeError, SettingsError
+
+PLANAR = {"plant": '"planar"', "seconds": "2.0", "position_noise_m": "0.0"}
+THETA = {"trim": 0.1}
+
+
+@pytest.fixture(scope="module")
+def lane(make_studies):
+    """A study of lane following."""
+    agents = '["steady", "braitenberg"]'
+    return make_studies("lane", domain=PLANAR, family='"proxytune.driving.family:lane_following"', agents=agents)
+
+
+@pytest.fixture(scope="module")
+def driven(lane):
+    return drive(lane, "steady", THETA)
+
+
+def test_poses_have_times_sixty_a_second_from_the_start_to_the_end(driven):
+    assert list(driven.poses.columns) == ["time", "x", "y", "heading"]
+    assert np.allclose(np.diff(driven.poses.time), 1 / 60)
+    assert driven.poses.time.iloc[[0, -1]].tolist() == [0.0, pytest.approx(2.0)]
+    start = driven.poses.iloc[0]
+    assert [start.x, start.y] == [0.4237, 0.702]
+
+
+def test_commands_are_the_duties_of_both_wheels_twenty_a_second(driven):
+    assert list(driven.commands.columns) == ["time", "left", "right"]
+    assert np.allclose(driven.commands.time, np.arange(40) / 20)
+    assert driven.commands[["left", "right"]].abs().to_numpy().max() <= 1.0
+
+
+def test_poses_and_scores_are_of_one_drive(driven):
+    steps = np.hypot(driven.poses.x.diff(), driven.poses.y.diff())[1:]
+    assert driven.scores["survival_time"] == 2.0
+    assert driven.scores["speed"] == pytest.approx(steps.sum() / 2.0)
+
+
+def test_the_scores_are_those_of_a_trial_at_this_theta(make_study):
+    folder = make_study(budget="1", initial="1")
+    report = run_study(folder)
+    distances = [drive(folder, "agent0", report.theta, start=start).scores["distance"] for start in range(3)]
+    proxy = report.best.assessment.inputs.proxy
+    assert np.mean(distances) == proxy.means[proxy.agents.index("agent0"), 0]
+
+
+def test_the_same_episode_is_the_same_and_start_seed_and_theta_change_it(lane, driven):
+    pd.testing.assert_frame_equal(drive(lane / "study.toml", "steady", THETA, seed=1).poses, driven.poses)
+    for other in (drive(lane, "steady", THETA, start=1), drive(lane, "steady", THETA, seed=2), drive(lane, "steady")):
+        assert not other.poses.equals(driven.poses)
+
+
+def test_an_episode_is_driven_before_there_are_scores_of_the_target(make_study):
+    folder = make_study()
+    (folder / "target.csv").unlink()
+    assert set(drive(folder, "agent0").scores) == {"distance", "survival_time"}
+
+
+def test_a_family_that_keeps_no_poses_gives_scores_alone(make_study):
+    driven = drive(make_study(), "agent0")
+    assert driven.poses is driven.commands is None
+    assert driven.scores["distance"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("raises", "agent 'agent1' failed from start 2: agent 'agent1' raised ValueError at 1.20 s: it lost its way"),
+        ("crashes", "agent 'agent1' failed from start 2: the domain family raised ZeroDivisionError: division by zero"),
+        ("nan", "agent 'agent1' failed from start 2: agent 'agent1': the domain family gave no finite 'distance'"),
+    ],
+)
+def test_an_episode_that_fails_ends_in_one_line(make_study, fault, words):
+    folder = make_study(domain={"faults": f'["agent1:2:{fault}"]'})
+    with pytest.raises(EpisodeError) as problem:
+        drive(folder, "agent1", start=2)
+    assert str(problem.value) == words
+    assert isinstance(problem.value, RunError)
+
+
+def test_an_agent_that_fails_in_lane_following_is_told_with_the_time(lane):
+    (lane / "lost.py").write_text(
+        "class Lost:\n    def begin(self, robot):\n        return 0\n\n"
+        "    def act(self, picture, memory):\n        return [0.0] * (2 if memory < 3 else 3), memory + 1\n"
+    )
+    with pytest.raises(EpisodeError, match=r"'lost:Lost' failed from start 0: answered with shape \(3,\) at 0.15 s"):
+        drive(lane, "lost:Lost")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "changes", "words"),
+    [
+        (("agent9",), {}, "no agent 'agent9'; did you mean 'agent"),
+        (("agent0", {"trimm": 0.1}), {}, "θ: unknown parameter 'trimm'; did you mean 'trim'"),
+        (("agent0", {"trim": 0.5}), {}, r"θ: trim must lie within \[-0.3, 0.3\], got 0.5"),
+        (("agent0", {"trim": float("nan")}), {}, r"θ: trim must lie within \[-0.3, 0.3\], got nan"),
+        (("agent0",), {"start": 5}, "start 5: the family has 5; give 0 to 4"),
+        (("agent0",), {"seed": -1}, "seed must be at least 0, got -1"),
+    ],
+)
+def test_what_the_family_has_not_is_refused_with_what_it_has(make_study, arguments, changes, words):
+    with pytest.raises(InputError, match=words):
+        drive(make_study(), *arguments, **changes)
+
+
+def test_a_folder_that_is_no_study_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match=r"study.toml: no such file"):
+        drive(tmp_path, "steady")

@@ -1,0 +1,164 @@
+"""A study from Python runs, resumes, and is looked at without simulating."""
+
+import json
+import warnings
+
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+from proxytune import InputError, ProxytuneError, RunError, read_study, run_study
+from proxytune.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def folder(make_studies):
+    return make_studies("ran", budget="6", preflight="true", confirm="1")
+
+
+@pytest.fixture(scope="module")
+def report(folder):
+    return run_study(folder)
+
+
+def journalled(make_study, **changes):
+    """A study that writes each simulated episode into a file."""
+    folder = make_study("journalled", **changes)
+    journal = folder.parent / "journal.txt"
+    return make_study("journalled", domain={"journal": f'"{journal}"'}, **changes), journal
+
+
+def simulated(journal):
+    return journal.read_text().splitlines() if journal.exists() else []
+
+
+def test_a_study_runs_and_run_again_it_simulates_nothing(make_study):
+    folder, journal = journalled(make_study, budget="6")
+    first = run_study(folder)
+    assert first.spent.episodes == len(simulated(journal)) == 6 * 6 * 3
+    again = run_study(str(folder / "study.toml"))
+    assert again.spent.episodes == 0
+    assert len(simulated(journal)) == 6 * 6 * 3
+    assert again.theta == first.theta
+    pd.testing.assert_frame_equal(again.trials(), first.trials())
+
+
+def test_a_study_that_was_left_goes_on_and_no_episode_is_simulated_twice(make_study):
+    folder, journal = journalled(make_study, budget="3")
+    run_study(folder)
+    journalled(make_study, budget="6")
+    resumed = run_study(folder)
+    assert len(simulated(journal)) == len({line.rsplit(" ", 1)[0] for line in simulated(journal)}) == 6 * 6 * 3
+    assert resumed.spent.episodes == 3 * 6 * 3
+    whole = run_study(make_study("whole", budget="6"))
+    pd.testing.assert_frame_equal(resumed.trials(), whole.trials())
+
+
+def test_the_trials_are_a_table_of_theta_state_score_and_measures(report):
+    trials = report.trials()
+    assert list(trials.index) == [1, 2, 3, 4, 5, 6]
+    assert trials.index.name == "trial"
+    assert list(trials.columns) == ["delay", "trim", "state", "score", "prpv", "ppv"]
+    assert set(trials.state) == {"finished"}
+    assert (trials.score == trials.prpv).all()
+    assert trials.delay.between(0.0, 0.3).all()
+
+
+def test_the_best_theta_is_that_of_the_best_trial(report):
+    row = report.trials().loc[report.best.trial.number]
+    assert report.theta == {"delay": row.delay, "trim": row.trim}
+    assert report.best.assessment.prpv.value == row.prpv
+
+
+def test_a_report_shows_itself_in_the_words_of_the_command(report):
+    assert repr(report) == f"StudyReport of 'wobbly': {report.document()['sentence']}"
+
+
+def test_the_document_is_what_the_command_prints(report, folder, capsys):
+    assert main(["study", str(folder), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    document = json.loads(json.dumps(report.document()))
+    assert {key: printed[key] for key in document} == document
+
+
+def test_reading_a_study_simulates_nothing_and_says_the_same(report, folder):
+    seen = read_study(folder)
+    assert seen.spent.episodes == 0
+    assert seen.document() == report.document()
+
+
+def test_reading_a_study_that_was_not_run_is_one_line_and_makes_no_file(make_study):
+    folder = make_study()
+    before = sorted(folder.iterdir())
+    with pytest.raises(ProxytuneError, match="run") as problem:
+        read_study(folder)
+    assert "\n" not in str(problem.value)
+    assert sorted(folder.iterdir()) == before
+
+
+def test_every_figure_is_drawn_and_written_where_asked(report, folder, tmp_path):
+    assert set(report.figures()) == {"convergence", "profiles", "evaluations", "importance"}
+    assert all(isinstance(figure, Figure) for figure in report.figures().values())
+    files = report.write(tmp_path / "elsewhere")
+    assert {path.name for path in files.figures} == {f"{name}.png" for name in report.figures()}
+    assert all(path.stat().st_size for path in (*files.figures, files.page))
+    assert files.page.parent == tmp_path / "elsewhere"
+    assert report.write().page.parent == folder
+
+
+def test_a_parameter_without_effect_is_a_warning_at_the_line_that_runs_the_study(make_study):
+    family, box = '"partly_dead:partly_dead"', {"matters": "[-1, 1]", "dead": "[0, 1]"}
+    folder = make_study("dead", parameters=box, family=family, budget="5", preflight="true")
+    with pytest.warns(UserWarning, match="'dead' changes nothing at all") as heard:
+        run_study(folder)
+    assert {one.filename for one in heard} == {__file__}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run_study(folder)
+
+
+def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
+    totals = []
+
+    class Spy:
+        def __init__(self, total):
+            totals.append(total)
+
+        def __enter__(self):
+            from proxytune.running.progress import Silent
+
+            return Silent()
+
+        def __exit__(self, *problem):
+            pass
+
+    monkeypatch.setattr("proxytune.api.studies.Bars", Spy)
+    folder = make_study("shown", budget="2", initial="2")
+    run_study(folder)
+    assert totals == []
+    run_study(folder, progress=True)
+    assert totals == [2 * 6 * 3]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"engine": '"gpp"'}, "study.toml: engine: unknown engine 'gpp'.*did you mean 'gp'"),
+        ({"metrics": '["distanc:max"]'}, "no column 'distanc'; did you mean 'distance'|unknown metric 'distanc'"),
+        (
+            {"objective": '"plv"'},
+            "objective: run_study has no search for 'plv'; run it with: python -m proxytune study",
+        ),
+    ],
+)
+def test_what_cannot_be_used_is_one_line_with_the_key_and_what_to_do(make_study, changes, words):
+    with pytest.raises(InputError, match=words) as problem:
+        run_study(make_study("wrong", **changes))
+    assert "\n" not in str(problem.value)
+
+
+def test_a_study_of_which_every_episode_fails_is_one_line(make_study):
+    faults = ", ".join(f'"agent{number}:*:crashes"' for number in range(6))
+    with pytest.raises(RunError, match="all 5 trials failed") as problem:
+        run_study(make_study("failing", domain={"faults": f"[{faults}]"}))
+    assert "\n" not in str(problem.value)

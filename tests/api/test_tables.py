@@ -1,0 +1,155 @@
+"""Usefulness from DataFrames is what the command says of the same tables, and complaints name side, row and column."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune import InputError, Metric, read_scores, score
+from proxytune.cli.main import main
+from proxytune.errors import ScoresError
+from proxytune.report.scores.document import document_of
+
+METRICS = ["distance:max", "time:min:5%"]
+
+
+def table(seed, agents="ABCDE", episodes=4):
+    """Scores of a few agents that differ by more than their episodes do."""
+    random = np.random.default_rng(seed)
+    labels = [(agent, episode) for agent in agents for episode in range(episodes)]
+    frame = pd.DataFrame(labels, columns=["agent", "episode"])
+    strength = frame.agent.map({agent: random.normal(5.0, 1.0) for agent in agents})
+    return frame.assign(
+        distance=strength + random.normal(0.0, 0.5, len(frame)), time=20.0 - strength + random.random(len(frame))
+    )
+
+
+def documented(assessment):
+    return json.loads(json.dumps(document_of(assessment)))
+
+
+@pytest.fixture
+def by_command(tmp_path, capsys):
+    """The document of the command for two DataFrames, and the files that it read."""
+
+    def run(proxy, target, *words):
+        paths = [tmp_path / "sim.csv", tmp_path / "real.csv"]
+        for frame, path in zip((proxy, target), paths, strict=True):
+            frame.to_csv(path, index=False)
+        metrics = [word for metric in METRICS for word in ("--metric", metric)]
+        assert main(["score", "--proxy", str(paths[0]), "--target", str(paths[1]), *metrics, *words, "--json"]) == 0
+        return json.loads(capsys.readouterr().out), paths
+
+    return run
+
+
+def test_the_numbers_of_two_dataframes_are_those_of_the_command(by_command):
+    proxy, target = table(1), table(2)
+    printed, paths = by_command(proxy, target)
+    found = documented(score(proxy=proxy, target=target, metrics=METRICS))
+    assert found == {key: printed[key] for key in found}
+    assert documented(score(proxy=str(paths[0]), target=paths[1], metrics=METRICS)) == found
+
+
+def test_weights_and_seed_are_those_of_the_command(by_command):
+    proxy, target = table(1), table(2)
+    printed, _ = by_command(proxy, target, "--beta", "distance:2", "--beta", "time:0.5", "--seed", "3")
+    found = documented(score(proxy=proxy, target=target, metrics=METRICS, beta={"distance": 2, "time": 0.5}, seed=3))
+    assert found == {key: printed[key] for key in found}
+    assert found != documented(score(proxy=proxy, target=target, metrics=METRICS))
+
+
+@settings(max_examples=20, deadline=None)
+@given(values=st.lists(st.floats(-1e6, 1e6), min_size=4, max_size=8, unique=True))
+def test_no_digit_of_a_score_is_lost_on_the_way(values):
+    frame = pd.DataFrame({"agent": [f"a{place}" for place in range(len(values))], "distance": values})
+    assert score(proxy=frame, target=frame, metrics="distance:max").inputs.proxy.means[:, 0].tolist() == values
+
+
+def test_one_metric_may_be_given_as_text_or_as_a_metric():
+    proxy, target = table(1), table(2)
+    metric = Metric("distance", tolerance=0.1)
+    one = score(proxy=proxy, target=target, metrics="distance:max:0.1")
+    assert documented(one) == documented(score(proxy=proxy, target=target, metrics=metric))
+    assert documented(one) == documented(score(proxy=proxy, target=target, metrics=[metric]))
+
+
+def test_agents_and_episodes_may_be_the_index(tmp_path):
+    proxy, target = table(1), table(2)
+    plain = documented(score(proxy=proxy, target=target, metrics=METRICS))
+    indexed = proxy.set_index(["agent", "episode"])
+    assert documented(score(proxy=indexed, target=target.set_index("agent"), metrics=METRICS)) == plain
+    assert list(indexed.index.names) == ["agent", "episode"], "the user's table stays as it is"
+
+
+def test_a_table_that_was_read_before_may_be_either_side(by_command):
+    proxy, target = table(1), table(2)
+    _, paths = by_command(proxy, target)
+    read = read_scores(str(paths[0]), ["time", "distance"])
+    mixed = score(proxy=read, target=target, metrics=METRICS)
+    assert documented(mixed) == documented(score(proxy=proxy, target=target, metrics=METRICS))
+    with pytest.raises(ScoresError, match="^proxy: no metric 'speed'"):
+        score(proxy=read, target=target, metrics="speed:max")
+
+
+def spoilt(**changes):
+    frame = table(1).astype({"distance": object})
+    for column, (row, value) in changes.items():
+        frame.loc[row, column] = value
+    return frame
+
+
+TWO_DOMAINS = pd.concat([table(1).assign(domain="sim"), table(2).assign(domain="real")])
+WRONG = {
+    "a missing column": (table(1).drop(columns="distance"), "proxy: no column 'distance'"),
+    "no agents": (
+        table(1).drop(columns="agent"),
+        "proxy: no column 'agent'; columns are episode, distance, time; name",
+    ),
+    "a missing agent": (table(1, "ABCD"), "the proxy lacks scores of E, which the target has; add or remove them"),
+    "an empty cell": (
+        spoilt(distance=(3, np.nan)),
+        r"proxy: row 3, column 'distance': must be a finite number, got ''",
+    ),
+    "a word": (spoilt(distance=(0, "far")), "proxy: row 0, column 'distance': must be a finite number, got 'far'"),
+    "an episode twice": (spoilt(episode=(1, 0)), "proxy: row 1: agent 'A' has episode '0' twice; number the episodes"),
+    "several domains": (TWO_DOMAINS, r"proxy: has several domains; select one, as in scores\[scores.domain == 'sim'\]"),
+    "no table": ({"agent": ["A"]}, "proxy: must be a DataFrame, a CSV file or a ScoreTable, got dict"),
+    "no rows": (table(1).head(0), "proxy: has no rows; add one per agent and episode"),
+    "no file": ("nowhere.csv", "nowhere.csv: no such file; check the path"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_cannot_be_used_is_one_line_with_the_side(name):
+    proxy, words = WRONG[name]
+    with pytest.raises(InputError, match=words) as problem:
+        score(proxy=proxy, target=table(2), metrics=METRICS)
+    assert "\n" not in str(problem.value)
+    assert "tmp" not in str(problem.value)
+    assert ".csv" not in str(problem.value) or name == "no file"
+
+
+def test_the_target_is_named_where_it_is_the_target_that_lacks_something():
+    with pytest.raises(
+        ScoresError, match="^target: no column 'time'; did you mean|^target: no column 'time'; known are"
+    ):
+        score(proxy=table(1), target=table(2).drop(columns="time"), metrics=METRICS)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"metrics": "distance"}, "metric 'distance': write NAME:max or NAME:min"),
+        ({"metrics": []}, "no metric is given; name at least one"),
+        ({"seed": -1}, "seed must be at least 0, got -1"),
+        ({"beta": {"distance": 1.0}}, "time"),
+    ],
+)
+def test_wrong_arguments_are_one_line(changes, words):
+    with pytest.raises(InputError, match=words) as problem:
+        score(**{"proxy": table(1), "target": table(2), "metrics": METRICS, **changes})
+    assert "\n" not in str(problem.value)

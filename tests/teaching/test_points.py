@@ -1,0 +1,91 @@
+"""What is cached of a learning experiment is found again only by what would make the very same."""
+
+from dataclasses import dataclass, replace
+
+import pytest
+from schoolroom import Matrix, Schoolroom
+from wobbly import Wobbly
+
+from proxytune.learning.cache import Cache
+from proxytune.learning.lessons import Distribution
+from proxytune.learning.settings import TeachingSettings
+from proxytune.teaching.points import Point, TeachingSetup
+
+PROXY = Distribution({"trim": (0.1, 0.2)})
+
+
+@dataclass(frozen=True)
+class Timid(Matrix):
+    """Learns nine tenths of what it is shown."""
+
+    def train(self, samples, start, seed):
+        return {"matrix": 0.9 * super().train(samples, start, seed)["matrix"]}
+
+
+def setup(folder, **changes):
+    amounts = {key: changes.pop(key) for key in ("proxy_samples", "lesson_s") if key in changes}
+    settings = TeachingSettings(
+        target=folder / "twin.toml",
+        learner="schoolroom:Matrix",
+        proxy_samples=60,
+        target_samples=(0, 20, 40),
+        seeds=1,
+        lesson_s=2.0,
+        level=None,
+        tolerance=6.0,
+        budget=1,
+        narrow=False,
+        widths={},
+        proxies={"near": PROXY},
+    )
+    plain = TeachingSetup(
+        proxy=Schoolroom(Wobbly()),
+        target=Schoolroom(Wobbly(theta=(("trim", 0.12), ("delay", 0.21)))),
+        learner=Matrix(),
+        learner_identity="matrix",
+        settings=replace(settings, **amounts),
+        seed=1,
+        starts=3,
+        cache=Cache(folder),
+    )
+    return replace(plain, **changes)
+
+
+CHANGES = {
+    "another learner": {"learner": Timid(), "learner_identity": "timid"},
+    "more starts": {"starts": 5},
+    "another seed": {"seed": 2},
+    "another proxy domain": {"proxy": Schoolroom(Wobbly(theta=(("delay", 0.2),)))},
+    "another target": {"target": Schoolroom(Wobbly(theta=(("trim", 0.05), ("delay", 0.21))))},
+    "more samples of the proxy": {"proxy_samples": 90},
+    "longer lessons": {"lesson_s": 3.0},
+}
+
+
+@pytest.mark.parametrize("count", [0, 20])
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change, count):
+    point = Point("near", PROXY, 0, count)
+    before = setup(tmp_path / "used").score(point)
+    fresh = setup(tmp_path / "empty", **CHANGES[change]).score(point)
+    assert fresh != before
+    assert setup(tmp_path / "used", **CHANGES[change]).score(point) == fresh
+
+
+@pytest.mark.parametrize("change", [change for change in CHANGES if "proxy" not in change])
+def test_without_a_proxy_a_used_cache_gives_what_an_empty_one_gives(tmp_path, change):
+    point = Point("none", None, 0, 20)
+    before = setup(tmp_path / "used").score(point)
+    fresh = setup(tmp_path / "empty", **CHANGES[change]).score(point)
+    assert fresh != before
+    assert setup(tmp_path / "used", **CHANGES[change]).score(point) == fresh
+
+
+def test_what_a_proxy_taught_is_shared_by_all_points_after_it(tmp_path):
+    one = setup(tmp_path)
+    for count in (0, 20, 40):
+        one.score(Point("near", PROXY, 0, count))
+    assert len(list(tmp_path.glob("weights-*.npz"))) == 3
+    assert len(list(tmp_path.glob("samples-*.npz"))) == 2
+    assert one.is_cached(Point("renamed", PROXY, 0, 40))
+    assert not one.is_cached(Point("near", PROXY, 1, 40))

@@ -75,9 +75,9 @@ def test_it_comes_after_the_shipped_effects_of_its_stage(folder):
 def test_two_folders_have_effects_of_one_name_each_its_own(folder, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
-    (other / "weak_reverse.py").write_text(WEAK_REVERSE.replace("high=0.9", "high=0.5"), encoding="utf-8")
+    (other / "weak_reverse.py").write_text(WEAK_REVERSE.replace("high=0.9", "high=0.85"), encoding="utf-8")
     assert Catalogue(folder).parameters[NAME].high == 0.9
-    assert Catalogue(other).parameters[NAME].high == 0.5
+    assert Catalogue(other).parameters[NAME].high == 0.85
 
 
 def test_model_toml_names_it_in_quotes_and_reads_back_the_same(folder):

@@ -102,7 +102,7 @@ def _engines(arguments: argparse.Namespace) -> list[Engine]:
 
 def _beside(arguments: argparse.Namespace) -> Path:
     """Where one's own engines lie: beside the study, or for a test problem in the current folder."""
-    path = Path(arguments.study)
+    path = Path(arguments.study).absolute()  # another process may be in another folder
     return path if path.is_dir() else path.parent
 
 

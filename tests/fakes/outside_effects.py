@@ -92,14 +92,14 @@ WRONG = {
     "no cue": (
         "cues=(Cue.DIRECTION,),",
         "cues=(),",
-        r"has a trace with the cues \(\); give a tuple of at least one Cue",
+        r"a trace with the cues \(\); give a tuple of at least one",
     ),
     "no figure": ("shown=Means(", "shown=(", "is to be shown by .*; give its trace a WheelCurve, or Means with panels"),
     "a panel of no motion": ('"forward"),))', '"speed"),))', "has a panel of the motion 'speed'; take one of forward,"),
     "a panel of no signal": (
         '(Panel("forward"',
         '(Panel("speed"',
-        "has a panel of the signal 'speed'; leave it empty,",
+        "a panel of the signal 'speed'; leave it empty,",
     ),
     "no panel": (
         '(Panel("forward", "forward speed [m/s]", "forward"),)',

@@ -39,6 +39,10 @@ class Objective:
         """The measure as something to be made small."""
         return value if value is None or not self.maximise else -value
 
+    def value(self, cost: float) -> float:
+        """The measure that has this cost."""
+        return -cost if self.maximise else cost
+
     def measure(self, *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> dict[str, float | None]:
         """PRPV, PPV and this measure of a proxy, by name; None where one is undefined.
 

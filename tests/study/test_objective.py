@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from proxytune.errors import SettingsError
+from proxytune.report.study.usefulness_table import objective_rows, usefulness_rows
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.store import Store
 from proxytune.study.knowledge import goal_of
 from proxytune.study.objective import PRPV
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
+from proxytune.study.stages.confirmation import run_confirmation
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 
@@ -58,6 +60,20 @@ def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, eng
         )
     assert max(values[5:]) > max(values[:5]), "the search gets nearer than its design"
     assert all(set(trial.measures) == {"mine:NEARNESS", "prpv", "ppv"} for trial in result.trials)
+
+
+def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
+    folder = own(confirm="1")
+    study_run, _ = run(folder, "gp")
+    with Store.open(folder) as store:
+        again = StudyRun(study_run.study, store)
+        run_confirmation(again)
+        result = result_of(again)
+    searched, fresh = objective_rows(result)
+    best = result.best.trial.measures["mine:NEARNESS"]
+    assert searched[:2] == ("nearness", f"{best:.4g}")
+    assert fresh[1] == f"{-result.confirmation.answer.scores[0]:.4g}"
+    assert usefulness_rows(result)[0] == searched
 
 
 def test_ppv_is_an_objective_too(make_study):

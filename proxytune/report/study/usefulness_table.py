@@ -1,6 +1,7 @@
 """How useful the proxy is at the best θ: a row per measure, and what to keep in mind."""
 
 from proxytune.report.numbers import Ends, fixed, probability, short
+from proxytune.study.objective import PRPV
 from proxytune.study.result import StudyResult
 from proxytune.study.stages.confirmation import Confirmation
 from proxytune.usefulness import Assessment, NoiseFloor
@@ -19,7 +20,18 @@ def usefulness_rows(result: StudyResult) -> list[Row]:
     own = result.best.assessment
     floor = floor_rows(result.floor, "" if result.judged is own else OF_THE_PROXY)
     ppv = [] if own.ppv.value is None else [("PPV", f"{own.ppv.value:.3g}", "", PPV_MEANING)]
-    return [*prpv_rows(result), *floor, chance_row(result), *ppv, misfit_row(result)]
+    return [*objective_rows(result), *prpv_rows(result), *floor, chance_row(result), *ppv, misfit_row(result)]
+
+
+def objective_rows(result: StudyResult) -> list[Row]:
+    """The study's objective at the best θ, in the search and on fresh episodes; nothing where it is PRPV."""
+    objective, value = result.study.objective, result.value_of(result.best.trial)
+    if objective == PRPV or value is None:
+        return []
+    rows = [(objective.label, f"{value:.4g}", "", "the objective, in the search's own episodes")]
+    scores = result.confirmation.answer.scores if result.confirmation else ()
+    fresh = [objective.value(score) for score in scores if score is not None]
+    return [*rows, ("  fresh", f"{sum(fresh) / len(fresh):.4g}", "", "on fresh episodes")] if fresh else rows
 
 
 def prpv_rows(result: StudyResult) -> list[Row]:

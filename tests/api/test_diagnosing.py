@@ -66,7 +66,7 @@ def test_what_is_found_is_drawn_and_written_as_the_command_does(report, tmp_path
     [
         ({"declared": ["trimm"]}, "^declared: trimm: no effect on motion has this name; did you mean 'trim'"),
         ({"robot": "duckybot"}, "robot 'duckybot'.* did you mean 'duckiebot'|'duckybot'"),
-        ({"effects": ["mine:Slip"]}, "effect 'mine:Slip': no module 'mine'"),
+        ({"effects": ["nobodys:Slip"]}, "effect 'nobodys:Slip': no module 'nobodys'"),
         ({"seed": -1}, "seed must be at least 0, got -1"),
     ],
 )

@@ -82,6 +82,7 @@ def test_the_study_of_the_introduction_reads(tmp_path, monkeypatch):
     assert open_study(tmp_path).settings.agents == ("steady", "braitenberg", "daredevil")
 
 
+@pytest.mark.slow
 def test_the_effect_is_found_by_diagnose_and_written_to_its_model(follow, tmp_path):
     found = follow("An effect")["diagnose log --effects weak_reverse:WeakReverse --output found"]
     assert [effect["name"] for effect in found["effects"]] == ["weak_reverse:WeakReverse"]
@@ -107,6 +108,7 @@ def test_the_measure_is_the_objective_of_a_study(follow, tmp_path):
     assert open_study(tmp_path).objective.label == "Worst"
 
 
+@pytest.mark.slow
 def test_the_engine_runs_in_a_comparison_and_in_a_study(follow, tmp_path):
     answers = follow("A search engine")
     (compared,) = [answer for line, answer in answers.items() if line.startswith("compare")]

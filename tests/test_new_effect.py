@@ -77,6 +77,7 @@ def run(folder, *arguments):
     )
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_added_in_one_place_is_found_fitted_and_drawn(folder):
     answer = run(folder, "-c", DIAGNOSE, str(folder / "tests" / "diagnosis"))
     assert answer.returncode == 0, answer.stderr
@@ -94,6 +95,7 @@ def test_an_effect_that_is_added_in_one_place_is_listed(folder):
     assert (row["parameter"], row["stage"], row["source"]) == ("weak_reverse", "motion", "made up")
 
 
+@pytest.mark.slow
 def test_an_effect_without_a_row_in_the_documents_is_refused_in_words(folder):
     answer = run(
         folder, "-m", "pytest", "tests/test_documents.py", "-k", "every_effect_and_its_parameters and weak_reverse"

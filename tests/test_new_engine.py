@@ -41,6 +41,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_a_tenth_engine_is_compared_to_its_figure(folder):
     answer = run(folder, "-m", "proxytune", "compare", "analytic", *FEW)
     assert answer.returncode == 0, answer.stderr
@@ -48,6 +49,7 @@ def test_a_tenth_engine_is_compared_to_its_figure(folder):
     assert (folder / "out" / "compare.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_a_tenth_engine_is_listed_and_refused_where_it_is_not_documented(folder):
     rows = json.loads(run(folder, "-m", "proxytune", "list", "engines", "--json").stdout)["engines"]
     assert [row["what_it_proposes"] for row in rows if row["name"] == "spiral"] == [

@@ -56,6 +56,7 @@ def test_score_tells_a_new_measure_in_its_document_and_its_table(folder):
     assert "Largest error distance" in run(folder, *words).stdout
 
 
+@pytest.mark.slow
 def test_sweep_tells_a_new_measure_in_its_document_its_csv_and_its_lines(folder):
     answer = run(folder, "-m", "proxytune", "sweep", "study", "--parameter", "trim", "--points", "3", "--json")
     assert answer.returncode == 0, answer.stderr

@@ -114,6 +114,7 @@ def test_a_domain_takes_it_from_its_table_from_theta_and_from_a_model(folder):
     assert plain.instance({NAME: 0.3}).drivetrain == given.instance({}).drivetrain
 
 
+@pytest.mark.slow
 def test_diagnose_tries_it_and_predict_and_a_study_read_what_it_wrote(folder, monkeypatch, capsys):
     log = planted_log({NAME: 0.3}, folder, monkeypatch)
     monkeypatch.chdir(folder)
@@ -130,6 +131,7 @@ def test_diagnose_tries_it_and_predict_and_a_study_read_what_it_wrote(folder, mo
     assert dict(family.effects)[NAME] == pytest.approx(loss["value"])
 
 
+@pytest.mark.slow
 def test_a_plugin_s_effect_takes_part_by_itself(installed, folder, monkeypatch, capsys):
     log = planted_log({"slow_back": 0.3}, folder, monkeypatch)
     monkeypatch.chdir(folder)

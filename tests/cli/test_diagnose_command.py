@@ -167,6 +167,7 @@ def test_a_study_takes_the_model_as_its_proxy(printed, home):
     assert [{effect.name for effect in chain.effects} for chain in chains] == [set(), {"yaw_scrub"}]
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_declared_is_not_missing_in_another_log_either(home, printed, capsys):
     test = write_log(small_log(seed=2), home / "test")
     words = ["--declared", "trim, delay,yaw_scrub", "--test", str(test), "--output", str(home / "declared"), "--json"]
@@ -178,6 +179,7 @@ def test_an_effect_that_is_declared_is_not_missing_in_another_log_either(home, p
     assert told["fitted_s"] == pytest.approx(told["tested_s"], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_robot_of_the_logs_own_geometry_is_diagnosed_and_its_model_predicts(tmp_path, capsys):
     log = replace(small_log(), robot="my_robot")
     own = {"wheel_radius_m": 0.0318, "baseline_m": 0.16, "full_speed_m_s": 0.6}
@@ -280,6 +282,7 @@ def test_data_that_cannot_bear_an_answer_is_refused_in_one_line_and_nothing_is_w
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_two_clocks_are_told_and_taken_out(tmp_path, capsys):
     folder = write_log(two_clocks(small_log(seconds=30.0)), tmp_path / "log")
     assert main(["diagnose", str(folder), "--output", str(tmp_path / "out")]) == 0
@@ -309,6 +312,7 @@ def test_wrong_options_are_told_in_one_line(words, says, home, printed, capsys, 
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_people_read_that_a_clean_log_is_missing_nothing_and_where_the_files_are(tmp_path, capsys):
     folder = write_log(planted_log(TRUTH, episodes=6, seconds=12.0, noise=CALM), tmp_path / "log")
     assert main(["diagnose", str(folder), "--output", str(tmp_path / "out")]) == 0
@@ -320,6 +324,7 @@ def test_people_read_that_a_clean_log_is_missing_nothing_and_where_the_files_are
     assert told["next_manoeuvre"] is None
 
 
+@pytest.mark.slow
 def test_where_the_noise_is_not_known_people_read_what_to_drive(tmp_path, capsys):
     folder = write_log(hidden.make_log(hidden.CLEAN[0], episodes=6, seconds=12.0), tmp_path / "log")
     assert main(["diagnose", str(folder), "--output", str(tmp_path / "out")]) == 0

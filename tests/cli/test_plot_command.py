@@ -62,6 +62,7 @@ def drawn_again(folder, capsys):
     return drawn
 
 
+@pytest.mark.slow
 def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_changed(
     make_study, tmp_path, capsys, monkeypatch
 ):
@@ -109,6 +110,7 @@ def forbidden(self, episode):
     raise AssertionError("simulated")
 
 
+@pytest.mark.slow
 def test_other_metrics_score_the_stored_episodes_anew_into_a_folder_of_their_own(finished, capsys, monkeypatch):
     assert main(["study", str(finished), "--json"]) == 0
     assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2"]) == 0

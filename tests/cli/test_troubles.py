@@ -80,6 +80,7 @@ def told_by_every_command(folder, capsys, expected):
     assert sorted(file.name for file in folder.iterdir()) == ["study.db", "study.toml", "target.csv"]
 
 
+@pytest.mark.slow
 def test_a_newer_format_is_told_and_its_study_goes_on_where_that_is_known(half, finished, capsys):
     with sqlite3.connect(half / "study.db") as plain:
         plain.execute(f"PRAGMA user_version = {FORMAT + 1}")
@@ -160,6 +161,7 @@ def limited(limit):
 FULL = r"cannot be read or written \(disk I/O error\); is the disk full\? Everything finished is kept"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [pytest.param(64, marks=slow), pytest.param(40_000, marks=slow), 120_000])
 def test_a_disk_that_fills_up_is_told_and_the_study_goes_on_when_there_is_room(half, finished, limit):
     before = episodes(half)
@@ -216,6 +218,7 @@ def sealed(half):
     subprocess.run(["umount", half], capture_output=True)
 
 
+@pytest.mark.slow
 def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_written(sealed, finished, capsys):
     folder, why = sealed
     before = (folder / "study.db").read_bytes()
@@ -232,6 +235,7 @@ def test_a_read_only_folder_is_told_and_the_study_goes_on_where_it_can_be_writte
     goes_on(elsewhere, finished)
 
 
+@pytest.mark.slow
 def test_an_edited_study_is_refused_with_every_key_that_changed(half, make_study, finished):
     (half / "model.toml").write_text("trim = 0.1\n")
     changes = {"starts": "2", "seed": "2", "initial": "4", "engine": '"sobol"', "proxy": '"model.toml"'}

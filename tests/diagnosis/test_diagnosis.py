@@ -123,6 +123,7 @@ def test_what_does_not_act_on_motion_cannot_be_declared(name, nearest):
         declared_parameters((name,))
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_diagnosis(diagnosis):
     again = diagnose(scrubbing_log(), ROBOT, ("trim", "delay"))
     assert again.theta == diagnosis.theta
@@ -159,12 +160,14 @@ def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
     assert error is None or np.isfinite((*error.before.interval, *error.ratio.interval)).all()
 
 
+@pytest.mark.slow
 def test_one_drive_is_enough_if_it_is_long():
     found = diagnose(planted_log(SCRUBBING, episodes=1, seconds=70.0), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
     assert found.unlike is None
 
 
+@pytest.mark.slow
 def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result():
     log = planted_log(SCRUBBING, episodes=6, seconds=12.0)
     at_origin = driven_log(SCRUBBING, np.stack([e.commands for e in log.episodes]), np.zeros((6, 3)))
@@ -177,6 +180,7 @@ def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result(
     assert not found.clocks[0].differ
 
 
+@pytest.mark.slow
 def test_an_hour_of_standing_with_a_minute_of_driving_gives_what_the_minute_gives():
     duties = np.zeros((1, 20 * 3600, 2))
     duties[0, 36000:37400] = planted_log(SCRUBBING, episodes=1, seconds=70.0).episodes[0].commands
@@ -186,6 +190,7 @@ def test_an_hour_of_standing_with_a_minute_of_driving_gives_what_the_minute_give
     assert found.drive_names == ("00 from 1799 s",)
 
 
+@pytest.mark.slow
 def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
     log = hidden.make_log(hidden.CLEAN[1], episodes=6, seconds=20.0, late_s=-0.25)
     found = diagnose(log, ROBOT, ("trim", "delay"))

@@ -62,6 +62,7 @@ def test_an_effect_that_joined_the_catalogue_later_is_named(name):
     assert row.evidence > rates.CLEAR
 
 
+@pytest.mark.slow
 def test_what_no_catalogue_has_is_flagged():
     row = said_of("carpet", "outside")
     assert row.flagged, row.text

@@ -21,6 +21,7 @@ def told(effect, size, seed):
     return first, size_random_effect(base, first, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("effect", "size"), [("dropped_commands", 0.3), ("delay_jitter", 0.15)])
 def test_intervals_hold_the_true_size(effect, size):
     found = [told(effect, size, seed)[1] for seed in (1, 2, 3)]
@@ -31,6 +32,7 @@ def test_intervals_hold_the_true_size(effect, size):
         assert one.interval[1] < 4.0 * one.interval[0]
 
 
+@pytest.mark.slow
 def test_the_same_seed_says_the_same():
     assert told("dropped_commands", 0.3, 1) == told("dropped_commands", 0.3, 1)
 

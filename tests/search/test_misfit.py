@@ -30,6 +30,7 @@ def p_value(seed, shift):
     return learn(SPACE, told, goal(whole, target, SPREAD**2), seed).misfit.p_value
 
 
+@pytest.mark.slow
 def test_targets_that_the_proxy_can_make_are_seldom_said_to_be_beyond_it():
     found = np.array([p_value(seed, 0.0) for seed in range(24)])
     assert (found < 0.05).sum() <= 3

@@ -44,12 +44,14 @@ def searched(engine, seed, budget=14):
     return min(away[6:]), min(trial.score for trial in trials)
 
 
+@pytest.mark.slow
 def test_it_comes_nearer_to_the_truth_than_the_engine_of_the_score_alone():
     ours, other = (np.array([searched(engine, seed) for seed in range(8)]) for engine in ("outcomes", "gp"))
     assert np.median(ours[:, 0]) < 0.02 < np.median(other[:, 0])
     assert ours[:, 1].mean() <= other[:, 1].mean()
 
 
+@pytest.mark.slow
 def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
     for count in (8, 9):  # a draw, and an expected improvement
         trials = search(make_proposer("outcomes", 5, WHOLE), count, seed=4)

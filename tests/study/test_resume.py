@@ -123,6 +123,7 @@ def test_a_study_stopped_at_any_moment_gives_the_trials_of_one_that_was_not(make
     assert not (folder / "study.lock").exists()
 
 
+@pytest.mark.slow
 def test_a_study_of_two_jobs_terminated_and_killed_within_a_trial_gives_the_trials_of_one_that_was_not(
     make_study, launcher
 ):
@@ -151,6 +152,7 @@ def test_a_study_killed_as_soon_as_it_begins_gives_the_trials_of_one_that_was_no
     assert (trials(folder), episodes(folder)) == whole
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_ctrl_c_ends_with_130_one_line_and_no_process_left(make_study, jobs):
     folder = make_study(domain=DOMAIN, jobs=jobs)
@@ -165,6 +167,7 @@ def test_ctrl_c_ends_with_130_one_line_and_no_process_left(make_study, jobs):
     assert not (folder / "study.lock").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("send", [os.kill, os.killpg], ids=["process", "group"])
 def test_sigterm_ends_with_143_one_line_and_no_process_left(make_study, send):
     """Sent to the process alone or, as schedulers do, to its workers too."""
@@ -179,6 +182,7 @@ def test_sigterm_ends_with_143_one_line_and_no_process_left(make_study, send):
     assert not (folder / "study.lock").exists()
 
 
+@pytest.mark.slow
 def test_processes_of_a_killed_study_do_not_linger(make_study):
     folder = make_study(domain={"sleep": "0.05"}, jobs="2")
     process = start("study", folder)

@@ -35,6 +35,7 @@ def test_a_stated_level_is_what_counts_as_converged(make_study):
     assert (strict.when.level, strict.when.threshold) == (59.9, 53.9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_run_whose_cache_lost_any_of_its_pieces_comes_to_the_same(make_study, jobs):
     folder = make_taught(make_study, jobs=jobs)

@@ -25,6 +25,7 @@ def run(folder, left=None):
         return PlvSearch(settings, setup, store, space, Silent()).run(make_proposer("gp", settings.initial))
 
 
+@pytest.mark.slow
 def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(make_study):
     found = run(make_taught(make_study, parameters=BOX, more="budget = 8", initial="4"))
     assert len(found.trials) == 8
@@ -33,6 +34,7 @@ def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(
     assert abs(found.best.theta["trim"] - 0.12) < 0.15
 
 
+@pytest.mark.slow
 def test_a_raised_budget_goes_on_after_the_very_same_trials(make_study, tmp_path):
     journal = tmp_path / "journal"
     domain = {"teaching_journal": f'"{journal}"'}
@@ -59,6 +61,7 @@ def test_its_trials_are_kept_in_the_study_with_score_and_measures(make_study):
     assert found.stopped == "the budget of 3 proxies is spent"
 
 
+@pytest.mark.slow
 def test_a_batch_of_proxies_is_proposed_together_and_resumed_exactly(make_study):
     def set_budget(folder, count):
         path = folder / "study.toml"

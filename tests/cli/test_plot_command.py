@@ -2,6 +2,8 @@ import json
 import shutil
 import sqlite3
 
+import pytest
+
 from proxytune.cli.main import main
 
 

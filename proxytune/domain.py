@@ -27,10 +27,18 @@ class Episode:
     seed: int
 
 
+Instance = tuple[tuple[str, float], ...]
+"""A domain instance: θ as an episode names it."""
+
+
+def instance_of(theta: Theta) -> Instance:
+    """θ in its canonical order."""
+    return tuple(sorted((name, float(value)) for name, value in theta.items()))
+
+
 def make_episode(theta: Theta, *, agent: str, start: int, seed: int) -> Episode:
     """An episode with θ in its canonical order."""
-    pairs = sorted((name, float(value)) for name, value in theta.items())
-    return Episode(tuple(pairs), agent, start, seed)
+    return Episode(instance_of(theta), agent, start, seed)
 
 
 @dataclass(frozen=True)

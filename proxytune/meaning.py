@@ -46,7 +46,12 @@ def files_beside(folder: Path) -> list[Path]:
 
 def modules_beside(folder: Path) -> list[Path]:
     """A user's own modules: those in a folder and in its packages, in order."""
-    return [path for path in files_beside(folder) if path.suffix == ".py" and path.is_file()]
+    return [path for path in files_beside(folder) if is_module(path)]
+
+
+def is_module(path: Path) -> bool:
+    """Whether this is a module of Python."""
+    return path.suffix == ".py" and path.is_file()
 
 
 def _can_be_package(folder: Path) -> bool:

@@ -8,38 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from outside_effects import WEAK_REVERSE
 
 ROOT = Path(__file__).resolve().parent.parent
 
-EFFECT = '''
-
-@dataclass(frozen=True)
-class WeakReverse:
-    """The robot is slower backwards than forwards."""
-
-    loss: float
-    name: ClassVar[str] = "weak_reverse"
-    stage: ClassVar[Stage] = Stage.MOTION
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="loss", unit="", low=0.0, high=0.9, neutral=0.0,
-            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), source="made up",
-        ),
-    )
-    trace: ClassVar[Trace | None] = Trace(
-        cues=(Cue.DIRECTION,),
-        shown=Means(Cue.DIRECTION, (Panel("forward", "forward speed [m/s]", "forward"),)),
-    )
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
-
-    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
-        """Slow down what is backwards."""
-        forward = signal[..., 0]
-        slowed = np.where(forward < 0.0, (1.0 - self.loss) * forward, forward)
-        return _moved(slowed, signal[..., 1], signal[..., 2]), None
-'''
+EFFECT = "\n\n" + WEAK_REVERSE[WEAK_REVERSE.index("@dataclass") :]
 
 DIAGNOSE = """
 import sys

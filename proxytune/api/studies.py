@@ -184,7 +184,6 @@ def _prepare(under_way: StudyRun, warn: Callable[[str], None]) -> None:
     check_facts(under_way)
     if line := note_search(under_way.study, under_way.store):
         warn(line)
-    preflight.run_preflight(under_way)
-    learnt = preflight.preflight_of(under_way) if under_way.spent.episodes else None
-    for warning in learnt.warnings if learnt else ():
+    learnt = preflight.run_preflight(under_way)
+    for warning in learnt.warnings if learnt and under_way.spent.episodes else ():
         warn(warning)

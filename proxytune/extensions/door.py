@@ -2,10 +2,10 @@
 
 import importlib
 import inspect
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from proxytune.errors import ExtensionError, ProxytuneError
 from proxytune.extensions.beside import import_beside
@@ -13,6 +13,7 @@ from proxytune.extensions.plugins import plugins
 from proxytune.settings import nearest
 
 NONE: Mapping[str, Any] = MappingProxyType({})
+Answer = TypeVar("Answer")
 
 
 def load(
@@ -60,14 +61,28 @@ def make(
     found = load(name, kind=kind, beside=beside, shipped=shipped)
     needs = tuple(needs)
     if callable(found) and (inspect.isclass(found) or _lacks(found, needs)):
-        try:
-            found = found()
-        except ProxytuneError:
-            raise
-        except Exception as problem:
-            raise ExtensionError(f"{kind} '{name}' raised {describe(problem)}; correct it") from problem
+        found = ask(f"{kind} '{name}'", found)
     require(found, needs, name=name, kind=kind)
     return found
+
+
+def ask(what: str, question: Callable[[], Answer], where: str = "") -> Answer:
+    """What code that is not ours answers.
+
+    Args:
+        what: Whose it is, as a complaint names it.
+        question: Asks it.
+        where: On what it was tried, as a complaint goes on.
+
+    Raises:
+        ExtensionError: In one line, if it raises anything but an error of ours.
+    """
+    try:
+        return question()
+    except ProxytuneError:
+        raise
+    except Exception as problem:
+        raise ExtensionError(f"{what} raised {describe(problem)}{where}; correct it") from problem
 
 
 def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:

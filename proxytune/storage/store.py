@@ -148,7 +148,8 @@ class Store:
                     "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
                     (objective, trial.number, instance, *scored, *rest),
                 )
-        self._trials.pop(objective, None)
+        if objective in self._trials:
+            self._trials[objective] |= {trial.number: trial for trial in trials}
 
     def save_outcome(self, identity: str, outcome: Outcome) -> None:
         """Write an episode, over an earlier failure of the same."""

@@ -5,16 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from proxytune.domain import Episode, Outcome, make_episode
+from proxytune.domain import Episode, Outcome, instance_of
 from proxytune.scores import Array, ScoreTable
 from proxytune.seeds import episode_seed
 from proxytune.space import Theta
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
 from proxytune.usefulness.prpv import dominance
-
-Instance = tuple[tuple[str, float], ...]
-"""θ as an episode names it."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +45,8 @@ class Evaluation:
 
 def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
     """The episodes that score a domain instance: every agent from every start."""
-    return [
-        make_episode(theta, agent=agent, start=start, seed=episode_seed(seed, start))
-        for agent in settings.agents
-        for start in range(settings.starts)
-    ]
+    instance, seeds = instance_of(theta), [episode_seed(seed, start) for start in range(settings.starts)]
+    return [Episode(instance, agent, start, own) for agent in settings.agents for start, own in enumerate(seeds)]
 
 
 @dataclass(frozen=True)
@@ -89,7 +83,8 @@ def score(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation
     value = measures[objective.name]
     reason = "" if value is not None else f"{objective.label} is undefined here"
     pairs = disagreement_of(study, proxy, sorted(study.settings.agents))
-    return Evaluation(theta, proxy, measures, objective.cost(value), failures, reason, pairs)
+    cost = None if value is None else objective.sign * value
+    return Evaluation(theta, proxy, measures, cost, failures, reason, pairs)
 
 
 def disagreement_of(study: Study, proxy: ScoreTable, agents: Sequence[str]) -> Array:

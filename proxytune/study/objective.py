@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from proxytune.errors import ExtensionError, InputError, ProxytuneError
-from proxytune.extensions import describe, load, plugins
+from proxytune.errors import ExtensionError, InputError
+from proxytune.extensions import ask, load, plugins
 from proxytune.scores import Array, Metric, ScoreTable
 from proxytune.settings import nearest
 from proxytune.study.settings import LEARNING, StudySettings
-from proxytune.usefulness import MEASURES, Measure, ppv, prpv
-from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.usefulness import MEASURES, Measure, compare
 
 OfMeans = Callable[[Array, Array, Sequence[Metric]], Array]
 """A measure of mean scores in the proxy (…, agents, metrics) and on the target (agents, metrics): shape (…)."""
@@ -35,13 +34,10 @@ class Objective:
     maximise: bool
     of_means: OfMeans
 
-    def cost(self, value: float | None) -> float | None:
-        """The measure as something to be made small."""
-        return value if value is None or not self.maximise else -value
-
-    def value(self, cost: float) -> float:
-        """The measure that has this cost."""
-        return -cost if self.maximise else cost
+    @property
+    def sign(self) -> float:
+        """What turns the measure into something to be made small, and back."""
+        return -1.0 if self.maximise else 1.0
 
     def measure(self, *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> dict[str, float | None]:
         """PRPV, PPV and this measure of a proxy, by name; None where one is undefined.
@@ -49,20 +45,14 @@ class Objective:
         Raises:
             ScoresError: If an agent is missing on one side, or a metric is unknown.
         """
-        ranking = prpv(proxy=proxy, target=target, metrics=metrics)
-        predicting = ppv(proxy=proxy, target=target, metrics=metrics)
-        own = float(self.of_means(*ranking.inputs.means, metrics))
-        return {
-            self.name: own if math.isfinite(own) else None,
-            "prpv": float(ranking.value),
-            "ppv": predicting.value,
-        }
+        means = compare(proxy=proxy, target=target, metrics=metrics).means
+        kept = {self.name: self.of_means, **{name: one.of_means for name, one in KEPT.items()}}
+        values = {name: float(of_means(*means, metrics)) for name, of_means in kept.items()}
+        return {name: value if math.isfinite(value) else None for name, value in values.items()}
 
 
 TRIED = (4, 3, 2)
 """Tables, agents and metrics that a user's own measure is tried on."""
-
-PRPV = Objective("prpv", "PRPV", False, prpv_of_means)
 
 
 def objective_of(settings: StudySettings) -> Objective:
@@ -72,14 +62,15 @@ def objective_of(settings: StudySettings) -> Objective:
         SettingsError: If there is no such measure, or it is no single number of mean scores.
     """
     name = settings.objective
-    if name in (PRPV.name, LEARNING):
+    if name == LEARNING:
         return PRPV
-    shipped = {measure.key: measure for measure in MEASURES if measure.on_means and not measure.per_metric}
+    if name in KEPT:
+        return KEPT[name]
     try:
-        if ":" not in name and name not in shipped and name not in plugins("measure", shipped):
-            known = (*shipped, LEARNING)
+        if ":" not in name and name not in plugins("measure", KEPT):
+            known = (*KEPT, LEARNING)
             raise InputError(f"unknown measure '{name}' (your own is written module:attribute); {nearest(name, known)}")
-        return _as_objective(name, shipped[name] if name in shipped else measure_of(name, settings.folder))
+        return _as_objective(name, measure_of(name, settings.folder))
     except InputError as problem:
         raise settings.error("objective", str(problem)) from None
 
@@ -117,13 +108,10 @@ class _Outside:
     on_means: OfMeans
 
     def __call__(self, proxy: Array, target: Array, metrics: Sequence[Metric]) -> Array:
-        try:
-            values = np.asarray(self.on_means(proxy, target, metrics), dtype=float)
-        except ProxytuneError:
-            raise
-        except Exception as problem:
-            told = f"measure '{self.name}' raised {describe(problem)}"
-            raise ExtensionError(f"{told} for means {proxy.shape} against {target.shape}; correct it") from problem
+        where = f" for means {proxy.shape} against {target.shape}"
+        values = ask(
+            f"measure '{self.name}'", lambda: np.asarray(self.on_means(proxy, target, metrics), dtype=float), where
+        )
         if values.shape != proxy.shape[:-2]:
             told = f"measure '{self.name}' gives values {values.shape} of means {proxy.shape}"
             raise ExtensionError(f"{told}; give one for each table, {proxy.shape[:-2]}")
@@ -136,3 +124,8 @@ def _outside(name: str, on_means: OfMeans) -> OfMeans:
     means = np.random.default_rng(0).uniform(1.0, 2.0, TRIED)
     checked(means, means[0], [Metric("one"), Metric("other", "min")])
     return checked
+
+
+KEPT = {one.key: _as_objective(one.key, one) for one in MEASURES if one.on_means is not None and not one.per_metric}
+"""PRPV and PPV: what may be an objective by name, and is kept with every trial."""
+PRPV = KEPT["prpv"]

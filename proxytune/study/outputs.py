@@ -42,10 +42,9 @@ def compose_of(study: Study) -> Compose:
     """What the study makes small, of outputs against the study's target."""
     metrics, table, objective = study.settings.metrics, study.target, study.objective
     compared = table.means[:, : len(metrics)]
-    sign = -1.0 if objective.maximise else 1.0
 
     def compose(outputs: Array) -> Array:
         means = outputs.reshape(*outputs.shape[:-1], *table.means.shape)
-        return sign * objective.of_means(means[..., : len(metrics)], compared, metrics)
+        return objective.sign * objective.of_means(means[..., : len(metrics)], compared, metrics)
 
     return compose

@@ -39,7 +39,7 @@ def note_search(study: Study, store: Store) -> str:
     Returns:
         One line if it is other code than before, or other packages; empty if not, or if no trial is left to propose.
     """
-    engine, first = study.engine, len(store.trials()) + 1
+    engine, first = study.engine, len(store.trials(study.objective.name)) + 1
     if first > study.settings.budget:
         return ""
     library = engine.needs

@@ -90,8 +90,7 @@ class StudyTrials:
     def _show_best(self) -> None:
         scores = [trial.score for trial in self._done if trial.state == "finished" and trial.score is not None]
         if scores:
-            objective = self._run.study.objective
-            self._run.watcher.best(-min(scores) if objective.maximise else min(scores))
+            self._run.watcher.best(self._run.study.objective.sign * min(scores))
 
 
 def _name_trials(trials: Sequence[TrialRecord], budget: int) -> str:

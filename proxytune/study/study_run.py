@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from proxytune.domain import Episode, Outcome
+from proxytune.domain import Episode, Instance, Outcome, instance_of
 from proxytune.errors import EpisodeError, RunError
 from proxytune.running.episodes import running
 from proxytune.running.progress import Silent, Watcher
@@ -10,7 +10,7 @@ from proxytune.search.proposer import Trial
 from proxytune.space import Theta
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import Evaluation, Instance, Spent, failure_of, longest_first, plan, score
+from proxytune.study.evaluation import Evaluation, Spent, failure_of, longest_first, plan, score
 from proxytune.study.outputs import outputs_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
@@ -110,7 +110,7 @@ class StudyRun:
         self.watcher.episode()
         self.spent += Spent(1, outcome.seconds)
         if self.settings.stop_on_failure and outcome.failure:
-            raise EpisodeError(f"{failure_of(outcome)}; mend it and run again, or set on_failure = 'continue'")
+            raise EpisodeError(f"{failure_of(outcome)}; correct it and run again, or set on_failure = 'continue'")
 
     def evaluate(self, theta: Theta, what: str) -> Evaluation:
         """Score a domain instance by every agent from every start.
@@ -125,9 +125,9 @@ class StudyRun:
 
     def evaluation(self, theta: Theta) -> Evaluation | None:
         """The score of a domain instance; None if an episode of it has not been simulated."""
-        planned = plan(self.settings, theta, self.settings.seed)
-        key = planned[0].theta
+        key = instance_of(theta)
         if key not in self._evaluations:
+            planned = plan(self.settings, theta, self.settings.seed)
             known = self.known(planned)
             if len(known) < len(planned):
                 return None

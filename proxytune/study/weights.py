@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from proxytune.meaning import files_beside, modules_beside
+from proxytune.meaning import files_beside, is_module
 
 SUFFIXES = (
     ".ckpt",
@@ -27,9 +27,10 @@ NAMED = 3
 
 def unnoticed(folder: Path) -> tuple[str, ...]:
     """One line on files of weights beside a study that has modules of its own; none where there are none."""
-    names = [path.relative_to(folder).as_posix() for path in files_beside(folder) if path.suffix.lower() in SUFFIXES]
+    files = files_beside(folder)
+    names = [path.relative_to(folder).as_posix() for path in files if path.suffix.lower() in SUFFIXES]
     names = [name for name in names if name.split("/")[0] not in MADE]
-    if not names or not modules_beside(folder):
+    if not names or not any(is_module(path) for path in files):
         return ()
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from proxytune import Engine, InputError, SearchBox
 from proxytune.search.engines.random_points import RandomPoints
-from proxytune.search.engines.registry import WITH_OUTPUTS
+from proxytune.search.engines.registry import ENGINES
 
 BOX = {"trim": (-0.3, 0.3), "delay": (0.0, 0.3)}
 
@@ -109,7 +109,7 @@ def test_an_engine_of_one_s_own_proposes():
     assert searched(6, engine=own, initial=2).trials().equals(searched(6, engine="random", initial=2).trials())
 
 
-@pytest.mark.parametrize("engine", WITH_OUTPUTS)
+@pytest.mark.parametrize("engine", [one.name for one in ENGINES if one.learns_from == "outputs"])
 def test_an_engine_that_needs_outputs_is_refused_with_one_that_does_not(engine):
     with pytest.raises(InputError, match=f"'{engine}' models what a score is computed from.*use 'gp'"):
         SearchBox(BOX, engine=engine)

@@ -107,17 +107,6 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("case", BAD)
-def test_what_is_no_objective_is_one_line_with_file_and_key(make_study, case):
-    objective, expected = BAD[case]
-    folder = make_study(objective=objective)
-    (folder / "mine.py").write_text(OWN)
-    with pytest.raises(SettingsError, match=expected) as caught:
-        open_study(folder)
-    assert "study.toml: objective: " in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 ENGINES = {
     "an unknown engine": ('"tpr"', "engine: unknown engine 'tpr' .*; did you mean 'tpe'"),
     "an engine for comparison only": ('"skopt"', "engine: 'skopt' is for `compare` only; known are: composite, gp"),
@@ -125,11 +114,34 @@ ENGINES = {
 }
 
 
-@pytest.mark.parametrize("case", ENGINES)
-def test_what_is_no_engine_of_a_study_is_one_line_with_file_and_key(make_study, case):
-    engine, expected = ENGINES[case]
-    folder = make_study(engine=engine)
+@pytest.mark.parametrize(
+    ("key", "case"), [*(("objective", case) for case in BAD), *(("engine", case) for case in ENGINES)]
+)
+def test_what_is_no_objective_or_engine_of_a_study_is_one_line_with_file_and_key(make_study, key, case):
+    name, expected = {"objective": BAD, "engine": ENGINES}[key][case]
+    folder = make_study(**{key: name})
     (folder / "mine.py").write_text(OWN)
     with pytest.raises(SettingsError, match=expected) as caught:
         open_study(folder)
-    assert "study.toml: engine: " in str(caught.value)
+    assert f"study.toml: {key}: " in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+WRONG = {
+    "np.abs(proxy - target).mean(axis=-1)": r"gives values \(4, 3\) of means \(4, 3, 2\); give one for each table",
+    "1 / 0": r"raised ZeroDivisionError: division by zero for means \(4, 3, 2\) against \(3, 2\); correct it",
+    "'high'": "raised ValueError: could not convert string to float",
+}
+
+
+@pytest.mark.parametrize("formula", WRONG)
+def test_what_a_measure_of_one_s_own_does_wrong_is_told_with_file_and_key_before_any_episode(make_study, formula):
+    folder = make_study(objective='"mine:WRONG"')
+    (folder / "mine.py").write_text(
+        "import numpy as np\n\nfrom proxytune import Measure\n\n\n"
+        f"def wrong(proxy, target, metrics):\n    return {formula}\n\n\n"
+        'WRONG = Measure("wrong", "Wrong", "wrong", "lower", "", ".2f", on_means=wrong)\n'
+    )
+    with pytest.raises(SettingsError, match=f"study.toml: objective: measure 'mine:WRONG' {WRONG[formula]}") as told:
+        open_study(folder)
+    assert "\n" not in str(told.value)

@@ -144,6 +144,16 @@ def test_a_search_that_proposed_nothing_is_forgotten(finished, make_study, code)
     assert searches(finished) == [(8, "one"), (10, "three")]
 
 
+def test_a_change_is_told_whatever_the_objective(make_study, code):
+    folder = make_study(objective='"ppv"')
+    noted(folder)
+    resumed(folder)
+    make_study(objective='"ppv"', budget="9")
+    code("two")
+    assert noted(folder).startswith("trials from 8 on are proposed by another search")
+    assert searches(folder) == [(1, "one"), (8, "two")]
+
+
 def test_nothing_is_said_or_kept_of_the_search_once_all_trials_are_proposed(finished, code):
     before = sqlite3.connect(finished / "study.db").execute("SELECT * FROM facts").fetchall()
     assert noted(finished) == ""

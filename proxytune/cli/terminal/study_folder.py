@@ -10,8 +10,9 @@ from proxytune.errors import InputError, StoreError
 from proxytune.settings import nearest
 from proxytune.shipped import shipped
 from proxytune.study.settings import FILE_NAME
+from proxytune.study.weights import MADE
 
-MADE = ("study.db*", "study.lock", "figures", "rescored", "teaching", "report.html", "__pycache__")
+NOT_COPIED = (*MADE, "study.db*", "study.lock", "report.html", "__pycache__")
 """What running a study adds; not copied."""
 
 
@@ -43,7 +44,7 @@ def _copy(source: Path, folder: Path) -> None:
     draft = folder.with_name(f".{folder.name}.{os.getpid()}")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*MADE))
+        shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED))
         draft.replace(folder)
     except (OSError, shutil.Error) as problem:
         with contextlib.suppress(OSError):

@@ -30,7 +30,7 @@ def objective_rows(result: StudyResult) -> list[Row]:
         return []
     rows = [(objective.label, f"{value:.4g}", "", "the objective, in the search's own episodes")]
     scores = result.confirmation.answer.scores if result.confirmation else ()
-    fresh = [objective.value(score) for score in scores if score is not None]
+    fresh = [objective.sign * score for score in scores if score is not None]
     return [*rows, ("  fresh", f"{sum(fresh) / len(fresh):.4g}", "", "on fresh episodes")] if fresh else rows
 
 

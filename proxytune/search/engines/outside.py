@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from proxytune.errors import ExtensionError, ProxytuneError
-from proxytune.extensions import describe, require
+from proxytune.extensions import ask, describe, require
 from proxytune.search.engines.engine import Engine
 from proxytune.search.goal import Goal
 from proxytune.search.proposer import Proposer, Trial, Values
@@ -29,12 +29,7 @@ class Outside:
         Raises:
             ExtensionError: If it raises, or proposes what is no point of the box.
         """
-        try:
-            values = tuple(float(value) for value in self.inner.propose(space, trials, seed))
-        except ProxytuneError:
-            raise
-        except Exception as problem:
-            raise ExtensionError(f"engine '{self.name}' raised {describe(problem)}; correct it") from problem
+        values = ask(f"engine '{self.name}'", lambda: tuple(map(float, self.inner.propose(space, trials, seed))))
         sides = space.intervals
         if len(values) != len(sides) or not all(i.low <= v <= i.high for i, v in zip(sides, values, strict=True)):
             box = ", ".join(f"{side.name} in [{side.low:g}, {side.high:g}]" for side in sides)

@@ -45,8 +45,6 @@ NAMES = tuple(engine.name for engine in ENGINES)
 """What can be compared."""
 STUDY_ENGINES = tuple(engine.name for engine in ENGINES if engine.in_studies)
 """What a study may name."""
-WITH_OUTPUTS = tuple(engine.name for engine in ENGINES if engine.learns_from == "outputs")
-"""What learns from the outputs that a score is computed from."""
 DEFAULT_ENGINE = outcomes.ENGINE.name
 SCORE_ENGINE = gaussian_process.ENGINE.name
 """The default where a score has no parts."""

@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.domain import Episode, Outcome
+from proxytune.domain import Episode, Instance, Outcome
 from proxytune.search.surrogate import fit_surrogate
 from proxytune.storage.records import TrialRecord
-from proxytune.study.evaluation import Instance, Spent, disagreement_of, plan, table
+from proxytune.study.evaluation import Spent, disagreement_of, plan, table
 from proxytune.study.objective import PRPV
 from proxytune.study.outputs import score_trials
 from proxytune.study.study import Study

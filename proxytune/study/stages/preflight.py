@@ -11,6 +11,7 @@ already shows to matter is left out of the second look.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ceil
 from typing import NamedTuple
 
@@ -62,16 +63,15 @@ class Preflight:
         return tuple(movement.warning for movement in self.movements if not movement.moves)
 
 
-def run_preflight(run: StudyRun) -> None:
-    """Simulate what is missing of the pre-flight of a study that has no finished trial yet.
+def run_preflight(run: StudyRun) -> Preflight | None:
+    """The pre-flight of a study that has no finished trial yet; what is missing of it is simulated now.
 
-    Nothing of it enters a trial. A study whose trials have begun goes on without.
+    Nothing of it enters a trial. A study whose trials have begun goes on without: None.
 
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
     """
-    if not run.finished_trials():
-        _preflight(run, lambda look, added: _simulate(run, look, added))
+    return None if run.finished_trials() else _preflight(run, partial(_simulate, run))
 
 
 def preflight_of(run: StudyRun) -> Preflight | None:

@@ -34,6 +34,9 @@ class CameraFigures:
         height_m: Height of the lens above the floor [m].
         field_of_view_deg: Vertical field of view of the lens without distortion [deg].
         k1: Radial distortion, plumb-bob model; below zero is a barrel.
+        centre_right: How far right of the picture's middle the lens' axis meets it, as a share of the picture's height.
+        centre_down: How far below the middle it does, in the same way.
+        aspect: Horizontal focal length over the vertical one; above 1 things look wider than they are.
 
     Raises:
         SettingsError: If no camera can have these figures.
@@ -48,6 +51,9 @@ class CameraFigures:
     height_m: float
     field_of_view_deg: float
     k1: float
+    centre_right: float = 0.0
+    centre_down: float = 0.0
+    aspect: float = 1.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -57,6 +63,8 @@ class CameraFigures:
             raise SettingsError(f"camera: a picture needs a column and a row, got {self.columns} × {self.rows}")
         if self.height_m <= 0.0:
             raise SettingsError(f"camera: height_m must be above 0 m, got {self.height_m}")
+        if self.aspect <= 0.0:
+            raise SettingsError(f"camera: aspect must be above 0, got {self.aspect}")
         if not 0.0 < self.field_of_view_deg < 180.0:
             raise SettingsError(f"camera: field_of_view_deg must be between 0° and 180°, got {self.field_of_view_deg}")
 
@@ -88,25 +96,39 @@ def ground_points(figures: CameraFigures) -> NDArray[np.float64]:
 
 def _floor_hits(figures: CameraFigures, right: float, down: float) -> NDArray[np.float64]:
     """Where the rays through the pixels' middles, shifted by a part of a pixel, meet the floor."""
-    rays = _rays(figures, right, down)
+    columns, rows = np.meshgrid(np.arange(figures.columns), np.arange(figures.rows))
+    return floor_points(figures, columns + 0.5 + right, rows + 0.5 + down)
+
+
+def floor_points(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any]) -> NDArray[np.float64]:
+    """Where on the floor any points of the picture look, in the robot's frame.
+
+    Args:
+        figures: Of the camera.
+        columns: Places (…) from the picture's left edge [pixel]; the first pixel's middle is at 0.5.
+        rows: Places (…) from its upper edge [pixel].
+
+    Returns:
+        Shape (…, 2): x ahead of the axle and y to the left [m]; NaN at and above the horizon.
+    """
+    rays = lens_rays(figures, columns, rows)
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = np.where(rays[..., 2] < 0.0, figures.height_m / -rays[..., 2], np.nan)
     hits: NDArray[np.float64] = rays[..., :2] * reach[..., None] + (figures.forward_m, 0.0)
     return hits
 
 
-def _rays(figures: CameraFigures, right: float, down: float) -> NDArray[np.float64]:
-    """Directions (rows, columns, 3) of the pixels' rays in the robot's frame: forward, left, up."""
+def lens_rays(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any]) -> NDArray[np.float64]:
+    """Directions (…, 3) in the robot's frame, forward, left, up, of the rays through points of the picture [pixel]."""
     focal = figures.rows / 2.0 / math.tan(math.radians(figures.field_of_view_deg) / 2.0)
-    u = (np.arange(figures.columns) + 0.5 + right - figures.columns / 2.0) / focal
-    v = (np.arange(figures.rows) + 0.5 + down - figures.rows / 2.0) / focal
-    u, v = np.meshgrid(u, v)
+    u = (columns - figures.columns / 2.0 - figures.centre_right * figures.rows) / focal / figures.aspect
+    v = (rows - figures.rows / 2.0 - figures.centre_down * figures.rows) / focal
     # Plumb-bob r' = r (1 + k1 r²) solved for r to second order in k1: exact inverses end where r' has its maximum,
     # inside the picture for k1 < -0.2, but real lenses go on (their k2 > 0), and so does the series, always upwards.
     bend = figures.k1 * (u * u + v * v)
     stretch = 1.0 - bend + 3.0 * bend * bend
-    seen = np.stack((np.ones_like(u), -u * stretch, -v * stretch), axis=-1)
-    return seen @ orientation(figures).T
+    rays = np.stack((np.ones_like(u), -u * stretch, -v * stretch), axis=-1)
+    return rays @ orientation(figures).T
 
 
 def orientation(figures: CameraFigures) -> NDArray[np.float64]:

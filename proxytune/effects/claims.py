@@ -137,10 +137,11 @@ def _wrong_filter(kind: Any) -> Iterator[str]:
 
 
 def _signal(stage: Stage) -> Any:
-    """Something that the stage could meet (1, ticks, channels); a camera is level, and all else of it 1."""
+    """Something that the stage could meet (1, ticks, channels)."""
     channels = len(CHANNELS[stage])
     if stage is Stage.CAMERA:
-        return np.tile((1.0, 0.0, 0.0, 1.0, 1.0, 0.0), (1, TICKS, 1))
+        level = {"pitch_deg": 1.0, "height_m": 1.0, "field_of_view_deg": 1.0, "aspect": 1.0}
+        return np.tile([level.get(name, 0.0) for name in CHANNELS[stage]], (1, TICKS, 1))
     return np.sin(np.arange(TICKS * channels, dtype=float)).reshape(1, TICKS, channels)
 
 

@@ -34,7 +34,18 @@ CHANNELS: Mapping[Stage, tuple[str, ...]] = {
     Stage.ACTUATION: ("left", "right"),
     Stage.MOTION: ("forward_m_s", "sideways_m_s", "yaw_rad_s"),
     Stage.MEASUREMENT: ("x_m", "y_m", "heading_rad"),
-    Stage.CAMERA: ("pitch_deg", "roll_deg", "yaw_deg", "height_m", "field_of_view_deg", "k1"),
+    Stage.CAMERA: (
+        "pitch_deg",
+        "roll_deg",
+        "yaw_deg",
+        "height_m",
+        "field_of_view_deg",
+        "k1",
+        "forward_m",
+        "centre_right",
+        "centre_down",
+        "aspect",
+    ),
     Stage.IMAGE: ("red, green and blue of every pixel, row by row, 0 to 255",),
 }
 

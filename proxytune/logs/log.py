@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -60,6 +61,34 @@ class LogEpisode:
 
 
 @dataclass(frozen=True)
+class Frames:
+    """The pictures that a log's camera took, N of them.
+
+    Attributes:
+        paths: The files (N,).
+        drives: Number of the drive that each belongs to (N,).
+        times: Middle of each exposure on the poses' clock (N,) [s].
+        road: The map that they show: a name of the package's, or the path of a map file.
+        position_m: Standard deviation of the tracker's places [m]; None where it is not known.
+        heading_deg: Standard deviation of its headings [deg]; None where it is not known.
+        rectified: Whether the lens' distortion has been taken out.
+        readout_s: How long a rolling shutter takes from the first row to the last [s], where that is known; 0 for a
+            global shutter; None where it is not known.
+        fixed_exposure: Whether every picture was exposed alike.
+    """
+
+    paths: tuple[Path, ...]
+    drives: Whole
+    times: Floats
+    road: str
+    position_m: float | None = None
+    heading_deg: float | None = None
+    rectified: bool = False
+    readout_s: float | None = None
+    fixed_exposure: bool = False
+
+
+@dataclass(frozen=True)
 class Log:
     """A robot's drives.
 
@@ -70,6 +99,7 @@ class Log:
         rate_hz: Samples per second; 0 for still frames that state none, whose times are as in the file.
         geometry: Figures that log.toml states itself: wheel_radius, effective_baseline [m], full_speed [m/s].
         episodes: The drives.
+        frames: What its camera saw, or None.
     """
 
     name: str
@@ -78,3 +108,4 @@ class Log:
     rate_hz: float
     geometry: dict[str, float]
     episodes: tuple[LogEpisode, ...]
+    frames: Frames | None = None

@@ -1,6 +1,6 @@
 """A map: the road's segments, its lanes and markings, and where robots are put down; in metres from its corner."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from proxytune.driving.road.segments import Segment
 
@@ -16,6 +16,7 @@ class Paint:
             not. The lanes as they are scored follow the road's own radius.
         straight_dash: About how long a yellow dash on a straight is [m].
         bend_dash: About how long one in a bend is [m].
+        tape_m: Standard deviation of where a line lies from where the map has it [m]; no episode depends on it.
     """
 
     white_width: float
@@ -23,6 +24,7 @@ class Paint:
     bend_radius: float | None
     straight_dash: float
     bend_dash: float
+    tape_m: float = field(default=0.005, repr=False)
 
 
 @dataclass(frozen=True)

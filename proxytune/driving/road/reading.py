@@ -81,13 +81,14 @@ def read_map(path: Path) -> Road:
 
 
 def _paint(section: Section) -> Paint:
-    section.only(("white_width", "yellow_width", "bend_radius", "straight_dash", "bend_dash"))
+    section.only(("white_width", "yellow_width", "bend_radius", "straight_dash", "bend_dash", "tape_m"))
     return Paint(
         white_width=_length(section, "white_width"),
         yellow_width=_length(section, "yellow_width"),
         bend_radius=_length(section, "bend_radius") if "bend_radius" in section.values else None,
         straight_dash=_length(section, "straight_dash"),
         bend_dash=_length(section, "bend_dash"),
+        tape_m=section.number("tape_m", 0.005, low=0.0, high=0.1),
     )
 
 

@@ -22,6 +22,7 @@ from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import TICK_HZ, Course, Drive, Driver, Instance, Sight, drive, measured, picture_only
 from proxytune.driving.expert import Expert
 from proxytune.driving.identity import earlier_identities, identity_of
+from proxytune.driving.mounting import mounted_camera
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
 from proxytune.driving.road.lane import off_map
@@ -32,7 +33,6 @@ from proxytune.driving.robot import Robot, read_robot, robot_home
 from proxytune.effects import (
     Catalogue,
     Effect,
-    Setting,
     Signal,
     Stage,
     effects_from,
@@ -235,10 +235,5 @@ def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> In
 
 
 def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) -> Camera:
-    figures = robot.camera_figures()
-    mounting = stage_chain(effects, Stage.CAMERA)
-    nominal = figures.channels()
-    memory = mounting.begin(Setting(TICK_HZ, nominal, robot.figures))
-    mounted = figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
-    floor = draw_floor(family.map)
+    mounted, floor = mounted_camera(robot, effects), draw_floor(family.map)
     return GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)

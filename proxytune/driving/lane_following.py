@@ -19,7 +19,18 @@ from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
-from proxytune.driving.episode import TICK_HZ, Course, Drive, Driver, Instance, Sight, drive, measured, picture_only
+from proxytune.driving.episode import (
+    TICK_HZ,
+    Course,
+    Drive,
+    Driver,
+    Instance,
+    Sight,
+    drive,
+    image_chain,
+    measured,
+    picture_only,
+)
 from proxytune.driving.expert import Expert
 from proxytune.driving.identity import earlier_identities, identity_of
 from proxytune.driving.mounting import mounted_camera
@@ -30,14 +41,7 @@ from proxytune.driving.road.maps import Road
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import Robot, read_robot, robot_home
-from proxytune.effects import (
-    Catalogue,
-    Effect,
-    Signal,
-    Stage,
-    effects_from,
-    stage_chain,
-)
+from proxytune.effects import Catalogue, Effect, Signal, Stage, effects_from, stage_chain
 from proxytune.space import Parameter, Theta
 from proxytune.versions import versions_of
 
@@ -230,7 +234,7 @@ def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> In
     robot = read_robot(family.robot, family.folder)
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
     camera = _camera(family, robot, effects)
-    image, measurement = (stage_chain(effects, stage) for stage in (Stage.IMAGE, Stage.MEASUREMENT))
+    image, measurement = image_chain(effects, robot.figures), stage_chain(effects, Stage.MEASUREMENT)
     return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
 
 

@@ -167,8 +167,8 @@ class Normal(NamedTuple):
         inverse = np.linalg.inv(blocks)
         coupling = inverse @ cross
         own_step = (inverse @ pulls[..., None])[..., 0]
-        flat = cross.reshape(-1, cross.shape[2])
-        matrix -= flat.T @ coupling.reshape(-1, cross.shape[2])
+        flat = cross.reshape(3 * count, self.columns.shape[1])
+        matrix -= flat.T @ coupling.reshape(3 * count, self.columns.shape[1])
         right -= flat.T @ own_step.ravel()
         return matrix, right, inverse, coupling, own_step
 

@@ -1,13 +1,13 @@
 """Which camera effects are needed: the fewest whose fit is no worse than with all of them free."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.fitting import SCALE_PX, CameraFit
+from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.camera.optics import effects_of
 
 Floats = NDArray[np.float64]
@@ -58,13 +58,3 @@ def _loss(full: CameraFit, effects: Sequence[str]) -> float:
     if kept.any():
         left = left - across @ np.linalg.solve(inner + 1e-9 * np.diag(np.diag(inner)), across.T)
     return float(0.5 * off @ left @ off)
-
-
-def sets_by_size(full: CameraFit, declared: Sequence[str]) -> Iterator[list[Subset]]:
-    """The best few sets of none, one, two … effects."""
-    for size in range(MOST + 1):
-        yield rank_subsets(full, declared, size)[:TRIED]
-
-
-FINAL = (4.0 * SCALE_PX, 2.0 * SCALE_PX, *(SCALE_PX,) * 5)
-"""Scales of the loss where a set of effects is fitted from the values that all effects together had [pixel]."""

@@ -1,6 +1,6 @@
 """Where the robot was when pictures were taken: tracked poses, smoothed where it moves."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,10 @@ class Tracks:
         columns = (self.poses.T, self.rates.T)
         poses, rates = (np.stack([np.interp(when, self.times, one) for one in column], axis=-1) for column in columns)
         return poses, rates
+
+    def only(self, chosen: NDArray[np.intp]) -> "Tracks":
+        """The tracks of some frames."""
+        return replace(self, instants=self.instants[chosen])
 
     @property
     def moving(self) -> bool:

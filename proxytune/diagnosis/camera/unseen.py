@@ -25,11 +25,11 @@ DRAWS = 400
 
 
 @dataclass(frozen=True)
-class PixelError:
-    """Mean displacement of markings on unseen frames.
+class PictureError:
+    """Mean error on unseen frames.
 
     Attributes:
-        value: Over all edge points [pixel].
+        value: Over all points, in pixels or grey levels.
         interval: 95 %, from a bootstrap over frames.
         frames: Mean of each frame, NaN where it shows no marking (N,).
     """
@@ -66,7 +66,7 @@ def fit_poses(views: Views, state: State, frames: NDArray[np.bool_]) -> State:
     return state
 
 
-def pixel_errors(views: Views, residuals: Sequence[Floats], seed: int) -> list[PixelError]:
+def pixel_errors(views: Views, residuals: Sequence[Floats], seed: int) -> list[PictureError]:
     """Errors of several cameras over the same points: those that any of them brings to a marking."""
     sizes = np.abs(np.stack(residuals))
     chosen = (sizes < CAP_PX).any(axis=0)
@@ -76,10 +76,10 @@ def pixel_errors(views: Views, residuals: Sequence[Floats], seed: int) -> list[P
     return [_error(total, counts, seed) for total in sums]
 
 
-def _error(sums: Floats, counts: Floats, seed: int) -> PixelError:
+def _error(sums: Floats, counts: Floats, seed: int) -> PictureError:
     draws = np.random.default_rng(seed).integers(0, len(sums), (DRAWS, len(sums)))
     means = sums[draws].sum(axis=1) / np.maximum(counts[draws].sum(axis=1), 1.0)
     low, high = np.quantile(means, (0.025, 0.975))
     with np.errstate(invalid="ignore", divide="ignore"):
         frames = np.where(counts > 0, sums / counts, np.nan)
-    return PixelError(float(sums.sum() / max(counts.sum(), 1.0)), (float(low), float(high)), frames)
+    return PictureError(float(sums.sum() / max(counts.sum(), 1.0)), (float(low), float(high)), frames)

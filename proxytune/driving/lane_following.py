@@ -22,6 +22,7 @@ from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import TICK_HZ, Course, Drive, Driver, Instance, Sight, drive, measured, picture_only
 from proxytune.driving.expert import Expert
 from proxytune.driving.identity import earlier_identities, identity_of
+from proxytune.driving.picture_size import with_columns
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
 from proxytune.driving.road.lane import off_map
@@ -216,9 +217,9 @@ class LaneFollowing:
         with self.plant_at(instance.robot, course.start) as plant:
             return drive(instance, plant, driver, course, sees)
 
-    def instance(self, theta: Theta) -> Instance:
-        """The domain instance S_θ: nominal effects, then the family's, then θ."""
-        return _instance(self, tuple(sorted(theta.items())))
+    def instance(self, theta: Theta, columns: int = 0) -> Instance:
+        """The domain instance S_θ: nominal effects, then the family's, then θ; pictures of at least so many columns."""
+        return _instance(self, tuple(sorted(theta.items())), columns)
 
     def plant_at(self, robot: Robot, start: Signal) -> Plant:
         """The plant with the robot at a starting pose."""
@@ -226,8 +227,9 @@ class LaneFollowing:
 
 
 @functools.lru_cache(maxsize=4)
-def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
-    robot = read_robot(family.robot, family.folder)
+def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...], columns: int) -> Instance:
+    named = read_robot(family.robot, family.folder)
+    robot = with_columns(named, columns) if columns else named
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
     camera = _camera(family, robot, effects)
     image, measurement = (stage_chain(effects, stage) for stage in (Stage.IMAGE, Stage.MEASUREMENT))

@@ -13,7 +13,8 @@ from proxytune.diagnosis.recording import tracked
 from proxytune.driving.episode import TICK_HZ, Course, Drive, Instance, Sight, drive, measured
 from proxytune.driving.expert import Expert
 from proxytune.driving.lane_following import LaneFollowing
-from proxytune.driving.road.lane import off_map
+from proxytune.driving.road.lane import lane_point, lane_pose, off_map
+from proxytune.driving.road.maps import Road
 from proxytune.driving.task import start_pose
 from proxytune.errors import EpisodeError
 from proxytune.logs import LogEpisode
@@ -55,7 +56,7 @@ class _Lap(NamedTuple):
 
 
 def film(family: LaneFollowing, frames: int, seed: int) -> Iterator[FilmedDrive]:
-    """Let the robot's expert drive from every start, then from every start turned round, and take pictures.
+    """Let the robot's expert drive from every start, then from each the other way, and take pictures.
 
     Args:
         family: The domain, whose expert drives in the right-hand lane with its disturbances.
@@ -85,8 +86,8 @@ def _drive(family: LaneFollowing, instance: Instance, lap: _Lap, seed: int) -> F
     random = np.random.default_rng((seed, lap.number, LANES))
     own = int(random.integers(2**32))
     noise = {"position_noise_m": family.position_noise_m, "heading_noise_deg": family.heading_noise_deg}
-    x, y, heading = start_pose(family.map, lap.start, seed=own, **noise)
-    start = np.array((x, y, heading + math.pi * lap.turned))
+    start = np.array(start_pose(family.map, lap.start, seed=own, **noise))
+    start = _in_other_lane(family.map, start) if lap.turned else start
     seconds = max(SHORTEST_S, lap.frames / FRAMES_HZ)
     course = Course(start, seconds, own, functools.partial(off_map, family.map))
     expert = Expert(family.map, *instance.robot.expert_figures(), seed=own)
@@ -97,6 +98,13 @@ def _drive(family: LaneFollowing, instance: Instance, lap: _Lap, seed: int) -> F
     poses = tracked(measured(instance, driven.poses, own)[:: round(TICK_HZ / rate)][:rows], random)
     episode = LogEpisode(f"lane_{lap.number}", np.arange(rows) / rate, driven.commands, poses, None)
     return FilmedDrive(episode, times, np.stack([driven.memory.pictures[step] for step in steps]))
+
+
+def _in_other_lane(road: Road, pose: Floats) -> Floats:
+    """The pose turned round, in the middle of the lane that it then looks along."""
+    heading = pose[2] + math.pi
+    other = lane_pose(road, pose[:2], heading)
+    return np.array((*lane_point(road, other.counter_clockwise, other.along), heading))
 
 
 def _instants(instance: Instance, driven: Drive, lap: _Lap) -> tuple[list[int], Floats]:

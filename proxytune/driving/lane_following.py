@@ -34,6 +34,7 @@ from proxytune.driving.episode import (
 from proxytune.driving.expert import Expert
 from proxytune.driving.identity import earlier_identities, identity_of
 from proxytune.driving.mounting import mounted_camera
+from proxytune.driving.picture_size import with_columns
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
 from proxytune.driving.road.lane import off_map
@@ -220,9 +221,9 @@ class LaneFollowing:
         with self.plant_at(instance.robot, course.start) as plant:
             return drive(instance, plant, driver, course, sees)
 
-    def instance(self, theta: Theta) -> Instance:
-        """The domain instance S_θ: nominal effects, then the family's, then θ."""
-        return _instance(self, tuple(sorted(theta.items())))
+    def instance(self, theta: Theta, columns: int = 0) -> Instance:
+        """The domain instance S_θ: nominal effects, then the family's, then θ; pictures of at least so many columns."""
+        return _instance(self, tuple(sorted(theta.items())), columns)
 
     def plant_at(self, robot: Robot, start: Signal) -> Plant:
         """The plant with the robot at a starting pose."""
@@ -230,8 +231,9 @@ class LaneFollowing:
 
 
 @functools.lru_cache(maxsize=4)
-def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
-    robot = read_robot(family.robot, family.folder)
+def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...], columns: int) -> Instance:
+    named = read_robot(family.robot, family.folder)
+    robot = with_columns(named, columns) if columns else named
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
     camera = _camera(family, robot, effects)
     image, measurement = image_chain(effects, robot.figures), stage_chain(effects, Stage.MEASUREMENT)

@@ -91,8 +91,8 @@ def name_camera_effects(full: CameraFit, declared: Sequence[str]) -> Named:
 def cost_of(fit: CameraFit) -> float:
     """Cost of a fit: that of its edge points, as the loss has it, and of what is added to poses and tape [nats]."""
     there = project(fit.views, fit.state)
-    squares = np.where(there.valid, (there.residual / SCALE_PX) ** 2, np.inf)
-    points = np.where(np.isfinite(squares), squares / (1.0 + squares), 1.0)[there.near].sum()
+    squares = (there.residual / SCALE_PX) ** 2
+    points = np.where(there.valid, squares / (1.0 + squares), 1.0)[there.near].sum()
     poses = ((fit.state.poses / fit.views.pose_scatter) ** 2).sum()
     tape = ((fit.state.tape / fit.views.tape_scatter) ** 2).sum()
     return float(0.5 * (EVIDENCE * points + poses + tape))

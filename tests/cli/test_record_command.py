@@ -91,19 +91,6 @@ def test_an_impossible_number_of_frames_is_refused(recorded, capsys, frames):
     assert not home.exists()
 
 
-def test_a_robot_without_an_expert_is_refused_before_anything_is_driven(recorded, tmp_path, capsys):
-    lines = (shipped("robots") / "duckiebot" / "robot.toml").read_text(encoding="utf-8").splitlines()
-    kept = "\n".join(line for line in lines if not line.startswith(("expert_", "urdf")))
-    (tmp_path / "novice").mkdir()
-    (tmp_path / "novice" / "robot.toml").write_text(kept.replace('name = "duckiebot"', 'name = "novice"'))
-    (tmp_path / "model.toml").write_text(MODEL.replace("duckiebot", "novice"))
-    status, output = recorded("log", "--frames", "1", changes=('"duckiebot"', '"novice"'))
-    assert status == 2
-    (line,) = capsys.readouterr().err.strip().splitlines()
-    assert "robot 'novice' has no expert" in line
-    assert not output.exists()
-
-
 def test_a_picture_that_cannot_be_written_leaves_no_log(recorded, capsys):
     _, home = recorded("log")
     (home / "log.toml").unlink()

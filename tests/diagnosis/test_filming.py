@@ -14,6 +14,7 @@ from proxytune.driving.road.lane import lane_pose
 from proxytune.driving.road.reading import shipped_map
 from proxytune.effects import Setting
 from proxytune.errors import EpisodeError, SettingsError
+from proxytune.shipped import shipped
 
 ROAD = shipped_map("small_loop")
 
@@ -54,6 +55,8 @@ def test_every_start_is_driven_from_in_both_lanes(family, exact, monkeypatch, na
     assert np.abs(begins[:10, :2] - np.array(road.starts)[:, :2]).max() < 0.05
     assert (lanes.counter_clockwise[:10] != lanes.counter_clockwise[10:]).all()
     np.testing.assert_allclose(lanes.deviation[10:], 0.0, atol=1e-9)
+    turned = begins[10:, 2] - begins[:10, 2] - np.pi
+    assert len(set(turned.round(9))) == 10, "drives from one start share their placement noise"
 
 
 @pytest.mark.slow
@@ -124,3 +127,12 @@ def test_a_drive_that_ends_before_its_pictures_are_taken_is_told_with_its_start(
 def test_a_robot_without_a_camera_is_refused_before_anything_is_driven(family):
     with pytest.raises(SettingsError, match="has no camera"):
         film(replace(family, robot="irobot_create"), 1, 1)
+
+
+def test_a_robot_without_an_expert_is_refused_before_anything_is_driven(family, tmp_path):
+    described = (shipped("robots") / "duckiebot" / "robot.toml").read_text(encoding="utf-8")
+    kept = [line for line in described.splitlines() if not line.startswith(("expert_", "urdf"))]
+    (tmp_path / "novice").mkdir()
+    (tmp_path / "novice" / "robot.toml").write_text("\n".join(kept).replace('"duckiebot"', '"novice"'))
+    with pytest.raises(SettingsError, match="'novice' has no expert"):
+        film(replace(family, robot="novice"), 1, 1)

@@ -25,7 +25,7 @@ def _either(random: Random, low: float, high: float) -> float:
 
 def _distortion(random: Random) -> Mapping[str, Any]:
     barrel = random.random() < 0.7
-    return {"k1": float(random.uniform(-0.3, -0.08) if barrel else random.uniform(0.05, 0.15))}
+    return {"lens_distortion": float(random.uniform(-0.3, -0.08) if barrel else random.uniform(0.05, 0.15))}
 
 
 def _centre(random: Random) -> Mapping[str, Any]:
@@ -76,14 +76,14 @@ GEOMETRIC: Mapping[str, Change] = {
 }
 TIMED: Mapping[str, Change] = {
     "camera_latency": lambda random: {"camera_latency": float(random.uniform(0.04, 0.2))},
-    "rolling_shutter": lambda random: {"readout": float(random.uniform(0.03, 0.08))},
+    "rolling_shutter": lambda random: {"rolling_shutter": float(random.uniform(0.03, 0.08))},
     "blur": lambda random: {"blur": float(random.uniform(0.04, 0.12))},
 }
 LIGHT: Mapping[str, Change] = {
     "defocus": lambda random: {"defocus": float(random.uniform(0.008, 0.02))},
     "vignetting": lambda random: {"vignetting": float(random.uniform(0.2, 0.5))},
     "exposure": _exposure,
-    "image_noise": lambda random: {"noise": float(random.uniform(3.0, 12.0))},
+    "image_noise": lambda random: {"image_noise": float(random.uniform(3.0, 12.0))},
 }
 OUTSIDE: Mapping[str, Change] = {"bent_lens": _bend, "dirt": _dirt, "bumper": _bumper}
 DECLARED: Mapping[str, Change] = {"camera_pitch": lambda random: {"camera_pitch": 19.15 + _either(random, 2.0, 8.0)}}
@@ -132,6 +132,11 @@ class Case:
     quality: int
     noise: float
 
+    @property
+    def seeds(self) -> np.random.SeedSequence:
+        """Of all that is drawn besides what is here."""
+        return _seeds(self.name.split()[0], self.seed)
+
 
 WORDS = ("still", "drive", "small_loop", "horseshoe", "plain", "sky", "walls", "fixed", "auto", *POSES, *TAPE)
 """The settings that a case may state."""
@@ -147,7 +152,7 @@ def draw_case(name: str, seed: int) -> Case:
     effects = () if what == "none" else tuple(what.split("+"))
     if unknown := [word for word in (*effects, *words) if word not in (*CHANGES, *WORDS)]:
         raise ValueError(f"no case '{unknown[0]}'; effects: {', '.join(CHANGES)}; settings: {', '.join(WORDS)}")
-    random = np.random.default_rng(np.random.SeedSequence((seed, crc32(what.encode()))))
+    random = np.random.default_rng(_seeds(what, seed))
     sight = Sight()
     for effect in effects:
         sight = replace(sight, **CHANGES[effect](random))
@@ -155,11 +160,15 @@ def draw_case(name: str, seed: int) -> Case:
     return Case(name, seed, effects, sight, **{**drawn, **_stated(words)})
 
 
+def _seeds(what: str, seed: int) -> np.random.SeedSequence:
+    return np.random.SeedSequence((seed, crc32(what.encode())))
+
+
 def _settings(effects: tuple[str, ...], random: Random) -> dict[str, Any]:
     """How the set was taken, where the case states nothing."""
     chance = random.random(7)
     return {
-        "moves": bool(set(effects) & set(TIMED)) or (chance[0] < 0.3 and not set(effects) & set(LIGHT)),
+        "moves": bool(set(effects) & set(TIMED) or (chance[0] < 0.3 and not set(effects) & set(LIGHT))),
         "road": "horseshoe" if chance[1] < 0.2 else "small_loop",
         "tape_m": 0.02 if chance[2] < 0.2 else 0.005,
         "scatter": "5mm" if chance[3] < 0.6 else "exact" if chance[3] < 0.8 else "10mm",
@@ -167,7 +176,7 @@ def _settings(effects: tuple[str, ...], random: Random) -> dict[str, Any]:
         "walls": bool(chance[4] < 0.5),
         "fixed": bool(chance[5] < 0.5) or "exposure" in effects,
         "quality": 0 if chance[6] < 0.25 else int(random.integers(50, 96)),
-        "noise": float(random.uniform(0.5, 1.5)),
+        "noise": 0.0 if "image_noise" in effects else float(random.uniform(0.5, 1.5)),
     }
 
 

@@ -19,8 +19,8 @@ def instants(sight: Sight, *, moves: bool) -> tuple[Values, Values]:
     """
     if not moves:
         return np.zeros(1), np.ones((1, ROWS))
-    rows = sight.readout * ((np.arange(ROWS) + 0.5) / ROWS - 0.5)
-    span = sight.readout + sight.blur
+    rows = sight.rolling_shutter * ((np.arange(ROWS) + 0.5) / ROWS - 0.5)
+    span = sight.rolling_shutter + sight.blur
     count = max(2, int(np.ceil(span / INSTANTS_S)) + 1)
     times = np.linspace(-span / 2.0, span / 2.0, count) if span else np.zeros(1)
     within = np.linspace(-0.5, 0.5, 201)[:, None] * sight.blur + rows
@@ -42,7 +42,7 @@ def exposed(scene: Values, sight: Sight, gain: float, noise: float, random: np.r
         picture = gaussian_filter(picture, (sigma, sigma, 0.0), mode="nearest")
     picture = picture * _corners(sight.vignetting)[..., None] * gain
     picture = 255.0 * sight.gain * np.clip(picture / 255.0, 0.0, None) ** sight.gamma
-    picture = picture + random.normal(0.0, np.hypot(noise, sight.noise), picture.shape)
+    picture = picture + random.normal(0.0, np.hypot(noise, sight.image_noise), picture.shape)
     return np.rint(np.clip(picture, 0.0, 255.0)).astype(np.uint8)
 
 

@@ -33,7 +33,7 @@ def _straightened(sight: Sight, columns: Values, rows: Values) -> tuple[Values, 
         columns, rows = columns + away[0], rows + away[1]
     u = (columns - COLUMNS / 2.0 - sight.centre_right * ROWS) / (sight.focal_px * sight.pixel_aspect)
     v = (rows - ROWS / 2.0 - sight.centre_down * ROWS) / sight.focal_px
-    square = sight.k1 * (u**2 + v**2)
+    square = sight.lens_distortion * (u**2 + v**2)
     stretch = 1.0 - square + 3.0 * square**2
     return u * stretch, v * stretch
 

@@ -86,7 +86,8 @@ class Pinhole:
         """What these rows show from another pose than the one that was drawn."""
         fine = slice(rows[0] * PER_PIXEL, (rows[-1] + 1) * PER_PIXEL)
         directions, meets = self._rays[fine], self._meets[fine]
-        seen = self._room.seen(directions, float(pose[2]))
+        seen = np.empty((*meets.shape, 3), dtype=np.float32)
+        seen[~meets] = self._room.seen(directions[~meets], float(pose[2]))
         slopes = self._slopes(self._from_middle(directions[meets], middle, pose))
         column = slopes[:, 0] * self._focal + self._width / 2.0 - 0.5
         # The row above the floor's end is the renderer's sky

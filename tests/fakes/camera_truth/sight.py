@@ -1,4 +1,4 @@
-"""What the camera of a blind set is: every figure under the name that the public parameters have."""
+"""What the camera of a blind set is."""
 
 import math
 from collections.abc import Mapping
@@ -7,8 +7,13 @@ from dataclasses import asdict, dataclass
 COLUMNS, ROWS = 160, 120
 """Size of the pictures of a set [pixel]."""
 
-SECONDS = ("camera_latency", "blur", "readout")
-"""The figures that only pictures taken in motion show."""
+PUBLIC = {
+    "centre_right": "lens_centre.right",
+    "centre_down": "lens_centre.down",
+    "gain": "exposure.gain",
+    "gamma": "exposure.gamma",
+}
+"""Parameters whose public name is not that of a field of Sight."""
 
 DECLARED = ("camera_pitch", "blur")
 """What the robot declares itself: a set with another value of these lacks nothing."""
@@ -53,8 +58,8 @@ class Bumper:
 class Sight:
     """The camera: nominal unless stated otherwise.
 
-    Angles [deg], lengths [m] and times [s]; shares of the picture's height for `centre_right`, `centre_down` and
-    `defocus` (standard deviation of a Gaussian); `vignetting` is what the corners lose; `noise` in grey levels.
+    Angles [deg], lengths [m] and times [s]; k1 for `lens_distortion`; shares of the picture's height for the centre and
+    for `defocus` (standard deviation of a Gaussian); `vignetting` is what the corners lose; `image_noise` in grey levels.
     """
 
     camera_pitch: float = 19.15
@@ -62,27 +67,27 @@ class Sight:
     camera_yaw: float = 0.0
     camera_height: float = 0.108
     field_of_view: float = 75.0
-    k1: float = 0.0
+    lens_distortion: float = 0.0
     camera_forward: float = 0.066
     centre_right: float = 0.0
     centre_down: float = 0.0
     pixel_aspect: float = 1.0
     camera_latency: float = 0.0
     blur: float = 0.05
-    readout: float = 0.0
+    rolling_shutter: float = 0.0
     defocus: float = 0.0
     vignetting: float = 0.0
     gain: float = 1.0
     gamma: float = 1.0
-    noise: float = 0.0
+    image_noise: float = 0.0
     bend: Bend | None = None
     dirt: tuple[Spot, ...] = ()
     bumper: Bumper | None = None
 
     @property
     def figures(self) -> Mapping[str, float]:
-        """Every figure that the catalogue has."""
-        return {name: value for name, value in vars(self).items() if isinstance(value, float)}
+        """Every figure that the catalogue has, by its parameter's public name."""
+        return {PUBLIC.get(name, name): value for name, value in vars(self).items() if isinstance(value, float)}
 
     @property
     def theta(self) -> Mapping[str, float]:

@@ -64,7 +64,7 @@ def write_set(folder: Path, case: str, seed: int) -> Truth:
         seed: Of all that is random.
     """
     drawn = draw_case(case, seed)
-    random = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
+    random = [np.random.default_rng(child) for child in drawn.seeds.spawn(4)]
     road = shipped_map(drawn.road)
     floor = draw_floor(road) if drawn.plain else photographed_floor(road, drawn.tape_m, random[0])
     (folder / "frames").mkdir(parents=True, exist_ok=True)

@@ -17,6 +17,9 @@ FULL_SPEED, BASELINE, LAG_S, DELAY_S = 0.6, 0.16, 0.20, 0.15
 MARGIN_S = 0.5
 """A drive goes on so long before its first frame and after its last, so that exposures lie within it."""
 
+LEAD_S = 0.25
+"""A drive begins on its way: so long before, the robot is where it should be."""
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -71,9 +74,12 @@ def _drive(road: Road, *, outer: bool, rate_hz: float, random: np.random.Generat
     count = FRAMES // DRIVES
     frames = MARGIN_S + (np.arange(count) + random.uniform(-0.15, 0.15, count)) / rate_hz + 0.2
     rows = int(np.ceil((frames[-1] + MARGIN_S) * ROWS_HZ)) + 1
-    wanted = _weaving(road, outer, rows / ROWS_HZ, random)
-    duties = _duties(wanted)[:rows]
-    return Drive(frames, duties, _driven(wanted[0], duties))
+    wanted = _weaving(road, outer, rows / ROWS_HZ + LEAD_S, random)
+    wheels = _wheels(wanted)
+    duties, held = _duties(wheels)
+    before = round(LEAD_S * ROWS_HZ)
+    poses = _driven(wanted[0], wheels[0], held)[round(LEAD_S * FINE_HZ) :]
+    return Drive(frames, duties[before : before + rows], poses)
 
 
 def _weaving(road: Road, outer: bool, seconds: float, random: np.random.Generator) -> Values:
@@ -91,23 +97,28 @@ def _weaving(road: Road, outer: bool, seconds: float, random: np.random.Generato
     return np.column_stack((points, np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))))
 
 
-def _duties(poses: Values) -> Values:
-    """What a Duckiebot with motors that lag and commands that arrive late must be told to go that way (m, 2)."""
+def _wheels(poses: Values) -> Values:
+    """Speeds of the wheels (k, 2) that go that way, as shares of full speed."""
     velocity = np.gradient(poses, axis=0) * FINE_HZ
     forward, turn = np.hypot(velocity[:, 0], velocity[:, 1]), velocity[:, 2] * BASELINE / 2.0
-    wheels = np.column_stack((forward - turn, forward + turn)) / FULL_SPEED
-    told = wheels + LAG_S * np.gradient(wheels, axis=0) * FINE_HZ
-    # A held duty acts half a row later in the mean
-    early = int((DELAY_S + 0.5 / ROWS_HZ) * FINE_HZ)
-    return np.clip(told[early :: FINE_HZ // ROWS_HZ], -1.0, 1.0)
+    return np.column_stack((forward - turn, forward + turn)) / FULL_SPEED
 
 
-def _driven(begin: Values, duties: Values) -> Values:
-    """Poses at FINE_HZ of the robot that got these duties, already on its way."""
-    held = np.repeat(duties, FINE_HZ // ROWS_HZ, axis=0)
-    late = int(DELAY_S * FINE_HZ)
-    held = np.concatenate((np.repeat(held[:1], late, axis=0), held[:-late]))
-    wheels, speeds = held[0], np.empty_like(held)
+def _duties(wheels: Values) -> tuple[Values, Values]:
+    """What a Duckiebot with motors that lag and commands that arrive late must be told for these speeds of its wheels.
+
+    Returns:
+        Duties at 20 Hz as they are sent (m, 2), and at FINE_HZ as they arrive (k, 2).
+    """
+    wanted = np.clip(wheels + LAG_S * np.gradient(wheels, axis=0) * FINE_HZ, -1.0, 1.0)
+    late, each = round(DELAY_S * FINE_HZ), FINE_HZ // ROWS_HZ
+    duties = wanted[late + each // 2 :: each]
+    return duties, np.concatenate((wanted[:late], np.repeat(duties, each, axis=0)))[: len(wheels)]
+
+
+def _driven(begin: Values, wheels: Values, held: Values) -> Values:
+    """Poses at FINE_HZ of a robot that begins with this pose and these speeds, and at which these duties (k, 2) arrive."""
+    speeds = np.empty_like(held)
     for number, duty in enumerate(held):
         speeds[number] = wheels
         wheels = wheels + (duty - wheels) * (1.0 - np.exp(-1.0 / (FINE_HZ * LAG_S)))

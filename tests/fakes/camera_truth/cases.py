@@ -1,6 +1,6 @@
 """The cases of blind sets: what is wrong with the camera, and how the set was taken; all else is drawn from the seed.
 
-A case is written as effects joined by "+", and maybe settings: "camera_roll", "camera_roll+field_of_view horseshoe 20mm".
+A case is written as effects joined by "+" and maybe settings: "camera_roll", "camera_roll+blur horseshoe 20mm_tape".
 """
 
 import itertools
@@ -10,6 +10,7 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
+
 from camera_truth.lens import BENDS
 from camera_truth.sight import COLUMNS, ROWS, Bend, Bumper, Sight, Spot
 

@@ -1,9 +1,10 @@
 """From the light on the sensor to the file: dirt, defocus, vignetting, exposure, noise."""
 
 import numpy as np
-from camera_truth.sight import COLUMNS, ROWS, Bumper, Sight, Spot
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
+
+from camera_truth.sight import COLUMNS, ROWS, Bumper, Sight, Spot
 
 Values = NDArray[np.float64]
 
@@ -14,8 +15,8 @@ INSTANTS_S = 0.01
 def instants(sight: Sight, *, moves: bool) -> tuple[Values, Values]:
     """When the parts of an exposure are, from a frame's time [s], and their weight in each row of the picture.
 
-    Between two instants the scene is taken to change linearly. Row r of R shows what was at readout · ((r + 0.5)/R − 0.5),
-    the mean over the blur around that.
+    Between two instants the scene is taken to change linearly. Row r of R shows the mean over the blur around
+    readout · ((r + 0.5)/R − 0.5), less the latency.
     """
     if not moves:
         return np.zeros(1), np.ones((1, ROWS))

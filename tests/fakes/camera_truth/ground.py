@@ -3,10 +3,10 @@
 import math
 
 import numpy as np
-from camera_truth.tape import Tape, lay_tape, line_distances
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, zoom
 
+from camera_truth.tape import Tape, lay_tape, line_distances
 from proxytune.driving.road.maps import Road
 from proxytune.driving.road.texture import COLOURS, MARGIN, Floor
 
@@ -35,7 +35,7 @@ def photographed_floor(road: Road, tape_m: float, random: np.random.Generator) -
 
 
 def _shades(road: Road, random: np.random.Generator) -> dict[str, Values]:
-    """Colours (tiles, 3): those of the map's paint, lighter or darker by up to 15 %, a little more from tile to tile."""
+    """Colours (tiles, 3): those of the map's paint, up to 15 % lighter or darker, and uneven from tile to tile."""
     tiles = len(road.segments)
     return {
         name: np.array(colour)
@@ -87,7 +87,7 @@ def _light(places: Values, random: np.random.Generator) -> Values:
 
 
 def noise(side: int, scale_m: float, random: np.random.Generator) -> Values:
-    """A field (side, side) of mean 0 and standard deviation 1 that changes over so many metres, 0 from pixel to pixel."""
+    """A field (side, side) of mean 0 and standard deviation 1; its values are alike over so many metres."""
     step = scale_m * PIXELS_PER_METRE
     if step < 2.0:
         field = gaussian_filter(random.normal(size=(side, side)), 0.7)

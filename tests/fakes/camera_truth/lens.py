@@ -7,8 +7,9 @@ down. Every figure of Sight has the meaning that CameraFigures gives it.
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from camera_truth.sight import COLUMNS, ROWS, Bend, Sight
 from numpy.typing import NDArray
+
+from camera_truth.sight import COLUMNS, ROWS, Bend, Sight
 
 Values = NDArray[np.float64]
 

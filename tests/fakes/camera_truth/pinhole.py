@@ -8,12 +8,12 @@ from typing import Self
 from unittest import mock
 
 import numpy as np
-from camera_truth.lens import rays
-from camera_truth.room import Room
-from camera_truth.sight import COLUMNS, ROWS, Sight
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from camera_truth.lens import rays
+from camera_truth.room import Room
+from camera_truth.sight import COLUMNS, ROWS, Sight
 from proxytune.driving.bullet import renderer
 from proxytune.driving.cameras import CameraFigures
 from proxytune.driving.road.texture import Floor
@@ -111,7 +111,7 @@ class Pinhole:
         return np.stack((x + nearer * lens[0], y + nearer * lens[1], directions[:, 2]), axis=-1)
 
     def _slopes(self, directions: Values) -> Values:
-        """Slopes (…, 2) to the right and down of directions in the robot's frame, as the renderer's picture has them."""
+        """Slopes (…, 2) to the right and down of directions in the robot's frame, in the renderer's picture."""
         pitch, yaw = np.radians((self._sight.camera_pitch, self._sight.camera_yaw))
         x, y, down = np.moveaxis(directions, -1, 0)
         ahead, left = x * np.cos(yaw) + y * np.sin(yaw), y * np.cos(yaw) - x * np.sin(yaw)

@@ -44,4 +44,6 @@ def walls(random: np.random.Generator) -> Room:
     """Plain walls, grey to beige, brighter towards the windows."""
     colour = random.uniform(70.0, 170.0) * np.array((1.0, random.uniform(0.92, 1.0), random.uniform(0.8, 1.0)))
     harmonics = np.arange(1, 9)
-    return Room(colour, random.normal(0.0, 0.15, 8) / harmonics, random.uniform(0.0, 6.28, 8), random.uniform(-0.2, 0.4))
+    return Room(
+        colour, random.normal(0.0, 0.15, 8) / harmonics, random.uniform(0.0, 6.28, 8), random.uniform(-0.2, 0.4)
+    )

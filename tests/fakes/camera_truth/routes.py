@@ -90,7 +90,9 @@ def _weaving(road: Road, outer: bool, seconds: float, random: np.random.Generato
     speed = middle + swing * np.sin(2.0 * np.pi * clock / random.uniform(4.0, 9.0) + random.uniform(0.0, 6.28))
     along = random.random() * float(lane_length(road, outer)) + np.cumsum(speed) / FINE_HZ
     points, heading = _lane(road, outer, along)
-    aside = random.uniform(0.02, 0.06) * np.sin(2.0 * np.pi * along / random.uniform(0.7, 1.4) + random.uniform(0.0, 6.28))
+    aside = random.uniform(0.02, 0.06) * np.sin(
+        2.0 * np.pi * along / random.uniform(0.7, 1.4) + random.uniform(0.0, 6.28)
+    )
     points = points + aside[:, None] * np.stack((-np.sin(heading), np.cos(heading)), axis=-1)
     points = gaussian_filter1d(points, 0.15 * FINE_HZ, axis=0, mode="nearest")[FINE_HZ // 2 :]
     velocity = np.gradient(points, axis=0) * FINE_HZ
@@ -117,7 +119,7 @@ def _duties(wheels: Values) -> tuple[Values, Values]:
 
 
 def _driven(begin: Values, wheels: Values, held: Values) -> Values:
-    """Poses at FINE_HZ of a robot that begins with this pose and these speeds, and at which these duties (k, 2) arrive."""
+    """Poses at FINE_HZ of a robot that begins with this pose and speeds, and at which these duties (k, 2) arrive."""
     speeds = np.empty_like(held)
     for number, duty in enumerate(held):
         speeds[number] = wheels

@@ -59,7 +59,7 @@ class Sight:
     """The camera: nominal unless stated otherwise.
 
     Angles [deg], lengths [m] and times [s]; k1 for `lens_distortion`; shares of the picture's height for the centre and
-    for `defocus` (standard deviation of a Gaussian); `vignetting` is what the corners lose; `image_noise` in grey levels.
+    for `defocus` (standard deviation of a Gaussian); `vignetting` is what corners lose; `image_noise` in grey levels.
     """
 
     camera_pitch: float = 19.15

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
 from camera_truth.cases import POSES, Case, draw_case
 from camera_truth.exposure import exposed, instants
 from camera_truth.ground import photographed_floor
 from camera_truth.pinhole import Pinhole
 from camera_truth.room import sky, walls
 from camera_truth.routes import ROWS_HZ, Drive, drives, places
-from numpy.typing import NDArray
-from PIL import Image
-
 from proxytune.driving.road.maps import Road
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import Floor, draw_floor
@@ -68,7 +68,9 @@ def write_set(folder: Path, case: str, seed: int) -> Truth:
     road = shipped_map(drawn.road)
     floor = draw_floor(road) if drawn.plain else photographed_floor(road, drawn.tape_m, random[0])
     (folder / "frames").mkdir(parents=True, exist_ok=True)
-    way = _write_drives(folder, drawn, road, random[1]) if drawn.moves else _write_places(folder, drawn, road, random[1])
+    way = (
+        _write_drives(folder, drawn, road, random[1]) if drawn.moves else _write_places(folder, drawn, road, random[1])
+    )
     for number, scene in enumerate(_scenes(drawn, floor, way, random[2])):
         gain = 1.0 if drawn.fixed else 1.0 + random[3].uniform(-0.1, 0.1)
         _write_picture(folder, number, drawn, exposed(scene, drawn.sight, gain, drawn.noise, random[3]))

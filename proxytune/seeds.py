@@ -8,9 +8,10 @@ purposes share a name space, and are kept so because every published number depe
 - preflight_seed(s, k, n) for k = 0, 1, 2 is proxy_lessons_seed(s, n), target_lessons_seed(s, n) and exam_seed(s, n).
   Lessons draw from what is derived once more from theirs (lesson_seeds). An examination from start n has the seed of an
   episode from start 2, in the pre-flight's turn n; no result compares the two.
-- placement_generator(e, k), message_generator(e, k) and expert_generator(e, k) are one generator: the same bits tell
-  where the robot is put down at start k, what becomes of commands 256 k to 256 k + 255, and how the expert is pushed in
-  control step k. The first moves the robot by a centimetre, the others time and disturb its commands.
+- placement_generator(e, k), message_generator(e, k), expert_generator(e, k) and picture_generator(e, k) are one
+  generator: the same bits tell where the robot is put down at start k, what becomes of commands 256 k to 256 k + 255,
+  how the expert is pushed in control step k, and the noise on picture k. The first moves the robot by a centimetre, the
+  next two time and disturb its commands, and effects are given seeds of their own.
 - fresh_seed(s, n) and target_seed(s) are study seeds again: studies whose seeds differ by exactly these offsets share
   episodes.
 
@@ -103,6 +104,11 @@ def placement_generator(seed: int, start: int) -> np.random.Generator:
 def message_generator(seed: int, block: int) -> np.random.Generator:
     """What becomes of a block of an episode's commands is drawn from this."""
     return np.random.default_rng((seed, block))
+
+
+def picture_generator(seed: int, number: int) -> np.random.Generator:
+    """What the noise on one of an episode's pictures is drawn from."""
+    return np.random.default_rng((seed, number))
 
 
 def expert_generator(seed: int, step: int) -> np.random.Generator:

@@ -34,6 +34,7 @@ def test_a_generator_draws_what_it_has_always_drawn():
     assert seeds.placement_generator(5, 2).standard_normal() == 1.95385576281231
     assert seeds.message_generator(5, 2).random() == 0.23772096442823154
     assert seeds.expert_generator(5, 0).standard_normal() == -0.8019314252534474
+    assert seeds.picture_generator(5, 0).standard_normal() == -0.8019314252534474
 
 
 def test_what_shares_a_name_space_is_what_the_module_says():

@@ -1,6 +1,8 @@
 """Logs of a domain instance: manoeuvres driven and measured as a robot's would be."""
 
 import json
+import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,11 +12,24 @@ from proxytune.diagnosis.measured.drives import Floats
 from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.recording import follow
 from proxytune.driving.robot import read_robot
-from proxytune.logs import Log, LogEpisode
+from proxytune.logs import Frames, Log, LogEpisode
 
 POSITION_NOISE_M = 0.002
 HEADING_NOISE_RAD = 0.005
 """White noise of a measured pose, as a tracker above the floor has it."""
+
+HEADING_NOISE_DEG = math.degrees(HEADING_NOISE_RAD)
+
+PICTURES = "frames/%06d.png"
+"""Where a log's pictures lie in its folder."""
+
+CAMERA = f"""
+[camera]
+frames = "{PICTURES}"
+poses = {{ position_m = {POSITION_NOISE_M:g}, heading_deg = {HEADING_NOISE_DEG:.4g} }}
+exposure = "fixed"
+"""
+"""What log.toml states of the pictures: no effect adjusts the exposure from one to the next."""
 
 
 def record(family: LaneFollowing, *, name: str, repeats: int, seconds: float, seed: int) -> Log:
@@ -48,6 +63,15 @@ def _drive(family: LaneFollowing, duties: Floats, random: np.random.Generator, n
     instance = family.instance({})
     with family.plant_at(instance.robot, start) as plant:
         poses = follow(instance, plant, start, duties, number)
+    return _tracked(poses, random)
+
+
+def _tracked(poses: Floats, random: np.random.Generator) -> Floats:
+    return tracked(poses, random)
+
+
+def tracked(poses: Floats, random: np.random.Generator) -> Floats:
+    """Poses (rows, 3) as a tracker measures them: with white noise."""
     noise = random.standard_normal(poses.shape) * (POSITION_NOISE_M, POSITION_NOISE_M, HEADING_NOISE_RAD)
     return np.asarray(poses + noise)
 
@@ -57,7 +81,9 @@ def log_text(log: Log, source: str) -> str:
     pose = f"x, y with {POSITION_NOISE_M:g} m, heading with {HEADING_NOISE_RAD:g} rad of white noise (1 sigma)"
     facts = {"format": 1, "name": log.name, "robot": log.robot, "command": log.command, "rate_hz": log.rate_hz}
     facts |= {"pose": pose, "measured": False, "source": source}
-    return "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in facts.items())
+    facts |= {"map": Path(log.frames.road).name} if log.frames else {}
+    lines = "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in facts.items())
+    return lines + (CAMERA if log.frames else "")
 
 
 def samples_text(log: Log) -> str:
@@ -68,3 +94,10 @@ def samples_text(log: Log) -> str:
         for e in log.episodes
     ]
     return pd.concat(tables)[["episode", *columns]].to_csv(index=False, float_format="%.4f", lineterminator="\n")
+
+
+def frames_text(log: Log, frames: Frames) -> str:
+    """A frames.csv for a log's pictures, numbered from 0."""
+    names = [log.episodes[drive].name for drive in frames.drives]
+    table = pd.DataFrame({"frame": range(len(names)), "episode": names, "time": frames.times})
+    return table.to_csv(index=False, float_format="%.6f", lineterminator="\n")

@@ -1,7 +1,7 @@
 """One episode: an agent drives a plant through the effects of a domain instance until time or luck runs out."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -13,7 +13,7 @@ from proxytune.driving.cameras import Camera
 from proxytune.driving.drivetrain import Drivetrain
 from proxytune.driving.plant import Plant
 from proxytune.driving.robot import Robot
-from proxytune.effects import Chain, Setting, Signal
+from proxytune.effects import Chain, Effect, Setting, Signal, Stage, stage_chain
 from proxytune.errors import EpisodeError
 
 TICK_HZ = 60
@@ -103,6 +103,16 @@ class Course:
     seconds: float
     seed: int
     ended: Callable[[float, float], bool]
+
+
+def image_chain(effects: Iterable[Effect], figures: Mapping[str, float]) -> Chain:
+    """The image effects that change a picture, given the nominal figures: neutral ones would only cost time."""
+    chain = stage_chain(effects, Stage.IMAGE)
+    return Chain(tuple(effect for effect in chain.effects if not _is_neutral(effect, figures)))
+
+
+def _is_neutral(effect: Effect, figures: Mapping[str, float]) -> bool:
+    return all(getattr(effect, one.name, None) == one.neutral_value(figures) for one in effect.parameters)
 
 
 class _View:

@@ -19,9 +19,22 @@ from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
-from proxytune.driving.episode import TICK_HZ, Course, Drive, Driver, Instance, Sight, drive, measured, picture_only
+from proxytune.driving.episode import (
+    TICK_HZ,
+    Course,
+    Drive,
+    Driver,
+    Instance,
+    Sight,
+    drive,
+    image_chain,
+    measured,
+    picture_only,
+)
 from proxytune.driving.expert import Expert
 from proxytune.driving.identity import earlier_identities, identity_of
+from proxytune.driving.mounting import mounted_camera
+from proxytune.driving.picture_size import with_columns
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
 from proxytune.driving.road.lane import off_map
@@ -29,15 +42,7 @@ from proxytune.driving.road.maps import Road
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import Robot, read_robot, robot_home
-from proxytune.effects import (
-    Catalogue,
-    Effect,
-    Setting,
-    Signal,
-    Stage,
-    effects_from,
-    stage_chain,
-)
+from proxytune.effects import Catalogue, Effect, Signal, Stage, effects_from, stage_chain
 from proxytune.space import Parameter, Theta
 from proxytune.versions import versions_of
 
@@ -216,9 +221,9 @@ class LaneFollowing:
         with self.plant_at(instance.robot, course.start) as plant:
             return drive(instance, plant, driver, course, sees)
 
-    def instance(self, theta: Theta) -> Instance:
-        """The domain instance S_θ: nominal effects, then the family's, then θ."""
-        return _instance(self, tuple(sorted(theta.items())))
+    def instance(self, theta: Theta, columns: int = 0) -> Instance:
+        """The domain instance S_θ: nominal effects, then the family's, then θ; pictures of at least so many columns."""
+        return _instance(self, tuple(sorted(theta.items())), columns)
 
     def plant_at(self, robot: Robot, start: Signal) -> Plant:
         """The plant with the robot at a starting pose."""
@@ -226,19 +231,15 @@ class LaneFollowing:
 
 
 @functools.lru_cache(maxsize=4)
-def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...]) -> Instance:
-    robot = read_robot(family.robot, family.folder)
+def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...], columns: int) -> Instance:
+    named = read_robot(family.robot, family.folder)
+    robot = with_columns(named, columns) if columns else named
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
     camera = _camera(family, robot, effects)
-    image, measurement = (stage_chain(effects, stage) for stage in (Stage.IMAGE, Stage.MEASUREMENT))
+    image, measurement = image_chain(effects, robot.figures), stage_chain(effects, Stage.MEASUREMENT)
     return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
 
 
 def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) -> Camera:
-    figures = robot.camera_figures()
-    mounting = stage_chain(effects, Stage.CAMERA)
-    nominal = figures.channels()
-    memory = mounting.begin(Setting(TICK_HZ, nominal, robot.figures))
-    mounted = figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
-    floor = draw_floor(family.map)
+    mounted, floor = mounted_camera(robot, effects), draw_floor(family.map)
     return GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)

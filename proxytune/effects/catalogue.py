@@ -19,8 +19,10 @@ from proxytune.effects.motors.friction import Backlash, DeadBand, Stiction
 from proxytune.effects.motors.load import SlewRate, ThermalFade
 from proxytune.effects.motors.power import BatterySag, Saturation
 from proxytune.effects.motors.ripple import WheelRipple
-from proxytune.effects.sight.camera import CameraHeight, CameraPitch, CameraRoll, CameraYaw, FieldOfView, LensDistortion
-from proxytune.effects.sight.image import Blur
+from proxytune.effects.sight.lens import FieldOfView, LensCentre, LensDistortion, PixelAspect
+from proxytune.effects.sight.light import Defocus, Exposure, ImageNoise, Vignetting
+from proxytune.effects.sight.mounting import CameraForward, CameraHeight, CameraPitch, CameraRoll, CameraYaw
+from proxytune.effects.sight.shutter import Blur, CameraLatency, RollingShutter
 from proxytune.errors import SettingsError
 from proxytune.extensions import plugins
 from proxytune.settings import nearest
@@ -57,9 +59,19 @@ _ALL: tuple[type[Effect], ...] = (
     CameraRoll,
     CameraYaw,
     CameraHeight,
+    CameraForward,
     FieldOfView,
     LensDistortion,
+    LensCentre,
+    PixelAspect,
+    # Mixtures of pictures commute; blur is exact on 8-bit pictures alone, so it comes first
     Blur,
+    RollingShutter,
+    CameraLatency,
+    Defocus,
+    Vignetting,
+    Exposure,
+    ImageNoise,
 )
 
 CATALOGUE: Mapping[str, type[Effect]] = MappingProxyType({effect.name: effect for effect in _ALL})

@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.errors import LogError, SettingsError
+from proxytune.logs.frames import read_camera, read_frames
 from proxytune.logs.grid import places_on_grid, spread
 from proxytune.logs.headings import check_headings, unwrapped
 from proxytune.logs.log import COMMANDS, GEOMETRY, POSE, WHEELS, Floats, Log, LogEpisode
-from proxytune.logs.rows import Layout, Rows, read_rows
+from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_rows
 from proxytune.settings import Section, read_settings
 
 TEXTS = ("name", "robot", "pose", "source", "licence", "map", "frames")
@@ -29,10 +30,10 @@ def read_log(path: str | Path) -> Log:
     """Read a log's folder.
 
     Missing rows are filled: the last command held, no pose. Wrapped headings are unwrapped. Where commands.csv lies
-    beside samples.csv, commands have times of their own.
+    beside samples.csv, commands have times of their own; frames.csv has those of the camera's pictures.
 
     Args:
-        path: Folder with log.toml, samples.csv and maybe commands.csv.
+        path: Folder with log.toml, samples.csv and maybe commands.csv and frames.csv.
 
     Raises:
         LogError: If the folder is not such a log, naming file, line and column.
@@ -44,6 +45,7 @@ def read_log(path: str | Path) -> Log:
     try:
         settings = read_settings(path / "log.toml")
         command, rate_hz, geometry = _read_description(settings)
+        camera = read_camera(settings)
         name, robot = settings.text("name", path.resolve().name), settings.text("robot")
     except SettingsError as problem:
         raise LogError(str(problem)) from None
@@ -51,12 +53,14 @@ def read_log(path: str | Path) -> Log:
     samples = _read_samples(path / "samples.csv", command, apart=apart)
     check_headings(samples, command, rate_hz)
     issued = _read_commands(path / "commands.csv", command, samples) if apart else {}
-    return Log(name, robot, command, rate_hz, geometry, _episodes(samples, command, rate_hz, issued))
+    episodes = _episodes(samples, command, rate_hz, issued)
+    frames = read_frames(camera, path, samples, rate_hz, episodes) if camera else None
+    return Log(name, robot, command, rate_hz, geometry, episodes, frames)
 
 
 def _read_description(settings: Section) -> tuple[str, float, dict[str, float]]:
     """Command kind, rate and geometry that log.toml states."""
-    settings.only(("format", *TEXTS, "command", "rate_hz", "measured", *GEOMETRY))
+    settings.only(("format", *TEXTS, "command", "rate_hz", "measured", "camera", *GEOMETRY))
     settings.whole("format", 1, low=1, high=1)
     for key in TEXTS:
         settings.text(key, "")
@@ -87,9 +91,7 @@ def _read_commands(path: Path, command: str, samples: Rows) -> dict[str, _Issued
         raise LogError(f"{path}: log.toml states that there are no commands; state their kind, or take this file out")
     rows = read_rows(path, Layout(COMMANDS[command], (), (), 1, f"commands of kind '{command}'"))
     _check_duties(rows, command)
-    for name, first in zip(rows.names, rows.firsts, strict=True):
-        if name not in samples.names:
-            raise rows.error(int(first), "episode", f"'{name}' is not in samples.csv; add its poses, or leave it out")
+    check_known_episodes(rows, samples.names)
     times, columns = rows.values["time"], rows.columns(COMMANDS[command])
     cuts = rows.firsts[1:]
     parts = zip(rows.names, np.split(times, cuts), np.split(columns, cuts), strict=True)

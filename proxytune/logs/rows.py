@@ -1,4 +1,4 @@
-"""Rows of samples.csv and commands.csv: read strictly, every complaint with file, line and column."""
+"""Rows of samples.csv, commands.csv and frames.csv: read strictly, every complaint with file, line and column."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from proxytune.settings import nearest
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows of samples.csv or commands.csv, N of them in E episodes.
+    """The rows of samples.csv, commands.csv or frames.csv, N of them in E episodes.
 
     Attributes:
         path: The file.
@@ -97,6 +97,17 @@ def read_rows(path: Path, layout: Layout) -> Rows:
     rows = replace(rows, values={name: _numbers(rows, table[name], layout.may_lack) for name in measures})
     _check_times(rows)
     return rows
+
+
+def check_known_episodes(rows: Rows, names: Sequence[str]) -> None:
+    """Refuse episodes that samples.csv does not have.
+
+    Raises:
+        LogError: If there is one.
+    """
+    for name, first in zip(rows.names, rows.firsts, strict=True):
+        if name not in names:
+            raise rows.error(int(first), "episode", f"'{name}' is not in samples.csv; add its poses, or leave it out")
 
 
 def _read_cells(path: Path) -> tuple[list[int], list[list[str]]]:

@@ -5,7 +5,10 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
 
 from proxytune.errors import RunError
 
@@ -26,6 +29,15 @@ def save(figure: Figure, path: Path) -> None:
         RunError: If the file cannot be written.
     """
     _whole(path, "the figure ", lambda draft: figure.savefig(draft, format="png", dpi=200))
+
+
+def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
+    """Write a picture (rows, columns, 3) as PNG, its folder made where missing; an interrupted write leaves the old.
+
+    Raises:
+        RunError: If the file cannot be written.
+    """
+    _whole(path, "the picture ", lambda draft: Image.fromarray(picture).save(draft, format="png"))
 
 
 def _whole(path: Path, what: str, write: Callable[[Path], object]) -> None:

@@ -15,8 +15,8 @@ ROBOT = "duckiebot"
 RATE_HZ = 60.0
 HELD = 3
 """Samples over which a command holds."""
-PICTURE = {"camera_columns": 2.0, "camera_rows": 2.0}
-"""The size of the pictures that image effects are tried on."""
+PICTURE = {"camera_columns": 4.0, "camera_rows": 3.0}
+"""The size of the pictures that image effects are tried on: no two sides alike, so that none is taken for the other."""
 
 
 def signal_at(stage: Stage, robot: Robot, seed: int, length: int = 90) -> Signal:
@@ -25,7 +25,8 @@ def signal_at(stage: Stage, robot: Robot, seed: int, length: int = 90) -> Signal
     if stage is Stage.CAMERA:
         return np.repeat(robot.camera_figures().channels()[None], length, axis=0)
     if stage is Stage.IMAGE:
-        return random.uniform(0.0, 255.0, (length, 12)).astype(np.float32)
+        channels = 3 * int(PICTURE["camera_columns"] * PICTURE["camera_rows"])
+        return random.uniform(0.0, 255.0, (length, channels)).astype(np.float32)
     return np.repeat(random.uniform(-1.0, 1.0, (length // HELD, len(CHANNELS[stage]))), HELD, axis=0)
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxytune.driving import cameras
-from proxytune.driving.cameras import CAMERA_CHANNELS, SKY, CameraFigures, GroundPlaneCamera, ground_points
+from proxytune.driving.cameras import CAMERA_CHANNELS, SKY, CameraFigures, GroundPlaneCamera, ground_points, lens_rays
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import COLOURS, Floor, draw_floor
 from proxytune.effects import PARAMETERS
@@ -58,9 +58,10 @@ def loop_poses(count):
 
 def test_channels_survive_the_way_there_and_back():
     assert NOMINAL.with_channels(NOMINAL.channels()) == NOMINAL
-    changed = NOMINAL.with_channels([1.0, 2.0, 3.0, 0.2, 60.0, -0.1])
+    changed = NOMINAL.with_channels([1.0, 2.0, 3.0, 0.2, 60.0, -0.1, 0.05, 0.02, -0.03, 1.1])
     assert (changed.pitch_deg, changed.roll_deg, changed.yaw_deg) == (1.0, 2.0, 3.0)
     assert (changed.height_m, changed.field_of_view_deg, changed.k1, changed.columns) == (0.2, 60.0, -0.1, 64)
+    assert (changed.forward_m, changed.centre_right, changed.centre_down, changed.aspect) == (0.05, 0.02, -0.03, 1.1)
     assert len(CAMERA_CHANNELS) == len(NOMINAL.channels())
 
 
@@ -73,6 +74,8 @@ def test_channels_survive_the_way_there_and_back():
         ("field_of_view_deg", 0.0),
         ("rows", 0),
         ("columns", 0),
+        ("aspect", 0.0),
+        ("centre_right", math.nan),
         ("pitch_deg", math.inf),
     ],
 )
@@ -143,6 +146,30 @@ def test_any_distortion_keeps_the_order_of_pixels(k1):
     assert (np.diff(points[..., 0], axis=0) < 0).all()
 
 
+def test_a_lens_further_ahead_sees_the_floor_further_ahead():
+    ahead = ground_points(replace(NOMINAL, forward_m=0.166)) - ground_points(NOMINAL)
+    seen = np.isfinite(ahead[..., 0])
+    np.testing.assert_allclose(ahead[seen], np.broadcast_to((0.1, 0.0), (seen.sum(), 2)), atol=1e-9)
+
+
+@given(st.floats(-0.25, 0.25), st.floats(-0.25, 0.25), st.floats(0.7, 1.4), st.floats(-0.4, 0.2))
+@settings(max_examples=25, derandomize=True)
+def test_the_lens_looks_along_its_axis_through_its_centre_whatever_else_it_does(right, down, aspect, k1):
+    """From the picture's middle, its centre is shares of the height to the right and down: 64 × 48 pixels."""
+    figures = replace(NOMINAL, centre_right=right, centre_down=down, aspect=aspect, k1=k1)
+    centre = lens_rays(figures, np.array([32.0 + 48.0 * right]), np.array([24.0 + 48.0 * down]))[0]
+    middle = lens_rays(NOMINAL, np.array([32.0]), np.array([24.0]))[0]
+    np.testing.assert_allclose(centre, middle, atol=1e-9)
+
+
+@given(st.floats(0.7, 1.4))
+@settings(max_examples=20, derandomize=True)
+def test_things_look_wider_by_the_aspect_and_as_high_as_before(aspect):
+    plain, wide = (ground_points(replace(NOMINAL, pitch_deg=90.0, aspect=one)) for one in (1.0, aspect))
+    np.testing.assert_allclose(wide[..., 1] * aspect, plain[..., 1], atol=1e-9)
+    np.testing.assert_allclose(wide[..., 0], plain[..., 0], atol=1e-9)
+
+
 # what pixels show
 
 
@@ -186,6 +213,10 @@ def test_a_batch_of_poses_gives_the_pictures_of_one_after_another():
         ("camera_height", "height_m"),
         ("field_of_view", "field_of_view_deg"),
         ("lens_distortion", "k1"),
+        ("camera_forward", "forward_m"),
+        ("lens_centre.right", "centre_right"),
+        ("lens_centre.down", "centre_down"),
+        ("pixel_aspect", "aspect"),
     ],
 )
 def test_every_camera_effect_is_seen_at_its_bounds(name, channel):

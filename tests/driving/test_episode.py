@@ -264,7 +264,7 @@ def test_the_same_commands_look_different_through_another_camera(tmp_path):
 
 
 def test_camera_effects_are_those_of_the_camera_stage():
-    assert sum(effect.stage is Stage.CAMERA for effect in CATALOGUE.values()) == 6
+    assert sum(effect.stage is Stage.CAMERA for effect in CATALOGUE.values()) == 9
 
 
 LEARNT = """

@@ -19,8 +19,10 @@ ORDER = (
     "slippery_patch",
     # measurement, camera, image
     "marker_offset", "heading_offset",
-    "camera_pitch", "camera_roll", "camera_yaw", "camera_height", "field_of_view", "lens_distortion",
-    "blur",
+    "camera_pitch", "camera_roll", "camera_yaw", "camera_height", "camera_forward",
+    "field_of_view", "lens_distortion", "lens_centre", "pixel_aspect",
+    # first what mixes pictures, then what the lens and last what the sensor does to each
+    "blur", "rolling_shutter", "camera_latency", "defocus", "vignetting", "exposure", "image_noise",
 )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from proxytune.effects import Setting
 from proxytune.effects.command import CommandQuantisation, Delay
 from proxytune.effects.motors.actuation import DriverMap, MotorLag, Trim, WheelGain
 from proxytune.effects.motors.wheels import per_wheel
-from proxytune.effects.sight.image import Blur
+from proxytune.effects.sight.shutter import Blur
 
 NOMINAL: dict[str, float] = {}
 

@@ -1,8 +1,10 @@
 """The reference camera: PyBullet's own renderer looking at the floor's picture."""
 
+import math
 import struct
 import tempfile
 import weakref
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -10,10 +12,10 @@ from typing import Any, Self
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
-from proxytune.driving.cameras import SKY, CameraFigures, orientation
+from proxytune.driving.cameras import SKY, CameraFigures, lens_rays, orientation
 from proxytune.driving.road.texture import Floor
-from proxytune.errors import SettingsError
 
 OVERSAMPLING = 4
 """Rendered pixels along a side of a pixel, averaged: the renderer itself does nothing against aliasing."""
@@ -21,21 +23,24 @@ OVERSAMPLING = 4
 NEAR, FAR, HORIZON = 0.01, 100.0, 50.0
 """What the renderer draws, and how far the floor goes on around the map [m]: at 50 m it ends 0.1° below the horizon."""
 
+WIDEST = math.tan(math.radians(80.0))
+"""How far off its axis a lens that distorts can look, to either side: beyond, pictures without distortion are huge."""
+
 
 class BulletCamera:
-    """The same picture as GroundPlaneCamera's, in a PyBullet world of its own that ends with the camera."""
+    """The same picture as GroundPlaneCamera's, in a PyBullet world of its own that ends with the camera.
+
+    The renderer draws straight lines straight: rays of a lens that bends them are looked up in a larger such picture.
+    """
 
     def __init__(self, figures: CameraFigures, floor: Floor) -> None:
-        """Lay the floor.
-
-        Raises:
-            SettingsError: If the lens distorts, which this renderer cannot draw.
-        """
+        """Lay the floor, and find where the rays of a lens that distorts meet the picture without distortion."""
+        self._figures = self._straight = figures
+        self._places: NDArray[np.float64] | None = None
         if figures.k1 != 0.0:
-            raise SettingsError(
-                f'camera: "renderer" draws no lens distortion, got k1 = {figures.k1:g}; use camera = "ground_plane"'
-            )
-        self._figures = figures
+            slopes = _slopes(figures)
+            self._straight = _without_distortion(figures, slopes)
+            self._places = _fine_places(self._straight, slopes)
         self._world: int = pybullet.connect(pybullet.DIRECT)
         self._end = weakref.finalize(self, pybullet.disconnect, self._world)
         _lay(floor, self._world)
@@ -45,7 +50,9 @@ class BulletCamera:
         figures = self._figures
         pictures = np.empty((len(poses), figures.rows, figures.columns, 3), dtype=np.uint8)
         for picture, pose in zip(pictures, poses, strict=True):
-            fine = self._shoot(pose).reshape(figures.rows, OVERSAMPLING, figures.columns, OVERSAMPLING, 3)
+            straight = self._shoot(pose)
+            fine: NDArray[Any] = straight if self._places is None else _look_up(straight, self._places)
+            fine = fine.reshape(figures.rows, OVERSAMPLING, figures.columns, OVERSAMPLING, 3)
             picture[:] = np.rint(fine.mean(axis=(1, 3)))
         return pictures
 
@@ -62,13 +69,13 @@ class BulletCamera:
         self.close()
 
     def _shoot(self, pose: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
-        figures = self._figures
+        figures = self._straight
         width, height = figures.columns * OVERSAMPLING, figures.rows * OVERSAMPLING
         _, _, colours, _, bodies = pybullet.getCameraImage(
             width,
             height,
             _view(figures, pose),
-            _projection(figures.field_of_view_deg, width, height),
+            _projection(figures, width, height),
             shadow=0,
             lightAmbientCoeff=1.0,
             lightDiffuseCoeff=0.0,
@@ -81,12 +88,49 @@ class BulletCamera:
         return picture
 
 
-def _projection(field_of_view_deg: float, width: int, height: int) -> list[float]:
-    """OpenGL's projection matrix of the lens."""
-    matrix = list(pybullet.computeProjectionMatrixFOV(field_of_view_deg, width / height, NEAR, FAR))
+def _slopes(figures: CameraFigures) -> NDArray[np.float64]:
+    """How far right and down each fine pixel looks, (2, rows, columns), per metre along the lens' axis."""
+    places = ((np.arange(count * OVERSAMPLING) + 0.5) / OVERSAMPLING for count in (figures.columns, figures.rows))
+    columns, rows = np.meshgrid(*places)
+    ahead, left, up = np.moveaxis(lens_rays(figures, columns, rows) @ orientation(figures), -1, 0)
+    slopes: NDArray[np.float64] = np.clip(np.stack((-left / ahead, -up / ahead)), -WIDEST, WIDEST)
+    return slopes
+
+
+def _focal(figures: CameraFigures) -> float:
+    """Vertical focal length [pixel]."""
+    return figures.rows / 2.0 / math.tan(math.radians(figures.field_of_view_deg) / 2.0)
+
+
+def _without_distortion(figures: CameraFigures, slopes: NDArray[np.float64]) -> CameraFigures:
+    """A camera at the same place, with the same focal length, that draws straight lines straight and sees as much."""
+    focal = _focal(figures)
+    columns, rows = (2 * math.ceil(focal * float(np.abs(one).max()) + 0.5) for one in slopes)
+    field = math.degrees(2.0 * math.atan(rows / 2.0 / focal))
+    plain = {"k1": 0.0, "centre_right": 0.0, "centre_down": 0.0, "aspect": 1.0}
+    return replace(figures, columns=columns, rows=rows, field_of_view_deg=field, **plain)
+
+
+def _fine_places(straight: CameraFigures, slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Row and column (2, …) in the fine picture of a camera without distortion of rays with these slopes."""
+    middle = np.reshape([straight.columns / 2.0, straight.rows / 2.0], (2, 1, 1))
+    places: NDArray[np.float64] = (middle + _focal(straight) * slopes)[::-1] * OVERSAMPLING - 0.5
+    return places
+
+
+def _look_up(picture: NDArray[np.uint8], places: NDArray[np.float64]) -> NDArray[Any]:
+    """Colours (…, 3) at rows and columns (2, …) of a picture, linear between its pixels."""
+    colours = [map_coordinates(one, places, np.float32, order=1) for one in np.moveaxis(picture, -1, 0)]
+    return np.stack(colours, axis=-1)
+
+
+def _projection(figures: CameraFigures, width: int, height: int) -> list[float]:
+    """OpenGL's projection matrix of the lens without distortion."""
+    matrix = list(pybullet.computeProjectionMatrixFOV(figures.field_of_view_deg, width / height, NEAR, FAR))
+    matrix[0] *= figures.aspect
     # The renderer looks through the lower left corner of a pixel instead of its middle
-    matrix[8] += 1.0 / width
-    matrix[9] += 1.0 / height
+    matrix[8] += 1.0 / width - 2.0 * figures.centre_right * figures.rows / figures.columns
+    matrix[9] += 1.0 / height + 2.0 * figures.centre_down
     return matrix
 
 

@@ -64,12 +64,12 @@ def draw_floor(road: Road) -> Floor:
     side = MARGIN * math.ceil(longest * PIXELS_PER_METRE / MARGIN + 2.0)
     origin = (longest - side / PIXELS_PER_METRE) / 2.0
     places = origin + (np.arange(side) + 0.5) / PIXELS_PER_METRE
-    paint = functools.partial(_paint, road, _stretches(road))
+    paint = functools.partial(_paint, road, painted(road))
     strips = [paint(np.stack(np.meshgrid(places, rows), axis=-1)) for rows in places.reshape(-1, STRIP)]
     return Floor(np.concatenate(strips), PIXELS_PER_METRE, origin)
 
 
-def _stretches(road: Road) -> list[tuple[Segment, ...]]:
+def painted(road: Road) -> list[tuple[Segment, ...]]:
     """What is painted for each segment of the road, its bends as tight as the paint's."""
     return [tightened(segment, road.paint.bend_radius) for segment in road.segments]
 
@@ -100,13 +100,15 @@ def _shapes(road: Road, stretches: list[tuple[Segment, ...]], positions: Metres)
 def _dash_distance(road: Road, stretches: list[tuple[Segment, ...]], along: Metres) -> Metres:
     """Signed distance along the centre line from the nearest dash [m]."""
     sizes = np.array([length(stretch) for stretch in stretches])
-    dashes = np.array([_dashes(road.paint, segment, size) for segment, size in zip(road.segments, sizes, strict=True)])
+    dashes = np.array(
+        [dashes_on(road.paint, segment, size) for segment, size in zip(road.segments, sizes, strict=True)]
+    )
     ends = np.cumsum(sizes)
     stretch = np.clip(np.searchsorted(ends, along, side="right"), 0, len(ends) - 1)
     return _from_dash(along - (ends - sizes)[stretch], sizes[stretch], dashes[stretch])
 
 
-def _dashes(paint: Paint, segment: Segment, size: float) -> int:
+def dashes_on(paint: Paint, segment: Segment, size: float) -> int:
     """How many dashes are painted on a segment whose centre line is painted so long [m]."""
     dash = paint.straight_dash if isinstance(segment, Straight) else paint.bend_dash
     return max(1, round((size / dash * DASH_PER_GAP - 1.0) / (DASH_PER_GAP + 1.0)))

@@ -1,4 +1,4 @@
-"""Effects on how the camera is mounted and how its lens draws: each sets one of the camera's figures."""
+"""Effects on how the camera is mounted: each sets one of the camera's figures."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,7 +10,8 @@ from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
 
 
-def _set(signal: Signal, channel: str, value: float) -> Signal:
+def with_figure(signal: Signal, channel: str, value: float) -> Signal:
+    """A signal of camera figures (…, time, channels) with another value in one of the channels of Stage.CAMERA."""
     changed = np.array(signal, dtype=float)
     changed[..., CHANNELS[Stage.CAMERA].index(channel)] = value
     return changed
@@ -41,7 +42,7 @@ class CameraPitch:
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the pitch [deg], downwards positive."""
-        return _set(signal, "pitch_deg", self.camera_pitch), None
+        return with_figure(signal, "pitch_deg", self.camera_pitch), None
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class CameraRoll:
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the roll [deg], clockwise in the driver's view positive."""
-        return _set(signal, "roll_deg", self.camera_roll), None
+        return with_figure(signal, "roll_deg", self.camera_roll), None
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ class CameraYaw:
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the yaw [deg], to the left positive."""
-        return _set(signal, "yaw_deg", self.camera_yaw), None
+        return with_figure(signal, "yaw_deg", self.camera_yaw), None
 
 
 @dataclass(frozen=True)
@@ -125,53 +126,29 @@ class CameraHeight:
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Set the height above the floor [m]."""
-        return _set(signal, "height_m", self.camera_height), None
+        return with_figure(signal, "height_m", self.camera_height), None
 
 
 @dataclass(frozen=True)
-class FieldOfView:
-    """The lens sees a wider or narrower angle than nominal."""
+class CameraForward:
+    """The lens is further ahead of the axle than nominal, or less far.
 
-    field_of_view: float
-    name: ClassVar[str] = "field_of_view"
+    Pictures at known places tell it from the field of view and from latency: at a constant speed without turns, a lens
+    that lies further back is the same as older pictures.
+    """
+
+    camera_forward: float
+    name: ClassVar[str] = "camera_forward"
     stage: ClassVar[Stage] = Stage.CAMERA
     parameters: ClassVar[tuple[Parameter, ...]] = (
         Parameter(
-            name="field_of_view",
-            unit="deg",
-            low=50.0,
-            high=100.0,
-            neutral="field_of_view",
-            probes=(65.0, 70.0, 80.0, 90.0),
-            source="lenses on the market",
-        ),
-    )
-    trace: ClassVar[Trace | None] = None
-
-    def begin(self, setting: Setting) -> None:
-        """Nothing to remember."""
-
-    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
-        """Set the vertical field of view [deg]."""
-        return _set(signal, "field_of_view_deg", self.field_of_view), None
-
-
-@dataclass(frozen=True)
-class LensDistortion:
-    """The lens bends straight lines: the radial coefficient k1 of the plumb-bob model."""
-
-    k1: float
-    name: ClassVar[str] = "lens_distortion"
-    stage: ClassVar[Stage] = Stage.CAMERA
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="k1",
-            unit="",
-            low=-0.4,
+            name="camera_forward",
+            unit="m",
+            low=-0.1,
             high=0.2,
-            neutral=0.0,
-            probes=(-0.3, -0.2, -0.1, 0.1),
-            source="Duckiebot calibrations: k1 about −0.27",
+            neutral="camera_forward",
+            probes=(0.0, 0.03, 0.1, 0.15),
+            source="gym-duckietown: 0.066 m; bounds take in lenses behind the axle and on long noses",
         ),
     )
     trace: ClassVar[Trace | None] = None
@@ -180,5 +157,5 @@ class LensDistortion:
         """Nothing to remember."""
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
-        """Set k1."""
-        return _set(signal, "k1", self.k1), None
+        """Set how far the lens is ahead of the axle [m]."""
+        return with_figure(signal, "forward_m", self.camera_forward), None

@@ -1,0 +1,80 @@
+"""A robot's camera as values in θ, for pictures of a log's own size."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from proxytune.driving.cameras import CameraFigures
+from proxytune.driving.mounting import mounted_camera
+from proxytune.driving.robot import Robot
+from proxytune.effects import Stage, effect_of, effects_from
+
+LATENCY = "camera_latency"
+READOUT = "rolling_shutter"
+MOVING = (LATENCY, READOUT)
+"""Effects that show where a marking lies in the picture only while the robot moves, by their names in θ."""
+
+DISTORTION = "lens_distortion"
+
+SPREAD = 0.2
+"""Standard deviation that is expected of a parameter, as a share of its range: it decides what views cannot."""
+
+STEP = 1e-4
+"""How far a parameter is moved for a derivative, as a share of its range."""
+
+
+@dataclass(frozen=True)
+class Optics:
+    """A robot's camera whose figures are set by θ.
+
+    Attributes:
+        robot: Whose camera.
+        rows: Height of the log's pictures [pixel].
+        columns: Width of the log's pictures [pixel].
+    """
+
+    robot: Robot
+    rows: int
+    columns: int
+
+    def figures(self, theta: Mapping[str, float]) -> CameraFigures:
+        """The camera with these values; whatever θ says of anything else is left alone."""
+        own = {name: value for name, value in theta.items() if name in self.mounting}
+        effects = effects_from(own, self.robot.figures, self.robot.catalogue)
+        return replace(mounted_camera(self.robot, effects), rows=self.rows, columns=self.columns)
+
+    @property
+    def mounting(self) -> tuple[str, ...]:
+        """The names in θ of what places the camera and shapes its lens, a user's own effects included."""
+        catalogue = self.robot.catalogue
+        effects = [name for name in catalogue.names if catalogue.effect(name).stage is Stage.CAMERA]
+        return tuple(name for effect in effects for name in catalogue.theta_names(effect))
+
+    def neutral(self, name: str) -> float:
+        """The value at which a parameter changes nothing."""
+        return self.robot.catalogue.parameters[name].neutral_value(self.robot.figures)
+
+    def start(self, name: str) -> float:
+        """The value that the robot states, else the neutral one."""
+        return self.robot.theta.get(name, self.neutral(name))
+
+    def spread(self, name: str) -> float:
+        """How far a parameter may be expected from its neutral value, as a standard deviation."""
+        return SPREAD * self._range(name)
+
+    def step(self, name: str) -> float:
+        """How far a parameter is moved for a derivative."""
+        return STEP * self._range(name)
+
+    def clipped(self, name: str, value: float) -> float:
+        """The nearest value within the parameter's bounds."""
+        parameter = self.robot.catalogue.parameters[name]
+        return min(max(value, parameter.low), parameter.high)
+
+    def _range(self, name: str) -> float:
+        parameter = self.robot.catalogue.parameters[name]
+        return parameter.high - parameter.low
+
+
+def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The effects that parameters belong to, each once."""
+    return tuple(dict.fromkeys(effect_of(name) for name in names))

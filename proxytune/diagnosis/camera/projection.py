@@ -1,0 +1,202 @@
+"""Where edge points fall on the floor, and how far that is from the map's markings, in pixels."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.diagnosis.camera.optics import LATENCY, READOUT
+from proxytune.diagnosis.camera.views import Tape, Views
+from proxytune.driving.cameras import CameraFigures, floor_points
+from proxytune.driving.road.markings import LINES, Marks
+
+Floats = NDArray[np.float64]
+
+FARTHEST_M = 1.2
+"""Edges farther ahead of the lens are too coarse to count [m]."""
+
+NARROWEST_PX = 2.5
+"""A marking must be wider in the picture, else its two edges are one [pixel]."""
+
+ALIGNED = 0.5
+"""The map's edge must run within 60° of the picture's, bright on the same side: this is the cosine."""
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that places an edge point.
+
+    Attributes:
+        theta: Of the camera, by name in θ.
+        tape: Errors of the tape, in the order of `Tape` [m].
+        offset: Of the whole map: x, y [m] and heading about its middle [rad] (3,).
+        poses: What is added to each frame's tracked pose (N, 3).
+    """
+
+    theta: Mapping[str, float]
+    tape: Floats
+    offset: Floats
+    poses: Floats
+
+
+class Projection(NamedTuple):
+    """Edge points on the floor (n).
+
+    Attributes:
+        residual: Signed distance from the map's marking [pixel].
+        near: Whether the point lies on the floor, near enough, by a marking wide enough.
+        valid: Whether besides the map's edge runs as the picture's does.
+        slope: How the distance changes with the place on the floor (n, 2) [pixel/m].
+        lever: From the robot to the place, in the world (n, 2) [m].
+        place: In the world (n, 2) [m].
+        heading: Of the robot (n,) [rad].
+        metres: Size of a pixel on the floor along the edge's normal (n,) [m].
+        marks: The nearest markings.
+        rates: Of the robot's pose (n, 3).
+    """
+
+    residual: Floats
+    near: NDArray[np.bool_]
+    valid: NDArray[np.bool_]
+    slope: Floats
+    lever: Floats
+    place: Floats
+    heading: Floats
+    metres: Floats
+    marks: Marks
+    rates: Floats
+
+
+def neutral_state(views: Views, theta: Mapping[str, float]) -> State:
+    """Tape, map and poses as they are said to be."""
+    return State(theta, np.zeros(Tape(views.markings.stretches).size), np.zeros(3), np.zeros((views.count, 3)))
+
+
+def project(views: Views, state: State) -> Projection:
+    """Project every edge point to the floor and compare it with the map."""
+    edges, figures = views.edges, views.optics.figures(state.theta)
+    poses, rates = (each[edges.frame] for each in _poses(views, state))
+    poses = poses + rates * (_row_share(views) * state.theta.get(READOUT, 0.0))[:, None]
+    ground = [_ground(figures, views, half) for half in (0.0, 0.5, -0.5)]
+    places = [_in_world(points, poses) for points in ground]
+    across = places[1] - places[2]
+    on_floor = np.isfinite(across).all(axis=1) & np.isfinite(places[0]).all(axis=1)
+    place, across = (np.where(on_floor[:, None], each, 1.0) for each in (places[0], across))
+    metres = np.linalg.norm(across, axis=1)
+    marks = _marks(views, place, state.offset)
+    reach = np.linalg.norm(np.where(on_floor[:, None], ground[0], np.inf) - (figures.forward_m, 0.0), axis=1)
+    near = on_floor & (reach < FARTHEST_M) & (_widths(views) / metres > NARROWEST_PX)
+    outward = _turned(marks.slope, state.offset[2])
+    aligned = -(outward * across).sum(axis=1) / metres > ALIGNED
+    residual = (marks.distance + _tape_shift(views, state.tape, marks)) / metres
+    slope = outward / metres[:, None]
+    lever = place - poses[:, :2]
+    return Projection(residual, near, near & aligned, slope, lever, place, poses[:, 2], metres, marks, rates)
+
+
+def camera_slopes(views: Views, state: State, there: Projection, names: Sequence[str]) -> Floats:
+    """How the residuals change with parameters of the camera (n, names)."""
+    figures = views.optics.figures(state.theta)
+    points = _ground(figures, views, 0.0)
+    ahead = _turned(there.slope, -there.heading)
+    columns = []
+    for name in names:
+        if name in (LATENCY, READOUT):
+            motion = (pose_slopes(there) * there.rates).sum(axis=1)
+            columns.append(-motion if name == LATENCY else motion * _row_share(views))
+            continue
+        step = views.optics.step(name)
+        moved = views.optics.figures({**state.theta, name: state.theta[name] + step})
+        change = np.nan_to_num((_ground(moved, views, 0.0) - points) / step)
+        columns.append((ahead * change).sum(axis=1))
+    return np.stack(columns, axis=-1) if columns else np.zeros((len(points), 0))
+
+
+def pose_slopes(there: Projection) -> Floats:
+    """How the residuals change with the robot's x, y and heading (n, 3)."""
+    slope, lever = there.slope, there.lever
+    turning = slope[:, 1] * lever[:, 0] - slope[:, 0] * lever[:, 1]
+    return np.column_stack((slope, turning))
+
+
+def map_slopes(views: Views, state: State, there: Projection) -> Floats:
+    """How they change with the whole map's x, y and heading about its middle (n, 3)."""
+    from_middle = there.place - state.offset[:2] - _middle(views)
+    turning = there.slope[:, 0] * from_middle[:, 1] - there.slope[:, 1] * from_middle[:, 0]
+    return np.column_stack((-there.slope, turning))
+
+
+def tape_slopes(views: Views, there: Projection) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
+    """How they change with the tape: places in the row of `Tape` and slopes (n,), for shift, tilt and width."""
+    tape, marks, white = Tape(views.markings.stretches), there.marks, views.edges.white
+    across = marks.side / there.metres
+    return (
+        (tape.shift(marks.stretch, marks.line), across),
+        (tape.tilt(marks.stretch, marks.line), across * _askew(marks)),
+        (tape.width(white, marks.line), -0.5 / there.metres),
+    )
+
+
+def _tape_shift(views: Views, errors: Floats, marks: Marks) -> Floats:
+    """What the tape's errors add to the distances [m]."""
+    tape, white = Tape(views.markings.stretches), views.edges.white
+    shift = errors[tape.shift(marks.stretch, marks.line)]
+    shift = shift + errors[tape.tilt(marks.stretch, marks.line)] * _askew(marks)
+    return marks.side * shift - 0.5 * errors[tape.width(white, marks.line)]
+
+
+def _askew(marks: Marks) -> Floats:
+    """From −1 at a stretch's beginning to 1 at its end; the ends of dashes move as one."""
+    return np.where(marks.line == len(LINES) - 1, 0.0, 2.0 * marks.share - 1.0)
+
+
+def _poses(views: Views, state: State) -> tuple[Floats, Floats]:
+    poses, rates = views.tracks.at(state.theta.get(LATENCY, 0.0))
+    return poses + state.poses, rates
+
+
+def _row_share(views: Views) -> Floats:
+    """How far below the picture's middle each point is, as a share of its height: rows are read from the top."""
+    return views.edges.row / views.optics.rows - 0.5
+
+
+def _ground(figures: CameraFigures, views: Views, along: float) -> Floats:
+    """Floor points (n, 2) in the robot's frame, of edge points moved along their normals [pixel]."""
+    edges = views.edges
+    return floor_points(figures, edges.column + along * edges.normal[:, 0], edges.row + along * edges.normal[:, 1])
+
+
+def _in_world(points: Floats, poses: Floats) -> Floats:
+    return poses[:, :2] + _turned(points, poses[:, 2])
+
+
+def _turned(vectors: Floats, angle: Floats | float) -> Floats:
+    cos, sin = np.cos(angle), np.sin(angle)
+    x, y = vectors[:, 0], vectors[:, 1]
+    return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)
+
+
+def _middle(views: Views) -> Floats:
+    return np.array(views.markings.road.size) / 2.0
+
+
+def _widths(views: Views) -> Floats:
+    paint = views.markings.road.paint
+    return np.where(views.edges.white, paint.white_width, paint.yellow_width)
+
+
+def _marks(views: Views, places: Floats, offset: Floats) -> Marks:
+    """The nearest markings of each point's colour, on a map that lies `offset` off."""
+    middle = _middle(views)
+    own = _turned(places - offset[:2] - middle, -offset[2]) + middle
+    white = views.edges.white
+    pair = (views.markings.white(own[white]), views.markings.yellow(own[~white]))
+    return Marks(*(_merged(white, one, other) for one, other in zip(*pair, strict=True)))
+
+
+def _merged(white: NDArray[np.bool_], one: NDArray[np.generic], other: NDArray[np.generic]) -> NDArray[np.generic]:
+    both = np.empty((len(white), *one.shape[1:]), dtype=one.dtype)
+    both[white], both[~white] = one, other
+    return both

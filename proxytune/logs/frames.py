@@ -1,0 +1,190 @@
+"""A log's camera: what log.toml states of it, and where and when each picture was taken."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from proxytune.errors import LogError
+from proxytune.logs.grid import places_on_grid
+from proxytune.logs.log import Floats, Frames, LogEpisode, Whole
+from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_rows
+from proxytune.settings import Section
+
+KEYS = ("frames", "poses", "exposure", "rectified", "shutter", "readout_s")
+LISTED = "frames.csv"
+PATTERN = re.compile(r"[^%]*%(0[1-9])?d[^%]*\.(png|jpe?g)", re.IGNORECASE)
+PLAIN_NAME = re.compile(r"\w[\w-]*")
+
+MOST_FRAMES = 2**53
+"""Whole numbers up to here are exact as read."""
+
+
+class Camera(NamedTuple):
+    """What log.toml states.
+
+    Attributes:
+        pattern: Where the pictures lie, as "frames/%06d.png".
+        own_table: Whether [camera] states them; a key of the top level may name pictures that were not passed on.
+        stated: Frames of no picture yet.
+    """
+
+    pattern: str
+    own_table: bool
+    stated: Frames
+
+
+class Instants(NamedTuple):
+    """Numbers of pictures, the drive of each, and its time [s] on the poses' clock, all (N,)."""
+
+    numbers: Whole
+    drives: Whole
+    times: Floats
+
+
+def read_camera(settings: Section) -> Camera | None:
+    """What log.toml states of its pictures, or None where it has none.
+
+    Raises:
+        SettingsError: If a key is missing, unknown or impossible.
+    """
+    if not {"camera", "frames"} & set(settings.keys()):
+        return None
+    table = settings.section("camera")
+    _check_keys(settings, table)
+    pattern = _pattern(settings if "frames" in settings else table)
+    poses = table.section("poses")
+    poses.only(("position_m", "heading_deg"))
+    stated = Frames(
+        paths=(),
+        drives=np.empty(0, dtype=np.int64),
+        times=np.empty(0),
+        road=_road(settings),
+        position_m=_figure(poses, "position_m", 10.0),
+        heading_deg=_figure(poses, "heading_deg", 180.0),
+        rectified=table.flag("rectified", False),
+        readout_s=_readout(table),
+        fixed_exposure=table.text("exposure", "auto", choices=("auto", "fixed")) == "fixed",
+    )
+    return Camera(pattern, "frames" in table, stated)
+
+
+def _check_keys(settings: Section, table: Section) -> None:
+    if "frames" in settings and "frames" in table:
+        raise settings.error("frames", "is stated in [camera] too; take this one out")
+    if "map" in table:
+        raise table.error("map", "belongs above the line [camera]; move it there")
+    table.only(KEYS)
+
+
+def _pattern(section: Section) -> str:
+    pattern = section.text("frames")
+    if not PATTERN.fullmatch(pattern):
+        rule = "must have the picture's number once, as %d or %06d, and end in .png, .jpg or .jpeg"
+        raise section.error("frames", f"{rule}, got '{pattern}'")
+    return pattern
+
+
+def _road(settings: Section) -> str:
+    """The map's name or the path of its file; whoever draws the map knows which names there are."""
+    if "map" not in settings:
+        problem = "is missing; frames show a map: add its name or that of a map file beside log.toml (above [camera])"
+        raise settings.error("map", problem)
+    name = settings.text("map")
+    path = settings.path.parent / name
+    if name.endswith(".toml") and not path.is_file():
+        raise settings.error("map", f"no such file: {name}; add it beside log.toml")
+    if not (name.endswith(".toml") or PLAIN_NAME.fullmatch(name)):
+        raise settings.error("map", f"must be the name of a map, or of a file that ends in .toml, got '{name}'")
+    return str(path.resolve()) if name.endswith(".toml") else name
+
+
+def _figure(section: Section, key: str, high: float) -> float | None:
+    return section.number(key, low=0.0, high=high) if key in section else None
+
+
+def _readout(table: Section) -> float | None:
+    """Seconds from the first row to the last, None where that is not known."""
+    readout = _figure(table, "readout_s", 1.0)
+    shutter = table.text("shutter", choices=("rolling", "global")) if "shutter" in table else "rolling"
+    if shutter == "global" and readout:
+        raise table.error("readout_s", "a global shutter exposes all rows at once; take one of the two out")
+    return 0.0 if shutter == "global" else readout
+
+
+def read_frames(
+    camera: Camera, folder: Path, samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]
+) -> Frames | None:
+    """Find every picture, those left out that were taken before or after the poses of their drive.
+
+    Without frames.csv there is one for each row of samples.csv, by its number from 0; those without a pose are left
+    out. None of the pictures need be there where only the key of the top level names them: the log then has none.
+
+    Raises:
+        LogError: If pictures are missing, or frames.csv does not belong to the poses.
+    """
+    listed = (folder / LISTED).exists()
+    taken = _read_instants(folder / LISTED, samples, episodes) if listed else _per_row(samples, rate_hz, episodes)
+    paths = tuple(folder / (camera.pattern % number) for number in taken.numbers.tolist())
+    missing = [path for path in paths if not path.is_file()]
+    if len(missing) == len(paths) and not (camera.own_table or listed):
+        return None
+    if missing:
+        counts = f"no such picture, {len(missing)} of {len(paths)} are missing"
+        raise LogError(f"{missing[0]}: {counts}; add them, or name those that there are in {LISTED}")
+    return replace(camera.stated, paths=paths, drives=taken.drives, times=taken.times)
+
+
+def _per_row(samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]) -> Instants:
+    """One picture at each row that has a pose."""
+    places, _ = places_on_grid(samples, rate_hz)
+    measured = np.flatnonzero(np.isfinite(samples.values["x"]))
+    if not len(measured):
+        raise LogError(f"{samples.path}: no row has a pose; frames need the poses from which they were taken")
+    times = np.concatenate([episode.times for episode in episodes])
+    return Instants(measured, samples.episode[measured], times[places[measured]])
+
+
+def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) -> Instants:
+    """The rows of frames.csv that lie within the poses of their drive."""
+    rows = read_rows(path, Layout(("frame",), (), (), 1, "frames"))
+    check_known_episodes(rows, samples.names)
+    _check_numbers(rows)
+    order = {name: number for number, name in enumerate(samples.names)}
+    drives = np.array([order[name] for name in rows.names])[rows.episode]
+    times, spans = rows.values["time"], np.array([_span(episode) for episode in episodes])
+    begins, ends = spans[drives].T
+    within = (times >= begins - 1e-9) & (times <= ends + 1e-9)
+    if not within.any():
+        name, begin, end = samples.names[drives[0]], begins[0], ends[0]
+        poses = f"its poses between {begin:.12g} and {end:.12g} s" if np.isfinite(begin) else "it has no pose"
+        problem = (
+            f"no frame lies within its episode's poses: the first of '{name}' is at {times[0]:.12g} s, {poses}; "
+            "write both in seconds of one clock"
+        )
+        raise rows.error(0, "time", problem)
+    return Instants(rows.values["frame"].astype(np.int64)[within], drives[within], times[within])
+
+
+def _span(episode: LogEpisode) -> tuple[float, float]:
+    """Times of the first and the last measured pose [s], NaN where there is none."""
+    times = episode.times[np.isfinite(episode.poses[:, 0])]
+    return (float(times[0]), float(times[-1])) if len(times) else (np.nan, np.nan)
+
+
+def _check_numbers(rows: Rows) -> None:
+    """Refuse what is no number of a picture, and two rows of one picture."""
+    numbers = rows.values["frame"]
+    wrong = (numbers != np.rint(numbers)) | (numbers < 0) | (numbers > MOST_FRAMES)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise rows.error(row, "frame", f"must be a whole number from 0 on, got {numbers[row]:.12g}")
+    again = pd.Series(numbers).duplicated().to_numpy()
+    if again.any():
+        row = int(np.argmax(again))
+        problem = f"{numbers[row]:.0f} comes twice; number the pictures through all episodes"
+        raise rows.error(row, "frame", problem)

@@ -1,0 +1,239 @@
+"""A log's frames are read with their drives and times, and every complaint says where and what to do."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune.api.logs import log_of
+from proxytune.errors import LogError
+from proxytune.logs import read_log
+
+DATA = Path(__file__).resolve().parents[2] / "../shared/data/logs/gym_duckietown_frames"
+BASE = 'format = 1\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
+CAMERA = '[camera]\nframes = "frames/%04d.jpg"\n'
+TOML = BASE + 'map = "small_loop"\n' + CAMERA
+SAMPLES = "episode,time,v,omega,x,y,heading\n" + "".join(f"a,{5 + k / 10},0,0,{k},0,0\n" for k in range(4))
+SAMPLES += "b,0,0,0,,,\nb,0.1,0,0,0,0,0\nb,0.3,0,0,0,0,0\n"
+HEADER = "frame,episode,time\n"
+LISTED = HEADER + "7,a,5.013\n9,a,5.3\n8,b,0.2\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    def write(frames=LISTED, description=TOML, pictures=range(7, 10), samples=SAMPLES, ending="jpg"):
+        home = tmp_path / "log"
+        (home / "frames").mkdir(parents=True, exist_ok=True)
+        (home / "log.toml").write_text(description, encoding="utf-8")
+        (home / "samples.csv").write_text(samples, encoding="utf-8")
+        if frames is not None:
+            (home / "frames.csv").write_bytes(frames if isinstance(frames, bytes) else frames.encode())
+        for number in pictures:
+            (home / "frames" / f"{number:04d}.{ending}").touch()
+        return home
+
+    return write
+
+
+def complaint(path):
+    with pytest.raises(LogError) as caught:
+        read_log(path)
+    assert "\n" not in str(caught.value)
+    return str(caught.value).removeprefix(f"{path}")
+
+
+def test_frames_have_their_own_times_and_numbers(folder):
+    frames = read_log(folder()).frames
+    assert [path.name for path in frames.paths] == ["0007.jpg", "0009.jpg", "0008.jpg"]
+    assert frames.drives.tolist() == [0, 0, 1]
+    assert frames.times.tolist() == [5.013, 5.3, 0.2]
+    assert (frames.road, frames.position_m, frames.heading_deg) == ("small_loop", None, None)
+    assert (frames.rectified, frames.readout_s, frames.fixed_exposure) == (False, None, False)
+
+
+def test_what_is_stated_of_the_camera_is_kept(folder):
+    stated = 'poses = { position_m = 0.005, heading_deg = 1.0 }\nexposure = "fixed"\nrectified = true\n'
+    frames = read_log(folder(description=TOML + stated + 'shutter = "rolling"\nreadout_s = 0.02\n')).frames
+    assert (frames.position_m, frames.heading_deg, frames.readout_s) == (0.005, 1.0, 0.02)
+    assert frames.rectified
+    assert frames.fixed_exposure
+
+
+@pytest.mark.parametrize(
+    ("stated", "readout"),
+    [('shutter = "global"\n', 0.0), ('shutter = "rolling"\n', None), ("readout_s = 0.01\n", 0.01), ("", None)],
+)
+def test_a_global_shutter_takes_no_time_and_an_unstated_one_is_not_known(folder, stated, readout):
+    assert read_log(folder(description=TOML + stated)).frames.readout_s == readout
+
+
+def test_frames_before_the_first_pose_and_after_the_last_are_left_out(folder):
+    frames = read_log(
+        folder(HEADER + "7,a,4.9\n8,a,5.0\n9,a,5.4\n10,b,0.0\n11,b,0.1\n12,b,9\n", pictures=(8, 11))
+    ).frames
+    assert [path.name for path in frames.paths] == ["0008.jpg", "0011.jpg"]
+    assert frames.times.tolist() == [5.0, 0.1]
+
+
+@pytest.mark.parametrize("description", [BASE + 'frames = "frames/%04d.png"\nmap = "small_loop"\n', None])
+def test_without_a_list_there_is_a_frame_at_each_row_with_a_pose(folder, description):
+    description = description or TOML.replace("jpg", "png")
+    frames = read_log(folder(None, description, pictures=(0, 1, 2, 3, 5, 6), ending="png")).frames
+    assert [int(path.stem) for path in frames.paths] == [0, 1, 2, 3, 5, 6]
+    assert frames.drives.tolist() == [0, 0, 0, 0, 1, 1]
+    np.testing.assert_allclose(frames.times, [5.0, 5.1, 5.2, 5.3, 0.1, 0.3])
+
+
+def test_a_frame_of_a_row_has_the_time_at_which_the_pose_lies_on_the_grid(folder):
+    samples = SAMPLES.replace("a,5.1,", "a,5.12,")
+    log = read_log(folder(None, pictures=range(7), samples=samples))
+    assert log.frames.times[1] == log.episodes[0].times[1] == pytest.approx(5.1)
+
+
+def test_the_key_at_the_top_goes_with_a_list_and_with_what_else_is_stated(folder):
+    top = TOML.replace("[camera]\n", "") + "[camera]\nrectified = true\n"
+    frames = read_log(folder(description=top)).frames
+    assert frames.times.tolist() == [5.013, 5.3, 0.2]
+    assert frames.rectified
+
+
+def test_a_log_that_was_passed_on_without_the_pictures_that_its_old_key_names_is_one_without_frames(folder):
+    old = BASE + 'frames = "frames/%04d.png"\nmap = "small_loop"\n'
+    assert read_log(folder(None, old, pictures=())).frames is None
+    assert "no such picture, 5 of 6 are missing" in complaint(folder(None, old, pictures=(0,), ending="png"))
+
+
+def test_a_log_without_pictures_has_no_frames_whatever_its_map(folder):
+    assert read_log(folder(description=BASE)).frames is None
+    assert read_log(folder(description=BASE + 'map = "a yard of ours"\n')).frames is None
+
+
+def test_a_map_file_beside_the_log_is_kept_as_its_path(folder):
+    home = folder(description=TOML.replace("small_loop", "yard.toml"))
+    assert complaint(home) == "/log.toml: map: no such file: yard.toml; add it beside log.toml"
+    (home / "yard.toml").touch()
+    assert read_log(home).frames.road == str((home / "yard.toml").resolve())
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (('map = "small_loop"\n', ""), "map: is missing; frames show a map: add its name"),
+        (('"small_loop"', '"our yard/loop"'), "map: must be the name of a map, or of a file that ends in .toml"),
+        (('"small_loop"', "3"), "map: must be text in quotes"),
+        (("frames/%04d.jpg", "frames/4.jpg"), "camera.frames: must have the picture's number once, as %d or %06d"),
+        (("frames/%04d.jpg", "%d/%d.jpg"), "camera.frames: must have the picture's number once"),
+        (("%04d", "%s"), "camera.frames: must have the picture's number once"),
+        (("%04d", "%099999999d"), "camera.frames: must have the picture's number once"),
+        (("%04d", "100%%_%d"), "camera.frames: must have the picture's number once"),
+        ((".jpg", ".bmp"), "camera.frames: must have the picture's number once, as %d or %06d, and end in .png, .jpg"),
+        (('frames = "frames/%04d.jpg"', ""), "camera.frames: is missing"),
+        (("[camera]", 'frames = "%d.png"\n[camera]'), "frames: is stated in [camera] too"),
+        (("[camera]\n", '[camera]\nmap = "x"\n'), "camera.map: belongs above the line [camera]"),
+        (("[camera]\n", "[camera]\nexposur = 1\n"), "camera.exposur: unknown key; did you mean 'exposure'?"),
+        (("[camera]\n", '[camera]\nexposure = "long"\n'), "camera.exposure: unknown value 'long'"),
+        (("[camera]\n", '[camera]\nrectified = "no"\n'), "camera.rectified: must be true or false"),
+        (("[camera]\n", '[camera]\nshutter = "slit"\n'), "camera.shutter: unknown value 'slit'"),
+        (("[camera]\n", "[camera]\nreadout_s = 20\n"), "camera.readout_s: must be between 0 and 1"),
+        (("[camera]\n", '[camera]\nshutter = "global"\nreadout_s = 0.1\n'), "camera.readout_s: a global shutter"),
+        (("[camera]\n", "[camera]\nposes = 0.005\n"), "camera.poses: must be a table"),
+        (("[camera]\n", "[camera]\nposes = { position = 1 }\n"), "camera.poses.position: unknown key; did you mean"),
+        (("[camera]\n", "[camera]\nposes = { position_m = -1 }\n"), "camera.poses.position_m: must be between 0 and"),
+        (("[camera]\n", "camera = 3\n"), "camera: must be a table"),
+    ],
+)
+def test_a_mistake_about_the_camera_is_one_line_with_file_and_key(folder, change, says):
+    assert complaint(folder(description=TOML.replace(*change))).startswith(f"/log.toml: {says}")
+
+
+@pytest.mark.parametrize(
+    ("frames", "says"),
+    [
+        ("", ": is empty"),
+        (HEADER, ": has no rows"),
+        (b"\xff\xfe\x00", ": is not a CSV file"),
+        (LISTED.replace("frame,", ""), ": line 1: no column 'frame'; frames need episode,time,frame"),
+        (LISTED.replace("frame", "frames"), ": line 1: unknown column 'frames'; did you mean 'frame'?"),
+        (LISTED.replace("9,a", "9.5,a"), ": line 3, column 'frame': must be a whole number from 0 on, got 9.5"),
+        (LISTED.replace("9,a", "-9,a"), ": line 3, column 'frame': must be a whole number from 0 on, got -9"),
+        (LISTED.replace("9,a", ",a"), ": line 3, column 'frame': must be a finite number, got ''"),
+        (LISTED.replace("9,a", "7,a"), ": line 3, column 'frame': 7 comes twice; number the pictures through all"),
+        (LISTED.replace("8,b", "8,c"), ": line 4, column 'episode': 'c' is not in samples.csv; add its poses"),
+        (LISTED.replace("9,a,5.3", "9,a,5.013"), ": line 3, column 'time': 5.013 s does not come after 5.013 s"),
+        (LISTED.replace("9,a,5.3", "9,a,5.0"), ": line 3, column 'time': 5 s does not come after 5.013 s"),
+        (LISTED.replace("9,a,5.3", "9,a,noon"), ": line 3, column 'time': must be a finite number, got 'noon'"),
+        (LISTED + "10,a,5.2\n", ": line 5, column 'episode': 'a' comes back after another episode"),
+    ],
+)
+def test_a_mistake_in_frames_csv_is_one_line_with_file_line_and_column(folder, frames, says):
+    assert complaint(folder(frames)).startswith(f"/frames.csv{says}")
+
+
+def test_frames_of_another_clock_are_refused_with_both_times(folder):
+    says = complaint(folder(HEADER + "7,a,1700000000\n8,a,1700000001\n"))
+    assert says.startswith("/frames.csv: line 2, column 'time': no frame lies within its episode's poses: ")
+    assert "the first of 'a' is at 1700000000 s, its poses between 5 and 5.3 s; write both in seconds" in says
+
+
+def test_frames_without_any_pose_are_refused(folder):
+    nowhere = "episode,time,v,omega,x,y,heading\na,5,0,0,,,\na,5.1,0,0,,,\nb,0,0,0,,,\nb,0.1,0,0,,,\n"
+    assert "the first of 'a' is at 5.013 s, it has no pose" in complaint(folder(samples=nowhere))
+    (home := folder(samples=nowhere)).joinpath("frames.csv").unlink()
+    assert complaint(home).startswith("/samples.csv: no row has a pose; frames need the poses")
+
+
+def test_missing_pictures_are_counted_and_the_first_is_named(folder):
+    says = complaint(folder(pictures=(7,)))
+    assert (
+        says
+        == "/frames/0009.jpg: no such picture, 2 of 3 are missing; add them, or name those that there are in frames.csv"
+    )
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(
+    times=st.lists(st.lists(st.integers(0, 300), min_size=1, unique=True).map(sorted), min_size=1, max_size=3),
+    start=st.integers(0, 999),
+)
+def test_instants_that_are_written_are_the_instants_that_are_read(tmp_path_factory, times, start):
+    home = tmp_path_factory.mktemp("log")
+    rows = [(drive, tick / 1000) for drive, ticks in enumerate(times) for tick in ticks]
+    table = pd.DataFrame({"frame": start + np.arange(len(rows)), "episode": [f"e{d}" for d, _ in rows]})
+    table.assign(time=[5 + t for _, t in rows]).to_csv(home / "frames.csv", index=False)
+    samples = [f"e{d},{5 + k / 10},0,0,0,0,0\n" for d in range(len(times)) for k in range(4)]
+    (home / "samples.csv").write_text(SAMPLES.splitlines()[0] + "\n" + "".join(samples), encoding="utf-8")
+    (home / "log.toml").write_text(TOML.replace("frames/", ""), encoding="utf-8")
+    for number in table["frame"]:
+        (home / f"{number:04d}.jpg").touch()
+    frames = read_log(home).frames
+    assert frames.drives.tolist() == [drive for drive, _ in rows]
+    assert frames.times.tolist() == [5 + t for _, t in rows]
+    assert [int(path.stem) for path in frames.paths] == table["frame"].tolist()
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(text=st.one_of(st.text(max_size=60), st.text("ab,-0.159einf \n\"'", max_size=60).map(HEADER.__add__)))
+def test_no_text_leads_to_anything_but_frames_or_one_line(tmp_path_factory, text):
+    home = tmp_path_factory.getbasetemp() / "fuzz_frames"
+    home.mkdir(exist_ok=True)
+    for name, content in (("log.toml", TOML), ("samples.csv", SAMPLES), ("frames.csv", text)):
+        (home / name).write_text(content, encoding="utf-8", newline="")
+    says = complaint(home)
+    assert says.startswith(("/frames.csv: ", "/frames/"))
+
+
+def test_a_log_from_tables_has_no_frames():
+    table = pd.DataFrame({"episode": "a", "time": [0.0, 0.1], "x": 0.0, "y": 0.0, "heading": 0.0})
+    description = {"robot": "tractor", "command": "none", "map": "small_loop", "frames": "frames/%d.png"}
+    assert log_of(table, description).frames is None
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="needs measured data in shared/data/logs")
+def test_the_measured_frames_are_one_per_row():
+    log = read_log(DATA)
+    assert len(log.frames.paths) == 120
+    assert (log.frames.paths[7].name, log.frames.road) == ("0007.png", "small_loop")
+    np.testing.assert_array_equal(log.frames.times, log.episodes[0].times)

@@ -8,10 +8,12 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 from camera_truth import CASES, draw_case, ground, routes, write_set, write_truth
+from camera_truth.answers import Answer, append, read_answers
 from camera_truth.exposure import exposed, instants
 from camera_truth.ground import photographed_floor
 from camera_truth.lens import BENDS, rays
 from camera_truth.pinhole import Pinhole
+from camera_truth.rates import EXAM, Rate, all_sets, coverage, rates
 from camera_truth.room import sky
 from camera_truth.sight import COLUMNS, PUBLIC, ROWS, Bend, Bumper, Sight, Spot
 from camera_truth.tape import lay_tape, line_distances, straight_tape
@@ -272,3 +274,71 @@ def test_worse_tape_comes_with_a_map_that_says_so(few_frames, tmp_path):
     write_set(tmp_path, "none still small_loop 20mm_tape", 1)
     assert tomllib.loads((tmp_path / "log.toml").read_text())["map"] == "laid.toml"
     assert read_map(tmp_path / "laid.toml").paint.tape_m == 0.02
+
+
+def answer(case="camera_roll still", camera=None, problem=""):
+    """What was said of a set, as it is kept in a file."""
+    drawn = draw_case(case, 1)
+    parts = {"effects": drawn.effects, "theta": drawn.sight.theta, "figures": drawn.sight.figures}
+    truth = {"case": case, "seed": 1, **parts, "outside": drawn.sight.outside, "scene": {"moves": drawn.moves}}
+    return Answer(truth, camera or {}, 1.0, problem)
+
+
+def said(verdict, *names, declared=None, **parameters):
+    """A diagnosis' document of the camera."""
+    effects = [{"name": name, "parameters": parameters, "indistinguishable_from": []} for name in names]
+    return {"verdict": verdict, "declared": declared or {}, "effects": effects}
+
+
+def test_a_right_name_counts_and_so_does_one_that_cannot_be_told_from_it():
+    rival = said("explained", "camera_yaw")
+    rival["effects"][0]["indistinguishable_from"] = ["camera_roll"]
+    answers = [answer(camera=said("explained", name)) for name in ("camera_roll", "camera_yaw")]
+    counted = rates([*answers, answer(camera=rival), answer(camera=said("explained", "camera_roll", "camera_yaw"))])
+    assert str(counted["geometric: named"]) == "3 of 4 (75 %)"
+    assert counted["geometric: named, nothing beside"].hits == 2
+    assert counted["geometric: named by itself, no rival"].hits == 1
+    assert counted["geometric: wrong without a flag"].hits == 2
+
+
+def test_false_alarms_are_counted_on_sets_that_lack_nothing():
+    quiet = [answer(case, said("nothing missing")) for case in ("none", "camera_pitch", "blur")]
+    loud = [answer("none", said("explained", "camera_yaw")), answer("none", said("partly explained"))]
+    assert rates([*quiet, *loud])["nothing missing: false alarms"] == Rate(2, 5)
+
+
+def test_outside_sets_are_flagged_by_the_verdict_or_by_a_place_in_the_picture():
+    blemish = {**said("nothing missing"), "blemishes": [{"column": 3}]}
+    answers = [answer("dirt", said("explained")), answer("dirt", said("unexplained")), answer("dirt", blemish)]
+    counted = rates(answers)
+    assert counted["outside: flagged"] == Rate(2, 3)
+    assert counted["outside: called explained or nothing missing"] == Rate(1, 3)
+
+
+def test_coverage_compares_each_interval_with_its_own_truth():
+    true = draw_case("lens_centre still", 1).sight.figures["lens_centre.right"]
+    told = {"right": {"value": true, "interval": [true - 0.01, true + 0.01], "unit": ""}}
+    pitch = {"camera_pitch": {"value": 25.0, "interval": [24.0, 26.0], "unit": "deg"}}
+    counted = coverage([answer("lens_centre still", said("explained", "lens_centre", declared=pitch, **told))])
+    assert (counted["lens_centre.right"], counted["camera_pitch"]) == (Rate(1, 1), Rate(0, 1))
+    assert counted["all"] == Rate(1, 2)
+
+
+def test_answers_are_read_back_and_a_line_that_was_cut_off_is_not(tmp_path):
+    file = tmp_path / "answers.jsonl"
+    append(file, answer(camera=said("explained", "camera_roll")))
+    with file.open("a") as lines:
+        lines.write('{"truth": {"case"')
+    append(file, answer(problem="failed"))
+    read = read_answers(file)
+    assert [one.verdict for one in read] == ["explained", "failed"]
+    assert read[0].key == ("camera_roll still", 1)
+
+
+def test_an_examination_has_every_case_and_any_beginning_a_share_of_each_kind():
+    sets = all_sets()
+    assert {name for name, _ in sets} == set(CASES)
+    assert len(set(sets)) == len(sets)
+    assert min(seed for _, seed in sets) >= EXAM
+    assert {name.count("+") for name, _ in sets[:20]} == {0, 1}
+    assert all_sets(["camera_roll horseshoe"]) == [("camera_roll horseshoe", EXAM + number) for number in range(4)]

@@ -3,17 +3,17 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from proxytune.diagnosis.camera.appearance import Appearance, look_at, matters
-from proxytune.diagnosis.camera.checks import check_match, matched_share
-from proxytune.diagnosis.camera.comparing import compare_brightness, compare_displacement
-from proxytune.diagnosis.camera.fitting import CameraFit
-from proxytune.diagnosis.camera.gate import Leftover, find_leftover
+from proxytune.diagnosis.camera.error.comparing import compare_brightness, compare_displacement
 from proxytune.diagnosis.camera.gathering import Gathered, gather_views
 from proxytune.diagnosis.camera.laying import TWO_SIDED, describe_map
-from proxytune.diagnosis.camera.naming import Named, fit_everything, name_camera_effects
-from proxytune.diagnosis.camera.optics import DISTORTION, MOVING, READOUT, effects_of
+from proxytune.diagnosis.camera.look.appearance import Appearance, look_at, matters
+from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.optics import DISTORTION, MOVING, READOUT, effects_of
+from proxytune.diagnosis.camera.naming.checks import check_match, matched_share
+from proxytune.diagnosis.camera.naming.gate import Leftover, find_leftover
+from proxytune.diagnosis.camera.naming.search import Named, fit_everything, name_camera_effects
+from proxytune.diagnosis.camera.naming.visibility import ALWAYS, hidden_effects, next_views
 from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect
-from proxytune.diagnosis.camera.visibility import ALWAYS, hidden_effects, next_views
 from proxytune.diagnosis.result import Estimate
 from proxytune.driving.robot import Robot
 from proxytune.effects import DECLARED, Catalogue, Stage, effect_of

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, map_coordinates
 
-from proxytune.diagnosis.camera.light import BLOCKS, Fitted, Floats, Pictures, jackknife
+from proxytune.diagnosis.camera.look.light import BLOCKS, Fitted, Floats, Pictures, jackknife
 
 Draw = Callable[[float, float], NDArray[Any]]
 """Draws all frames (N, rows, columns, 3) with a blur [s] and a defocus, a share of the picture's height."""

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.blemishes import Blemish, find_blemishes
-from proxytune.diagnosis.camera.drawing import draw_pictures
-from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.camera.gathering import Gathered
-from proxytune.diagnosis.camera.grain import Grain, fit_grain
-from proxytune.diagnosis.camera.light import Fitted, Light, fit_light
-from proxytune.diagnosis.camera.projection import pose_slopes, project
-from proxytune.diagnosis.camera.sharpness import Edges, Sharpness, fit_sharpness
+from proxytune.diagnosis.camera.look.blemishes import Blemish, find_blemishes
+from proxytune.diagnosis.camera.look.grain import Grain, fit_grain
+from proxytune.diagnosis.camera.look.light import Fitted, Light, fit_light
+from proxytune.diagnosis.camera.look.sharpness import Edges, Sharpness, fit_sharpness
+from proxytune.diagnosis.camera.model.drawing import draw_pictures
+from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.projection import pose_slopes, project
 from proxytune.driving.cameras import ground_points
 
 SHARP_PX = 2.0

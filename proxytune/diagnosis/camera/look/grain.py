@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.light import MARGIN, Fitted, Floats, Pictures, flat_places
+from proxytune.diagnosis.camera.look.light import MARGIN, Fitted, Floats, Pictures, flat_places
 
 BANDS = 6
 """Bands of rows that are compared: a floor's texture changes with distance, noise does not."""

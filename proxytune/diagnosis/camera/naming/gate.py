@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.fitting import EVIDENCE, SCALE_PX, CameraFit, Normal, common_slopes, robust_weight
-from proxytune.diagnosis.camera.projection import pose_slopes, project
-from proxytune.diagnosis.camera.views import MAP_SCATTER, Views
+from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, CameraFit, Normal, common_slopes, robust_weight
+from proxytune.diagnosis.camera.model.projection import pose_slopes, project
+from proxytune.diagnosis.camera.model.views import MAP_SCATTER, Views
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from proxytune.diagnosis.camera.blemishes import find_blemishes
-from proxytune.diagnosis.camera.light import fit_light
+from proxytune.diagnosis.camera.look.blemishes import find_blemishes
+from proxytune.diagnosis.camera.look.light import fit_light
 from proxytune.driving.road.texture import Floor
 
 sys.path.append(str(Path(__file__).parent))

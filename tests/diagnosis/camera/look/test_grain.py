@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.camera.grain import fit_grain
+from proxytune.diagnosis.camera.look.grain import fit_grain
 
 sys.path.append(str(Path(__file__).parent))
 from photographs import drawn, floor, logged, measured, needs_measured, on_the_road, photographed, predicted, scene

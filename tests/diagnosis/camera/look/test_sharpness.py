@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from proxytune.diagnosis.camera.sharpness import Edges, fit_sharpness
+from proxytune.diagnosis.camera.look.sharpness import Edges, fit_sharpness
 
 COUNT = 40
 SPEEDS = np.random.default_rng(0).permutation(np.linspace(-120.0, 120.0, COUNT))  # pixel/s, one of each bar

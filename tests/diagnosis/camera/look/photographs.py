@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from proxytune.diagnosis.camera.light import squared_radius
+from proxytune.diagnosis.camera.look.light import squared_radius
 from proxytune.driving.cameras import CameraFigures, GroundPlaneCamera, ground_points
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import Floor, draw_floor

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects, label, median_filter, minimum_filter, uniform_filter
 
-from proxytune.diagnosis.camera.light import Light, Pictures
+from proxytune.diagnosis.camera.look.light import Light, Pictures
 
 Singles = NDArray[np.float32]
 

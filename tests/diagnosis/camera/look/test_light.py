@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.camera.light import PAINTS, fit_light, flat_places, squared_radius
+from proxytune.diagnosis.camera.look.light import PAINTS, fit_light, flat_places, squared_radius
 
 sys.path.append(str(Path(__file__).parent))
 from photographs import floor, logged, measured, needs_measured, predicted, scene

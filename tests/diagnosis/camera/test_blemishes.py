@@ -32,6 +32,7 @@ def test_dirt_is_found_where_it_is(row, column):
     (spot,) = blemishes(logged(dirty(seen, row, column), noise=2.0), model)
     assert spot.rows[0] <= row <= spot.rows[1]
     assert spot.columns[0] <= column <= spot.columns[1]
+    assert max(np.ptp(spot.rows), np.ptp(spot.columns)) <= 16
     assert spot.contrast == pytest.approx(0.55, abs=0.12)
     assert 0.001 < spot.share < 0.02
 

@@ -97,6 +97,14 @@ def test_the_squared_radius_is_one_in_the_corners_of_the_picture():
     np.testing.assert_allclose(radius, radius[::-1, ::-1])
 
 
+def test_what_is_no_floor_is_no_flat_place():
+    asphalt = np.tile(PAINTS[0].astype(np.float32), (1, 40, 40, 1))
+    below = np.arange(40)[:, None] * np.ones(40) >= 20
+    flat = flat_places(asphalt, below)[0]
+    np.testing.assert_array_equal(flat[:23], -1)
+    np.testing.assert_array_equal(flat[23:], 0)
+
+
 @needs_measured
 def test_measured_frames_of_the_nominal_camera_are_neutral():
     """Gain 0.97, gamma 1.01, vignetting 0.01."""

@@ -67,7 +67,8 @@ def find_blemishes(
 ) -> tuple[Blemish, ...]:
     """Find where brightness does not follow the drawn frames', the largest place first.
 
-    Windows in which no markings pass, near the horizon and at the sides, cannot be judged.
+    Windows in which too few markings pass, near the horizon and at the sides, are not judged: what is hidden may reach
+    farther than is said.
 
     Args:
         measured: Frames (N, rows, columns, 3) as logged.

@@ -41,7 +41,7 @@ RESPONSE = np.array([1.0, 0.5])
 """How much wider an edge gets than in theory: of a pixel's own width, part of a little defocus is not seen."""
 
 WIDER = 1.5
-"""By what the jackknife's intervals are too narrow: they held 14 of 20 planted blurs, as a width's foot is not smooth."""
+"""What the jackknife's intervals are too narrow by: they held 14 of 20 planted blurs, for a foot's end jumps."""
 
 ROUGH = 0.06
 """What widths of profiles half a pixel apart are wrong by, besides their scatter [pixel²]."""

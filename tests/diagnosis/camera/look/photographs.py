@@ -27,7 +27,7 @@ CAMERA = CameraFigures(
     k1=0.0,
 )
 REACH_M = 1.2
-FRAMES = 80
+FRAMES = 100
 needs_measured = pytest.mark.skipif(not LOG.is_dir(), reason=f"needs measured data in {LOG.parent.name}/{LOG.name}")
 
 

@@ -32,11 +32,13 @@ def test_dirt_is_found_where_it_is(row, column):
     (spot,) = blemishes(logged(dirty(seen, row, column), noise=2.0), model)
     assert spot.rows[0] <= row <= spot.rows[1]
     assert spot.columns[0] <= column <= spot.columns[1]
+    assert max(np.ptp(spot.rows), np.ptp(spot.columns)) <= 16
     assert spot.contrast == pytest.approx(0.55, abs=0.12)
     assert 0.001 < spot.share < 0.02
 
 
-def test_a_bumper_in_view_leaves_no_contrast():
+def test_a_bumper_leaves_no_contrast_where_markings_pass():
+    """Its left part is not judged: few of these frames show a marking there."""
     model, seen = scene()
     hidden = seen.copy()
     hidden[:, 108:] = (30.0, 30.0, 35.0)
@@ -44,9 +46,8 @@ def test_a_bumper_in_view_leaves_no_contrast():
     assert bumper.contrast < 0.15
     assert 106 <= bumper.rows[0] <= 112
     assert bumper.rows[1] == 119
-    assert bumper.columns[0] <= 4
-    assert bumper.columns[1] >= 155
-    assert bumper.share == pytest.approx(0.1, abs=0.03)
+    assert bumper.columns[1] - bumper.columns[0] > 60
+    assert 0.02 < bumper.share < 0.11
 
 
 def test_the_largest_blemish_comes_first():
@@ -57,10 +58,10 @@ def test_the_largest_blemish_comes_first():
     assert first.columns[0] > 80 > second.columns[1]
 
 
-def test_a_clean_camera_has_no_blemishes_whatever_its_light():
+@pytest.mark.parametrize("light", [(1.0, 1.0, 0.0), (0.8, 1.3, 0.3)])
+def test_a_clean_camera_has_no_blemishes_whatever_its_light(light):
     model, seen = scene()
-    assert blemishes(logged(seen, noise=3.0), model) == ()
-    assert blemishes(logged(seen, 0.8, 1.3, 0.3, drift=0.1, noise=3.0), model) == ()
+    assert blemishes(logged(seen, *light, drift=0.1, noise=3.0), model) == ()
 
 
 @functools.cache

@@ -73,7 +73,7 @@ def test_frames_without_floor_tell_nothing():
 
 def test_shining_the_fitted_light_gives_the_logged_brightness():
     model, seen = scene()
-    frames = logged(seen, 0.8, 1.3, 0.3, drift=0.1)
+    model, frames = model[:40], logged(seen[:40], 0.8, 1.3, 0.3, drift=0.1)
     flat = flat_places(model, floor()) >= 0
     lit = fit_light(frames, model, floor()).shine(model)
     assert abs((lit - frames)[flat].mean()) < 2.0
@@ -95,6 +95,14 @@ def test_the_squared_radius_is_one_in_the_corners_of_the_picture():
     assert radius[0, 0] == pytest.approx(1.0, abs=0.02)
     assert radius[60, 80] == pytest.approx(0.0, abs=1e-3)
     np.testing.assert_allclose(radius, radius[::-1, ::-1])
+
+
+def test_what_is_no_floor_is_no_flat_place():
+    asphalt = np.tile(PAINTS[0].astype(np.float32), (1, 40, 40, 1))
+    below = np.arange(40)[:, None] * np.ones(40) >= 20
+    flat = flat_places(asphalt, below)[0]
+    np.testing.assert_array_equal(flat[:23], -1)
+    np.testing.assert_array_equal(flat[23:], 0)
 
 
 @needs_measured

@@ -56,8 +56,8 @@ LEAST: Mapping[str, tuple[float, float]] = {
     "vignetting": (0.0, 0.05),
     "exposure.gain": (1.0, 0.08),
     "exposure.gamma": (1.0, 0.1),
-    "image_noise": (0.0, 1.5),
-    "defocus": (0.0, 0.004),
+    "image_noise": (0.0, 2.0),
+    "defocus": (0.0, 0.006),
     "blur": (0.0, 0.01),
 }
 """The neutral value of each, and how far from it a figure must lie to matter for what an agent sees."""

@@ -35,6 +35,10 @@ FEWEST = 75
 HIDDEN = 0.75
 """Contrast below which something lies between lens and floor: photographed floors alone seldom go below 0.75."""
 
+SUBDUED = 0.65
+"""Variation over the frames, against that of what is drawn, below which it does: tape that lies off and poses that
+scatter spoil the first contrast, not this one."""
+
 SURE = 3.0
 """Standard deviations by which the contrast must be below that."""
 
@@ -76,13 +80,12 @@ def find_blemishes(
         floor: Pixels (rows, columns) that look at the floor.
         light: What fit_light says.
     """
-    contrast, error = _contrast(measured, predicted, floor, light)
+    contrast, error, variation = _contrast(measured, predicted, floor, light)
     known = np.isfinite(contrast)
     if not known.any():
         return ()
-    usual = median_filter(np.where(known, contrast, np.nanmedian(contrast)), AROUND, mode="nearest")
-    left = contrast / np.maximum(usual, 0.5)
-    hidden = known & (left + SURE * error < HIDDEN)
+    left = _against_usual(contrast)
+    hidden = known & (left + SURE * error < HIDDEN) & (_against_usual(variation) < SUBDUED)
     parts, _ = label(hidden, structure=np.ones((3, 3)))
     blemishes = [
         _blemish(parts == number, place, left, floor.shape)
@@ -90,6 +93,13 @@ def find_blemishes(
         if (parts == number).sum() >= SMALLEST
     ]
     return tuple(sorted(blemishes, key=lambda blemish: -blemish.share))
+
+
+def _against_usual(contrast: Singles) -> Singles:
+    """Each window's contrast over that of its neighbourhood."""
+    filled = np.where(np.isfinite(contrast), contrast, np.nanmedian(contrast))
+    usual = median_filter(filled, AROUND, mode="nearest")
+    return np.asarray(contrast / np.maximum(usual, 0.5), dtype=np.float32)
 
 
 def _blemish(
@@ -106,15 +116,29 @@ def _blemish(
 
 def _contrast(
     measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], light: Light
-) -> tuple[Singles, Singles]:
-    """Slope of the measured over the expected brightness of each window, and its standard error; NaN if unknown."""
+) -> tuple[Singles, Singles, Singles]:
+    """How the measured brightness of each window follows the expected one over the frames; NaN if unknown.
+
+    Returns:
+        The slope, its standard error, and the standard deviation of the measured over that of the expected.
+    """
     green = np.ascontiguousarray(predicted[..., 1], dtype=np.float32)
     expected, logged = _windows(light.shine(green)), _windows(measured[..., 1].astype(np.float32))
     on_map = minimum_filter(green, (0, WINDOW, WINDOW))[:, ::STEP, ::STEP] > DARKEST
-    slope, error, spread = _regress(expected, logged, on_map.astype(np.float32))
+    weight = on_map.astype(np.float32)
+    slope, error = _regress(expected, logged, weight)
+    spread = _spread(expected, weight)
     judged = minimum_filter(floor, WINDOW + 2 * HORIZON)[::STEP, ::STEP]
     judged &= (spread > VARIED) & (on_map.sum(axis=0) >= FEWEST)
-    return np.where(judged, slope, np.nan), error
+    variation = _spread(logged, weight) / np.maximum(spread, 1e-3)
+    return np.where(judged, slope, np.nan), error, np.where(judged, variation, np.nan)
+
+
+def _spread(grey: Singles, weight: Singles) -> Singles:
+    """Standard deviation of each window over the frames."""
+    total = np.maximum(weight.sum(axis=0), 1.0)
+    off = grey - (weight * grey).sum(axis=0) / total
+    return np.sqrt((weight * off**2).sum(axis=0) / total)
 
 
 def _windows(grey: Singles) -> Singles:
@@ -122,8 +146,8 @@ def _windows(grey: Singles) -> Singles:
     return uniform_filter(grey, (0, WINDOW, WINDOW), mode="nearest")[:, ::STEP, ::STEP]
 
 
-def _regress(expected: Singles, logged: Singles, weight: Singles) -> tuple[Singles, Singles, Singles]:
-    """Robust slope over the frames, its standard error, and the standard deviation of what is expected."""
+def _regress(expected: Singles, logged: Singles, weight: Singles) -> tuple[Singles, Singles]:
+    """Robust slope over the frames and its standard error."""
     now = weight
     for _ in range(ROUNDS):
         total = np.maximum(now.sum(axis=0), 1.0)
@@ -135,4 +159,4 @@ def _regress(expected: Singles, logged: Singles, weight: Singles) -> tuple[Singl
         scale = 2.0 * 1.4826 * np.median(np.abs(left), axis=0) + 1.0
         now = weight * np.minimum(1.0, scale / np.maximum(np.abs(left), 1e-3))
     error = np.sqrt(((now * across * left) ** 2).sum(axis=0)) / squares
-    return slope, error, np.sqrt(squares / total)
+    return slope, error

@@ -1,6 +1,6 @@
 """Edges of white and yellow markings in pictures, to a fraction of a pixel."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,16 +43,16 @@ class Edges(NamedTuple):
     row: Floats
     normal: Floats
 
-    def only(self, chosen: NDArray[np.bool_]) -> "Edges":
-        """The points that are chosen (n,)."""
-        return Edges(*(field[chosen] for field in self))
+    def only(self, chosen: NDArray[Any]) -> "Edges":
+        """The points that are chosen, by a mask or their numbers."""
+        return Edges._make(field[chosen] for field in self)
 
 
 def find_edges(pictures: NDArray[np.uint8]) -> Edges:
     """Find the edges of markings in pictures (N, rows, columns, 3), red, green, blue."""
     maps = [_colour_maps(picture) for picture in pictures]
     parts = [_edges_of(number, white, one) for number, pair in enumerate(maps) for white, one in pair]
-    return Edges(*(np.concatenate(field) for field in zip(*parts, strict=True)))
+    return Edges._make(np.concatenate(field) for field in zip(*parts, strict=True))
 
 
 def _colour_maps(picture: NDArray[np.uint8]) -> tuple[tuple[bool, Floats], tuple[bool, Floats]]:

@@ -111,7 +111,7 @@ def _solve(views: Views, state: State, names: tuple[str, ...], there: Projection
     matrix, right, inverse, coupling, own = system.marginal(frame, state.poses, views.pose_scatter)
     precision, pull = _priors(views, state, names)
     matrix[np.diag_indices_from(matrix)] += precision
-    common = -np.linalg.solve(matrix, right + pull)
+    common = np.asarray(-np.linalg.solve(matrix, right + pull), dtype=float)
     poses = -own - np.einsum("fij,j->fi", coupling, common)
     return _Step(common, poses, matrix, np.sqrt(np.diagonal(inverse, axis1=1, axis2=2)))
 
@@ -141,7 +141,9 @@ class Normal(NamedTuple):
         """The problem with these rows."""
         return cls(columns, poses, residual, weight)
 
-    def marginal(self, frame: NDArray[np.intp], corrections: Floats, scatter: Floats) -> tuple[Floats, ...]:
+    def marginal(
+        self, frame: NDArray[np.intp], corrections: Floats, scatter: Floats
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """Normal equations of the common columns with every frame's pose eliminated under its prior.
 
         Returns:
@@ -164,7 +166,7 @@ class Normal(NamedTuple):
             pulls[number] = slopes.T @ self.residual[own]
         blocks[:, (0, 1, 2), (0, 1, 2)] += 1.0 / scatter**2
         pulls += corrections / scatter**2
-        inverse = np.linalg.inv(blocks)
+        inverse = np.asarray(np.linalg.inv(blocks), dtype=float)
         coupling = inverse @ cross
         own_step = (inverse @ pulls[..., None])[..., 0]
         flat = cross.reshape(3 * count, self.columns.shape[1])

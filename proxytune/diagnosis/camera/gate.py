@@ -62,7 +62,7 @@ def find_leftover(fit: CameraFit) -> Leftover:
     halves = [np.arange(fit.views.count) % 2 == part for part in (0, 1)]
     systems = [_system(fit, half) for half in halves]
     ridge = np.eye(len(systems[0][1])) / FIELD_PX**2
-    fields = [-np.linalg.solve(matrix + ridge, right) for matrix, right, _ in systems]
+    fields = [np.asarray(-np.linalg.solve(matrix + ridge, right), dtype=float) for matrix, right, _ in systems]
     gains = [_gain(fields[1 - part], *systems[part][:2]) for part in (0, 1)]
     cost = sum(system[2] for system in systems)
     field = np.mean(fields, axis=0).reshape(2, -1).T

@@ -61,14 +61,15 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     tracks, numbers = track_frames(log, frames)
     used = _spread(len(numbers), MOST_FRAMES)
     tracks, numbers = tracks.only(used), numbers[used]
-    pictures = read_pictures(frames, numbers)
+    pictures = read_pictures(frames, numbers.tolist())
     edges = find_edges(pictures)
     _check_markings(log, np.bincount(edges.frame, minlength=len(numbers)))
     edges = edges.only(np.arange(len(edges.row)) % EVERY == 0)
     edges = edges.only(np.argsort(edges.frame, kind="stable"))
     optics = Optics(robot, *pictures.shape[1:3])
-    scatter = (_stated(frames.position_m, ASSUMED_M), np.radians(_stated(frames.heading_deg, ASSUMED_DEG)))
-    views = Views(edges, tracks, Markings(road), optics, *(float(tracks.share * one) for one in scatter))
+    position_m = tracks.share * _stated(frames.position_m, ASSUMED_M)
+    heading_rad = tracks.share * np.radians(_stated(frames.heading_deg, ASSUMED_DEG))
+    views = Views(edges, tracks, Markings(road), optics, position_m, float(heading_rad), road.paint.tape_m)
     return Gathered(views, numbers, pictures, frames)
 
 

@@ -62,7 +62,8 @@ def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float
     """
     theta = {name: views.optics.neutral(name) for name in (*views.optics.mounting, *MOVING)} | dict(fixed)
     start = neutral_state(views, theta)
-    fit = fit_camera(views, start, [name for name in names if name in FIRST], FAR)
+    # From far away an edge may be taken for another: the tape must not follow it
+    fit = fit_camera(replace(views, tape_m=0.0), start, [name for name in names if name in FIRST], FAR)
     fit = fit_camera(views, fit.state, names, NEAR)
     for _ in range(PASSES if learn_scatter else 0):
         fit = fit_camera(views.with_scatter(*pose_scatter(fit)), fit.state, names, AGAIN)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +82,7 @@ def project(views: Views, state: State) -> Projection:
     ground = [_ground(figures, views, half) for half in (0.0, 0.5, -0.5)]
     places = [_in_world(points, poses) for points in ground]
     across = places[1] - places[2]
-    on_floor = np.isfinite(across).all(axis=1) & np.isfinite(places[0]).all(axis=1)
+    on_floor = np.asarray(np.isfinite(across).all(axis=1) & np.isfinite(places[0]).all(axis=1))
     place, across = (np.where(on_floor[:, None], each, 1.0) for each in (places[0], across))
     metres = np.linalg.norm(across, axis=1)
     marks = _marks(views, place, state.offset)
@@ -193,10 +193,10 @@ def _marks(views: Views, places: Floats, offset: Floats) -> Marks:
     own = _turned(places - offset[:2] - middle, -offset[2]) + middle
     white = views.edges.white
     pair = (views.markings.white(own[white]), views.markings.yellow(own[~white]))
-    return Marks(*(_merged(white, one, other) for one, other in zip(*pair, strict=True)))
+    return Marks._make(_merged(white, one, other) for one, other in zip(*pair, strict=True))
 
 
-def _merged(white: NDArray[np.bool_], one: NDArray[np.generic], other: NDArray[np.generic]) -> NDArray[np.generic]:
+def _merged(white: NDArray[np.bool_], one: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
     both = np.empty((len(white), *one.shape[1:]), dtype=one.dtype)
     both[white], both[~white] = one, other
     return both

@@ -68,7 +68,7 @@ def track_frames(log: Log, frames: Frames) -> tuple[Tracks, NDArray[np.intp]]:
     parts, offset, instants = [], 0.0, np.full(len(frames.times), np.nan)
     for number, episode in enumerate(log.episodes):
         own = np.flatnonzero(frames.drives == number)
-        known = np.isfinite(episode.poses).all(axis=1)
+        known = np.asarray(np.isfinite(episode.poses).all(axis=1))
         if not known.any():
             continue
         shift = offset - episode.times[0]

@@ -73,10 +73,11 @@ def pixel_errors(views: Views, residuals: Sequence[Floats], seed: int) -> list[P
     frame = views.edges.frame[chosen]
     counts = np.bincount(frame, minlength=views.count).astype(float)
     sums = [np.bincount(frame, each[chosen], minlength=views.count) for each in sizes]
-    return [_error(total, counts, seed) for total in sums]
+    return [error_over(total.astype(float), counts, seed) for total in sums]
 
 
-def _error(sums: Floats, counts: Floats, seed: int) -> PictureError:
+def error_over(sums: Floats, counts: Floats, seed: int) -> PictureError:
+    """The mean over all points of frames, from each frame's sum and number of points (N,)."""
     draws = np.random.default_rng(seed).integers(0, len(sums), (DRAWS, len(sums)))
     means = sums[draws].sum(axis=1) / np.maximum(counts[draws].sum(axis=1), 1.0)
     low, high = np.quantile(means, (0.025, 0.975))

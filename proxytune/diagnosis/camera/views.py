@@ -15,6 +15,9 @@ Floats = NDArray[np.float64]
 LEAST_SCATTER = (0.0005, np.radians(0.1))
 """No tracker is trusted beyond this: place [m] and heading [rad]."""
 
+LEAST_TAPE_M = 0.0001
+"""No map is laid more exactly [m]."""
+
 MAP_SCATTER = np.array((0.03, 0.03, np.radians(1.0)))
 """How far the whole map may lie off, as standard deviations of x, y [m] and heading [rad]."""
 
@@ -33,6 +36,7 @@ class Views:
         optics: Of the camera.
         position_m: Standard deviation of a tracked place after smoothing [m].
         heading_rad: Standard deviation of a tracked heading after smoothing [rad].
+        tape_m: Standard deviation of where a line lies from where the map has it [m].
     """
 
     edges: Edges
@@ -41,6 +45,7 @@ class Views:
     optics: Optics
     position_m: float
     heading_rad: float
+    tape_m: float
 
     @property
     def count(self) -> int:
@@ -56,7 +61,7 @@ class Views:
     @property
     def tape_scatter(self) -> Floats:
         """Standard deviations of the tape's errors, in the order of `Tape` [m]."""
-        return np.full(Tape(self.markings.stretches).size, max(self.markings.road.paint.tape_m, 1e-4))
+        return np.full(Tape(self.markings.stretches).size, max(self.tape_m, LEAST_TAPE_M))
 
     def with_scatter(self, position_m: float, heading_rad: float) -> "Views":
         """The same views with another scatter of poses."""

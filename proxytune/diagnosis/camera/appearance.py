@@ -1,0 +1,106 @@
+"""How a camera's pictures look besides where things are in them: brightness, sharpness, noise and blemishes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.diagnosis.camera.blemishes import Blemish, find_blemishes
+from proxytune.diagnosis.camera.drawing import draw_pictures
+from proxytune.diagnosis.camera.fitting import CameraFit
+from proxytune.diagnosis.camera.gathering import Gathered
+from proxytune.diagnosis.camera.grain import Grain, fit_grain
+from proxytune.diagnosis.camera.light import Fitted, Light, fit_light
+from proxytune.diagnosis.camera.projection import pose_slopes, project
+from proxytune.diagnosis.camera.sharpness import Edges, Sharpness, fit_sharpness
+from proxytune.driving.cameras import ground_points
+
+SHARP_PX = 2.0
+"""Edges that lie farther from the map's are not those that the model draws."""
+
+HORIZON_ROWS = 3
+"""So many rows beneath the horizon are left out: what a pixel covers there is a metre long."""
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """What the pictures' look says.
+
+    Attributes:
+        light: Exposure and vignetting.
+        grain: Noise.
+        sharpness: Blur and defocus.
+        blemishes: What is fixed to the camera in its pictures.
+    """
+
+    light: Light
+    grain: Grain
+    sharpness: Sharpness
+    blemishes: tuple[Blemish, ...]
+
+    @property
+    def figures(self) -> Mapping[str, Fitted]:
+        """Every figure by its name in θ."""
+        return {
+            "vignetting": self.light.vignetting,
+            "exposure.gain": self.light.gain,
+            "exposure.gamma": self.light.gamma,
+            "image_noise": self.grain.noise,
+            "defocus": self.sharpness.defocus,
+            "blur": self.sharpness.blur,
+        }
+
+
+LEAST: Mapping[str, tuple[float, float]] = {
+    "vignetting": (0.0, 0.05),
+    "exposure.gain": (1.0, 0.08),
+    "exposure.gamma": (1.0, 0.1),
+    "image_noise": (0.0, 1.5),
+    "defocus": (0.0, 0.004),
+    "blur": (0.0, 0.01),
+}
+"""The neutral value of each, and how far from it a figure must lie to matter for what an agent sees."""
+
+
+def look_at(gathered: Gathered, fit: CameraFit) -> Appearance:
+    """Fit the look of a log's pictures to a fitted camera's."""
+    every = np.arange(fit.views.count)
+    drawn = draw_pictures(fit.views, fit.state, {}, every)
+    floor = floor_pixels(fit)
+    light = fit_light(gathered.pictures, drawn, floor, gathered.frames.fixed_exposure)
+    sharpness = fit_sharpness(
+        gathered.pictures,
+        _sharp_edges(fit),
+        lambda blur, defocus: light.shine(draw_pictures(fit.views, fit.state, _soft(blur, defocus), every)),
+    )
+    grain = fit_grain(gathered.pictures, drawn, floor)
+    return Appearance(light, grain, sharpness, find_blemishes(gathered.pictures, drawn, floor, light))
+
+
+def floor_pixels(fit: CameraFit) -> NDArray[np.bool_]:
+    """Pixels (rows, columns) that look at the floor, a little beneath the horizon."""
+    on_floor = np.isfinite(ground_points(fit.views.optics.figures(fit.theta))[..., 0])
+    below = np.ones_like(on_floor)
+    below[HORIZON_ROWS:] = on_floor[:-HORIZON_ROWS]
+    return np.asarray(on_floor & below)
+
+
+def matters(name: str, figure: Fitted) -> bool:
+    """Whether a figure is told, differs from its neutral value beyond doubt, and by enough to matter."""
+    neutral, least = LEAST[name]
+    low, high = figure.interval
+    return figure.identified and not low <= neutral <= high and abs(figure.value - neutral) >= least
+
+
+def _soft(blur_s: float, defocus: float) -> dict[str, float]:
+    return {"blur": float(np.clip(blur_s, 0.0, 0.2)), "defocus": float(np.clip(defocus, 0.0, 0.05))}
+
+
+def _sharp_edges(fit: CameraFit) -> Edges:
+    """The edges that the model has too, with how fast each moves through the picture."""
+    there, edges = project(fit.views, fit.state), fit.views.edges
+    speed = (pose_slopes(there) * there.rates).sum(axis=1)
+    same = there.valid & (np.abs(there.residual) < SHARP_PX)
+    place = np.stack((edges.column, edges.row), axis=-1)
+    return Edges(edges.frame[same], place[same], edges.normal[same], np.abs(speed[same]))

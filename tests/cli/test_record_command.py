@@ -1,0 +1,108 @@
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from proxytune.cli.main import main
+from proxytune.diagnosis import filming
+from proxytune.logs import read_log
+from proxytune.logs.pictures import read_pictures
+from proxytune.shipped import shipped
+from proxytune.study.family import load_family
+from proxytune.study.settings import read_study_settings
+
+MODEL = 'format = 1\nrobot = "duckiebot"\nplant = "planar"\n[effects.camera_roll]\ncamera_roll = 4.0\n'
+
+
+@pytest.fixture
+def recorded(tmp_path, monkeypatch):
+    monkeypatch.setattr(filming, "SHORTEST_S", 0.5)
+    (tmp_path / "model.toml").write_text(MODEL)
+
+    def run(name, *options, domain="", changes=("", "")):
+        study = (shipped("studies") / "quickstart" / "study.toml").read_text(encoding="utf-8")
+        (tmp_path / "study.toml").write_text(study.replace(*changes) + domain, encoding="utf-8")
+        arguments = [str(tmp_path), "--model", str(tmp_path / "model.toml"), "--output", str(tmp_path / name)]
+        return main(["record", *arguments, "--repeats", "1", "--seconds", "5", *options]), tmp_path / name
+
+    return run
+
+
+def test_frames_are_read_as_they_were_taken(recorded, capsys):
+    status, home = recorded("log", "--frames", "12", "--json")
+    assert status == 0
+    assert json.loads(capsys.readouterr().out)["frames"] == 12
+    log = read_log(home)
+    frames = log.frames
+    assert (frames.road, frames.position_m, frames.heading_deg, frames.fixed_exposure) == (
+        "small_loop",
+        0.002,
+        pytest.approx(np.degrees(0.005), abs=1e-4),
+        True,
+    )
+    assert [path.name for path in frames.paths] == [f"{number:06d}.png" for number in range(12)]
+    drives = [log.episodes[drive].name for drive in frames.drives]
+    assert drives == [f"lane_{number}" for number in range(12)]
+    taken = list(filming.film(family_of(home), 12, 1))
+    np.testing.assert_array_equal(read_pictures(frames, range(12)), np.concatenate([drive.pictures for drive in taken]))
+    np.testing.assert_allclose(frames.times, np.concatenate([drive.times for drive in taken]), atol=1e-6)
+    np.testing.assert_allclose(log.episodes[-1].poses, taken[-1].episode.poses, atol=1e-4)
+    assert not list(home.rglob(".*"))
+
+
+def family_of(home):
+    return load_family(read_study_settings(home.parent), home.parent / "model.toml")
+
+
+def test_manoeuvres_are_the_same_with_frames_as_without(recorded, capsys):
+    (_, plain), (_, filmed) = recorded("plain", "--json"), recorded("filmed", "--frames", "2")
+    assert json.loads(capsys.readouterr().out.partition("\n}\n")[0] + "\n}")["frames"] == 0
+    rows = (plain / "samples.csv").read_text()
+    assert (filmed / "samples.csv").read_text().startswith(rows)
+    assert not (plain / "frames.csv").exists()
+    assert "[camera]" not in (plain / "log.toml").read_text()
+    assert read_log(plain).frames is None
+
+
+def test_the_renderer_of_a_study_takes_the_frames(recorded, monkeypatch):
+    monkeypatch.setattr(filming, "COLUMNS", 64)
+    (_, rendered), (_, plain) = (
+        recorded("a", "--frames", "1", domain='camera = "renderer"\n'),
+        recorded("b", "--frames", "1"),
+    )
+    one, other = (read_pictures(read_log(home).frames, [0]).astype(float) for home in (rendered, plain))
+    assert 0.0 < np.abs(one - other).mean() < 8.0
+
+
+def test_a_map_of_the_users_own_goes_with_the_log(recorded, tmp_path):
+    (tmp_path / "yard.toml").write_bytes((shipped("robots") / "maps" / "small_loop.toml").read_bytes())
+    status, home = recorded("log", "--frames", "1", changes=('"small_loop"', '"yard.toml"'))
+    assert status == 0
+    assert read_log(home).frames.road == str((home / "yard.toml").resolve())
+    assert (home / "yard.toml").read_bytes() == (tmp_path / "yard.toml").read_bytes()
+
+
+@pytest.mark.parametrize("frames", ["-1", "1000001"])
+def test_an_impossible_number_of_frames_is_refused(recorded, capsys, frames):
+    status, home = recorded("log", "--frames", frames)
+    assert status == 2
+    assert f"--frames must be between 0 and 1000000, got {frames}" in capsys.readouterr().err
+    assert not home.exists()
+
+
+def test_a_picture_that_cannot_be_written_leaves_no_log(recorded, capsys):
+    _, home = recorded("log")
+    (home / "log.toml").unlink()
+    (home / "frames").write_text("in the way")
+    capsys.readouterr()
+    status, _ = recorded("log", "--frames", "1")
+    assert status == 1
+    assert "000000.png: the picture cannot be written" in capsys.readouterr().err
+    assert not (home / "log.toml").exists()
+
+
+def test_pictures_are_png_files_of_the_robots_camera_at_160_columns(recorded):
+    _, home = recorded("log", "--frames", "1")
+    with Image.open(home / "frames" / "000000.png") as picture:
+        assert (picture.format, picture.mode, picture.size) == ("PNG", "RGB", (160, 120))

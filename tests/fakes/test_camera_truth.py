@@ -306,7 +306,9 @@ def test_a_right_name_counts_and_so_does_one_that_cannot_be_told_from_it():
 def test_false_alarms_are_counted_on_sets_that_lack_nothing():
     quiet = [answer(case, said("nothing missing")) for case in ("none", "camera_pitch", "blur")]
     loud = [answer("none", said("explained", "camera_yaw")), answer("none", said("partly explained"))]
-    assert rates([*quiet, *loud])["nothing missing: false alarms"] == Rate(2, 5)
+    counted = rates([*quiet, *loud, answer("none", problem="LogError: no frames")])
+    assert counted["nothing missing: false alarms"] == Rate(2, 5)
+    assert counted["failed"] == Rate(1, 6)
 
 
 def test_outside_sets_are_flagged_by_the_verdict_or_by_a_place_in_the_picture():

@@ -135,7 +135,9 @@ def test_rows_show_the_mean_over_the_blur_about_their_own_instant(latency, blur,
     assert np.allclose(deviation, blur / np.sqrt(12.0), atol=4e-3)
 
 
-@pytest.mark.parametrize("sight", [Sight(camera_latency=0.1), Sight(rolling_shutter=0.08, blur=0.0)], ids=str)
+@pytest.mark.parametrize(
+    "sight", [Sight(camera_latency=0.1), Sight(rolling_shutter=0.08, blur=0.0)], ids=("latency", "rolling shutter")
+)
 def test_a_picture_in_motion_is_what_each_row_sees_at_its_own_time(sight):
     """Mean difference on the floor 0.5 to 0.8 grey levels; with the opposite sign 3 to 20."""
     drive = routes.drives(SMALL_LOOP, np.random.default_rng(3))[0]

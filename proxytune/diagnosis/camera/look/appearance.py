@@ -11,10 +11,11 @@ from proxytune.diagnosis.camera.look.blemishes import Blemish, find_blemishes
 from proxytune.diagnosis.camera.look.grain import Grain, fit_grain
 from proxytune.diagnosis.camera.look.light import Fitted, Light, fit_light
 from proxytune.diagnosis.camera.look.sharpness import Edges, Sharpness, fit_sharpness
-from proxytune.diagnosis.camera.model.drawing import draw_pictures
+from proxytune.diagnosis.camera.model.drawing import NOISE, draw_pictures
 from proxytune.diagnosis.camera.model.fitting import CameraFit
 from proxytune.diagnosis.camera.model.projection import pose_slopes, project
 from proxytune.driving.cameras import ground_points
+from proxytune.effects import effect_of
 
 SHARP_PX = 2.0
 """Edges that lie farther from the map's are not those that the model draws."""
@@ -62,6 +63,9 @@ LEAST: Mapping[str, tuple[float, float]] = {
 }
 """The neutral value of each, and how far from it a figure must lie to matter for what an agent sees."""
 
+NARROW = 0.12
+"""Half of an interval of gain or gamma that is found only where every paint is as declared."""
+
 
 def look_at(gathered: Gathered, fit: CameraFit) -> Appearance:
     """Fit the look of a log's pictures to a fitted camera's."""
@@ -86,11 +90,28 @@ def floor_pixels(fit: CameraFit) -> NDArray[np.bool_]:
     return np.asarray(on_floor & below)
 
 
-def matters(name: str, figure: Fitted) -> bool:
-    """Whether a figure is told, differs from its neutral value beyond doubt, and by enough to matter."""
+def changes(look: Appearance) -> tuple[str, ...]:
+    """The effects on pictures that there is no doubt of, and that matter, by name.
+
+    Exposure is told where every paint says the same of it: else the paint may be another than the map declares. Noise
+    is told by its size: no floor's texture is so strong everywhere.
+    """
+    names = [name for name in look.figures if _matters(name, look.figures[name])]
+    exposure = [name for name in look.figures if name.startswith("exposure.")]
+    if any(_half(look.figures[name]) > NARROW for name in exposure):
+        names = [name for name in names if name not in exposure]
+    return tuple(dict.fromkeys(effect_of(name) for name in names))
+
+
+def _matters(name: str, figure: Fitted) -> bool:
     neutral, least = LEAST[name]
     low, high = figure.interval
-    return figure.identified and not low <= neutral <= high and abs(figure.value - neutral) >= least
+    sure = name == NOISE or (figure.identified and not low <= neutral <= high)
+    return sure and abs(figure.value - neutral) >= least
+
+
+def _half(figure: Fitted) -> float:
+    return (figure.interval[1] - figure.interval[0]) / 2.0
 
 
 def _soft(blur_s: float, defocus: float) -> dict[str, float]:

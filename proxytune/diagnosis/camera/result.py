@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.diagnosis.camera.blemishes import Blemish
 from proxytune.diagnosis.camera.choice import Subset
 from proxytune.diagnosis.camera.gate import Leftover
 from proxytune.diagnosis.camera.gathering import Gathered
@@ -117,7 +118,7 @@ class CameraDiagnosis:
     pixels: Comparison
     grey: Comparison
     gates: tuple[Leftover, Leftover]
-    blemishes: tuple[object, ...]
+    blemishes: tuple[Blemish, ...]
     could_not_be_seen: tuple[str, ...]
     next_views: tuple[str, ...]
     laid: LaidMap

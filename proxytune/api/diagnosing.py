@@ -1,4 +1,4 @@
-"""A diagnosis from Python: what a model lacks of a log."""
+"""A diagnosis from Python: what a model lacks of a log, of motion and camera."""
 
 import json
 from collections.abc import Sequence
@@ -9,19 +9,18 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.diagnose import declared_effects
-from proxytune.diagnosis.diagnose import diagnose as diagnose_log
+from proxytune.diagnosis.camera.result import CameraDiagnosis
+from proxytune.diagnosis.log_diagnosis import LogDiagnosis, diagnose_log
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.diagnosis.result import Diagnosis
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.logs import Log, read_log
-from proxytune.report.diagnosis.document import document, model_file
-from proxytune.report.diagnosis.figures import diagnosis_figures
-from proxytune.report.diagnosis.notes import headline, notes
+from proxytune.report.diagnosis.camera.document import noise_floor
+from proxytune.report.diagnosis.whole import model_file, whole_document, whole_figures, whole_headline, whole_notes
 from proxytune.report.writing import save, write_text
 
-IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: "}
+IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: ", "--test": "test"}
 """What a complaint calls an option of the command, and what it is here."""
 
 
@@ -30,51 +29,75 @@ class DiagnosisReport:
     """What a log says of a model.
 
     Attributes:
-        diagnosis: All of it.
+        found: All of it.
     """
 
-    diagnosis: Diagnosis
+    found: LogDiagnosis
 
     def __repr__(self) -> str:
-        return f"DiagnosisReport of {headline(self.diagnosis)}"
+        return f"DiagnosisReport of {whole_headline(self.found)}"
+
+    @property
+    def diagnosis(self) -> Diagnosis | None:
+        """All that the drives say, or None where the log has no commands, or they say nothing."""
+        return self.found.motion
+
+    @property
+    def camera(self) -> CameraDiagnosis | None:
+        """All that the frames say, or None where the log has none, or they say nothing."""
+        return self.found.camera
 
     @property
     def verdict(self) -> str:
-        """Either "nothing missing", "explained", "partly explained", "unexplained" or "cannot be told"."""
-        return self.diagnosis.verdict
+        """Either "nothing missing", "explained", "partly explained", "unexplained" or "cannot be told".
+
+        It is that on motion; the camera's where there is none on motion.
+        """
+        return self._parts[0].verdict
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that the model lacks and that were added."""
-        return tuple(adopted.effect for adopted in self.diagnosis.effects)
+        """Names of the effects that the model lacks and that were added, those on motion first."""
+        return tuple(added.effect for part in self._parts for added in part.effects)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What else is to be known, a line each: what each effect is worth, what these drives could not show."""
-        return tuple(notes(self.diagnosis))
+        """What else is to be known, a line each: what each effect is worth, what this log could not show."""
+        return tuple(whole_notes(self.found))
+
+    @property
+    def _parts(self) -> tuple[Diagnosis | CameraDiagnosis, ...]:
+        return tuple(part for part in (self.found.motion, self.found.camera) if part is not None)
 
     def parameters(self) -> pd.DataFrame:
         """One row per parameter of the extended model: value, 95 % interval (low, high), unit, value before."""
-        before = self.diagnosis.declared
         rows = [
-            (name, one.value, *one.interval, one.unit, before[name].value if name in before else None)
-            for name, one in self.diagnosis.theta.items()
+            (name, one.value, *one.interval, one.unit, part.declared[name].value if name in part.declared else None)
+            for part in self._parts
+            for name, one in part.theta.items()
         ]
         columns = ["parameter", "value", "low", "high", "unit", "before"]
         return pd.DataFrame(rows, columns=columns).set_index("parameter")
 
     def errors(self) -> pd.DataFrame:
         """One row per horizon [s]: RMSE of position [m] on drives kept aside, before, after, and the noise floor."""
-        rows = [(one.horizon_s, one.before.value, one.after.value, one.floor.lower) for one in self.diagnosis.errors]
+        errors = () if self.found.motion is None else self.found.motion.errors
+        rows = [(one.horizon_s, one.before.value, one.after.value, one.floor.lower) for one in errors]
         return pd.DataFrame(rows, columns=["horizon", "before", "after", "noise_floor"]).set_index("horizon")
+
+    def camera_errors(self) -> pd.DataFrame:
+        """Mean errors on frames kept aside, before, after, noise floor: `markings` [px], `brightness` [grey levels]."""
+        both = () if self.camera is None else (("markings", self.camera.pixels), ("brightness", self.camera.grey))
+        rows = [(name, one.before.value, one.after.value, noise_floor(one), one.unit) for name, one in both]
+        return pd.DataFrame(rows, columns=["of", "before", "after", "noise_floor", "unit"]).set_index("of")
 
     def figures(self) -> dict[str, Figure]:
         """The figures that there is something to draw for, by name."""
-        return dict(diagnosis_figures(self.diagnosis))
+        return dict(whole_figures(self.found))
 
     def document(self) -> dict[str, Any]:
         """What `diagnose --json` prints of it."""
-        return document(self.diagnosis)
+        return whole_document(self.found)
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write diagnosis.json, model.toml, which `predict` and a study's `proxy` read, and the figures; their paths.
@@ -85,7 +108,7 @@ class DiagnosisReport:
         home = Path(folder)
         text = json.dumps(self.document(), indent=2, allow_nan=False, ensure_ascii=False)
         write_text(home / "diagnosis.json", text)
-        write_text(home / "model.toml", model_file(self.diagnosis))
+        write_text(home / "model.toml", model_file(self.found))
         figures = {home / f"{name}.png": figure for name, figure in self.figures().items()}
         for path, figure in figures.items():
             save(figure, path)
@@ -101,13 +124,16 @@ def diagnose(
     effects: Sequence[str] = (),
     seed: int = 1,
 ) -> DiagnosisReport:
-    """Tune what is declared to a log, find the effects that the model lacks, and test both on drives kept aside.
+    """Tune what is declared to a log, find the effects that the model lacks, and test both on what was kept aside.
+
+    Motion is diagnosed where the log has commands, the camera where it has frames.
 
     Args:
         log: A log, or its folder.
-        test: Another log to test on; a part of the drives if not given.
+        test: Another log to test motion on; a part of the drives if not given.
         robot: Name of the robot, instead of the one that the log names.
-        declared: Effects tuned in any case, as in ["trim", "delay"]; those of θ that the robot has if not given.
+        declared: Effects tuned in any case, on motion and camera, as in ["trim", "camera_pitch"]; those of θ that the
+            robot has if not given.
         effects: Effects of your own to try too, as "module:Attribute".
         seed: Seed of the null distributions.
 
@@ -119,8 +145,7 @@ def diagnose(
     drives, others = _read(log), None if test is None else _read(test)
     try:
         vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))
-        names = declared_effects(vehicle) if declared is None else declared
-        return DiagnosisReport(diagnose_log(drives, vehicle, names, test=others, seed=seed))
+        return DiagnosisReport(diagnose_log(drives, vehicle, declared, test=others, seed=seed))
     except InputError as problem:
         raise type(problem)(_in_python(str(problem))) from None
 

@@ -1,4 +1,4 @@
-"""`diagnose`: find the effect that the model lacks, from a log of measured drives."""
+"""`diagnose`: find the effect that the model lacks, from a log of measured drives and frames."""
 
 import argparse
 from pathlib import Path
@@ -9,14 +9,14 @@ from rich.text import Text
 from proxytune.api.diagnosing import DiagnosisReport
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.steps import Steps
-from proxytune.diagnosis.diagnose import declared_effects, diagnose
+from proxytune.diagnosis.log_diagnosis import diagnose_log
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.logs import read_log
-from proxytune.report.diagnosis.document import tables_and_notes
+from proxytune.logs import Log, read_log
+from proxytune.report.diagnosis.whole import whole_tables_and_notes
 
-SHARES = {
+MOTION = {
     "fitting what is declared": 0.02,
     "looking for what is missing, round 1": 0.05,
     "looking for what is missing, round 2": 0.4,
@@ -29,16 +29,31 @@ SHARES = {
     "confirming on the bullet plant": 0.88,
     "drawing": 0.96,
 }
-"""The share of a diagnosis' time that has usually passed when each of its steps begins."""
+"""The share of a diagnosis of motion that has usually passed when each of its steps begins."""
+
+CAMERA = {
+    "reading frames": 0.0,
+    "fitting the camera": 0.1,
+    "looking for what the camera lacks": 0.45,
+    "looking at brightness and sharpness": 0.6,
+    "testing on frames kept aside": 0.75,
+    "drawing": 0.95,
+}
+"""The same of a camera's."""
+
+MOTION_SHARE = 0.8
+"""Of the time of both; the camera comes last."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the log, what is declared and where the findings go."""
-    parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder: log.toml and samples.csv")
+    parser.add_argument(
+        "log", type=Path, metavar="LOG", help="a log's folder: log.toml, samples.csv, and frames if there are"
+    )
     parser.add_argument(
         "--declared",
         metavar="NAMES",
-        help="effects tuned in any case, as in trim,delay [the robot's]",
+        help="effects tuned in any case, on motion and camera, as in trim,delay,camera_pitch [the robot's]",
     )
     parser.add_argument(
         "--effects",
@@ -47,7 +62,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="your own effects to try too, as module:Attribute of this folder; plug-ins take part by themselves",
     )
     parser.add_argument("--robot", metavar="NAME", help="the robot, if not the one in log.toml")
-    parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test on [part of LOG]")
+    parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test motion on [part of LOG]")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the null distributions [1]")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the findings [diagnosis_LOG]")
 
@@ -58,15 +73,25 @@ def run(arguments: argparse.Namespace) -> Answer:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
     log = read_log(arguments.log)
     robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), _names(arguments.effects)))
-    declared = declared_effects(robot) if arguments.declared is None else _names(arguments.declared)
+    declared = None if arguments.declared is None else _names(arguments.declared)
     test = read_log(arguments.test) if arguments.test else None
-    with Steps(SHARES) as step:
-        diagnosis = diagnose(log, robot, declared, test=test, seed=arguments.seed, report=step)
+    with Steps(_shares(log)) as step:
+        found = diagnose_log(log, robot, declared, test=test, seed=arguments.seed, report=step)
         folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
         step("drawing")
-        report = DiagnosisReport(diagnosis)
+        report = DiagnosisReport(found)
         files = [str(path) for path in report.write(folder)]
-    return Answer(report.document() | {"files": files}, Group(tables_and_notes(diagnosis), Text("\n".join(files))))
+    return Answer(report.document() | {"files": files}, Group(whole_tables_and_notes(found), Text("\n".join(files))))
+
+
+def _shares(log: Log) -> dict[str, float]:
+    """The share of the whole time that has usually passed when each step begins."""
+    if log.frames is None:
+        return MOTION
+    if log.command == "none":
+        return CAMERA
+    motion = {step: MOTION_SHARE * share for step, share in MOTION.items()}
+    return motion | {step: MOTION_SHARE + (1.0 - MOTION_SHARE) * share for step, share in CAMERA.items()}
 
 
 def _names(given: str) -> tuple[str, ...]:

@@ -1,20 +1,23 @@
-"""`predict`: the poses of a log, predicted by a fitted model."""
+"""`predict`: the poses of a log, or the pictures of its camera, predicted by a fitted model."""
 
 import argparse
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console
 from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.diagnosis.horizon.prediction import agreement, predict
 from proxytune.diagnosis.measured.vehicle import robot_of
+from proxytune.diagnosis.predicted_pictures import predict_pictures, predicted_frames_text
+from proxytune.diagnosis.recording import PICTURES
 from proxytune.driving.robot import Robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
 from proxytune.logs import Log, read_log
-from proxytune.report.writing import write_text
+from proxytune.report.writing import write_picture, write_text
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -22,16 +25,32 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model.toml")
     parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder")
     parser.add_argument("--horizon", type=float, default=2.0, metavar="S", help="length of the windows [2 s]")
-    parser.add_argument("--output", type=Path, required=True, metavar="CSV", help="the predicted poses to write")
+    parser.add_argument("--frames", action="store_true", help="predict what the camera sees instead of poses")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        required=True,
+        metavar="PATH",
+        help="the CSV of predicted poses to write; with --frames the folder for frames.csv and pictures",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """Predict every window, write the poses, and compare them with those measured."""
+    """Predict poses or pictures, write them, and compare them with those measured."""
+    catalogue = Catalogue(Path.cwd())
     if not (np.isfinite(arguments.horizon) and arguments.horizon > 0.0):
         raise InputError(f"--horizon must be a positive number of seconds, got {arguments.horizon}")
-    catalogue = Catalogue(Path.cwd())
     model, log = read_model(arguments.model, catalogue), read_log(arguments.log)
-    table = predict(log, _robot(model, log, catalogue), model.theta, arguments.horizon)
+    if arguments.frames:
+        return _predict_pictures(log, _robot(model, log, catalogue), model, arguments.output)
+    if log.command == "none":
+        frames = "" if log.frames is None else ", or give --frames to predict those"
+        raise InputError(f"{log.name}: has no commands to predict poses from; give a log of drives{frames}")
+    return _predict_poses(log, _robot(model, log, catalogue), model, arguments)
+
+
+def _predict_poses(log: Log, robot: Robot, model: Model, arguments: argparse.Namespace) -> Answer:
+    table = predict(log, robot, model.theta, arguments.horizon)
     write_text(arguments.output, table.to_csv(index=False))
     rmse = agreement(table, log, arguments.horizon)
     document = {
@@ -55,6 +74,22 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer(
         document, Text(f"{document['windows']} windows of {arguments.horizon:g} s: {error}\n{arguments.output}")
     )
+
+
+def _predict_pictures(log: Log, robot: Robot, model: Model, folder: Path) -> Answer:
+    """Every frame as a picture; frames.csv comes last, so that a list never names what is not there."""
+    numbers, errors = list[int](), list[float]()
+    with Console(stderr=True).status("drawing") as status:
+        for part in predict_pictures(log, robot, model.theta):
+            for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
+                write_picture(folder / (PICTURES % number), picture)
+            numbers += part.numbers.tolist()
+            errors += part.grey_errors.tolist()
+            status.update(f"drawing: {len(numbers)} frames")
+    write_text(folder / "frames.csv", predicted_frames_text(log, numbers))
+    error = float(np.mean(errors))
+    told = f"{len(numbers)} frames: mean absolute difference on the floor {error:.1f} grey levels\n{folder}"
+    return Answer({"frames": len(numbers), "output": str(folder), "grey_error": error}, Text(told))
 
 
 def _robot(model: Model, log: Log, catalogue: Catalogue) -> Robot:

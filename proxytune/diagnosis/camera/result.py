@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.error.unseen import PictureError
 from proxytune.diagnosis.camera.gathering import Gathered
+from proxytune.diagnosis.camera.look.blemishes import Blemish
 from proxytune.diagnosis.camera.naming.choice import Subset
 from proxytune.diagnosis.camera.naming.gate import Leftover
 from proxytune.diagnosis.camera.naming.search import Named
@@ -117,7 +118,7 @@ class CameraDiagnosis:
     pixels: Comparison
     grey: Comparison
     gates: tuple[Leftover, Leftover]
-    blemishes: tuple[object, ...]
+    blemishes: tuple[Blemish, ...]
     could_not_be_seen: tuple[str, ...]
     next_views: tuple[str, ...]
     laid: LaidMap

@@ -1,10 +1,9 @@
-"""A diagnosis as one JSON document, as model.toml, and as tables for people."""
+"""A diagnosis of motion as one JSON document, and as tables for people."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Group
-from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
@@ -13,13 +12,12 @@ from proxytune.diagnosis.horizon_error import HorizonError
 from proxytune.diagnosis.naming.findings import AdoptedEffect
 from proxytune.diagnosis.naming.materiality import Worth
 from proxytune.diagnosis.result import Diagnosis, Estimate, main_error
-from proxytune.driving.robot import robot_names
-from proxytune.effects import Catalogue, Model, model_text
-from proxytune.logs import GEOMETRY
+from proxytune.effects import Catalogue
 from proxytune.report.diagnosis.clocks import clocks_document
 from proxytune.report.diagnosis.learnt import learnt_document, ratio_document, ratios_document
 from proxytune.report.diagnosis.likeness import unlike_document
 from proxytune.report.diagnosis.notes import decisive, headline, may_matter, notes, per_cent
+from proxytune.report.diagnosis.tables import parameters_table, plain_table
 
 
 def document(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -144,38 +142,18 @@ def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:
     }
 
 
-def model_file(diagnosis: Diagnosis) -> str:
-    """The extended model as model.toml."""
-    theta = {name: estimate.value for name, estimate in diagnosis.theta.items()} | dict(diagnosis.learning.theta)
-    bounds = {name: estimate.interval for name, estimate in diagnosis.theta.items()}
-    catalogue = diagnosis.robot.catalogue
-    in_robots = diagnosis.robot.name in robot_names(catalogue.folder)
-    geometry = {} if in_robots else {figure: diagnosis.robot.figures[figure] for figure in GEOMETRY.values()}
-    added = ", ".join(effect.effect for effect in diagnosis.effects) or "nothing"
-    comments = (f"{diagnosis.verdict}: fitted to {diagnosis.log}; added to what was declared: {added}",)
-    return model_text(Model(diagnosis.robot.name, None, theta, bounds, geometry), comments, catalogue)
-
-
 def tables_and_notes(diagnosis: Diagnosis) -> Group:
     """The diagnosis as `diagnose` prints it: the verdict, tables and notes."""
-    parts = [_parameters(diagnosis), _errors(diagnosis), _candidates(diagnosis)]
+    parts = [
+        parameters_table("Fitted parameters", diagnosis.declared, diagnosis.theta),
+        _errors(diagnosis),
+        _candidates(diagnosis),
+    ]
     return Group(Text(headline(diagnosis), style="bold"), *parts, *(Text(note) for note in notes(diagnosis)))
 
 
-def _parameters(diagnosis: Diagnosis) -> Table:
-    table = _table("Fitted parameters", ("parameter", "declared only", "effects added", "95 % interval", "unit"))
-    for name, after in diagnosis.theta.items():
-        if name.endswith(".imbalance") and after.value == 0.0:
-            continue
-        before = diagnosis.declared.get(name)
-        interval = f"{after.interval[0]:.4g} … {after.interval[1]:.4g}" if after.interval[0] < after.interval[1] else ""
-        old = f"{before.value:.4g}" if before else ""
-        table.add_row(name, old, f"{after.value:.4g}", interval, after.unit)
-    return table
-
-
 def _errors(diagnosis: Diagnosis) -> Table:
-    table = _table(
+    table = plain_table(
         "Error on held-out drives: RMSE of position [mm] (heading [deg])",
         ("window", "before", "after", "after / before", "noise floor"),
     )
@@ -196,15 +174,7 @@ def _millimetres(value: float, interval: tuple[float, float], heading: float) ->
 
 
 def _candidates(diagnosis: Diagnosis) -> Table:
-    table = _table("Effects tried, best first", ("effect", "form", "log-likelihood gain [nats]", "p"))
+    table = plain_table("Effects tried, best first", ("effect", "form", "log-likelihood gain [nats]", "p"))
     for tried in diagnosis.found.tried[:8]:
         table.add_row(tried.effect, tried.form, f"{tried.gain:.1f}", f"{tried.p_value:.3f}")
-    return table
-
-
-def _table(title: str, columns: tuple[str, ...]) -> Table:
-    table = Table(title=escape(title), title_justify="left", title_style="bold", box=None, pad_edge=False)
-    for column in columns:
-        text = column in ("parameter", "unit", "window", "effect", "form")
-        table.add_column(escape(column), justify="left" if text else "right", overflow="fold")
     return table

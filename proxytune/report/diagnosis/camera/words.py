@@ -1,0 +1,118 @@
+"""What a camera's diagnosis says in sentences."""
+
+from collections.abc import Mapping
+
+from proxytune.diagnosis.camera.look.blemishes import Blemish
+from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect, LaidLine, LaidMap
+from proxytune.diagnosis.result import Estimate
+from proxytune.report.diagnosis.camera.document import dropped_values
+from proxytune.report.numbers import fixed, listed, short
+
+MEANINGS = {
+    "nothing missing": "the declared camera explains the frames",
+    "explained": "with the effects added, the camera explains the frames",
+    "partly explained": "the effects added explain a part; something fixed to the camera is left over",
+    "unexplained": "something fixed to the camera is left over, and no named effect explains it",
+}
+
+MOST_LINES = 3
+"""So many lines of the map are told, the farthest from their places first."""
+
+WIDER_M = 0.002
+"""Tape is told to be wider or narrower than on the map from here on."""
+
+
+def camera_headline(log: str, diagnosis: CameraDiagnosis) -> str:
+    """The verdict on the camera and what it means."""
+    return f"{log}: camera: {diagnosis.verdict}: {MEANINGS[diagnosis.verdict]}"
+
+
+def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
+    """Everything that the tables do not hold, a line each."""
+    lines = [_say_added(effect) for effect in diagnosis.effects]
+    dropped = dropped_values(diagnosis)
+    lines += [_say_immaterial(effect, dropped) for effect in diagnosis.immaterial]
+    lines += _say_left_over(diagnosis)
+    rows, columns = diagnosis.gathered.pictures.shape[1:3]
+    lines += [_say_blemish(blemish, rows, columns) for blemish in diagnosis.blemishes]
+    if any(name.startswith("exposure") for name in diagnosis.theta):
+        lines.append("exposure is relative to the map's declared paint: it makes pictures match, and is no figure of")
+        lines[-1] += " the camera where the paint is not known"
+    lines += _say_map(diagnosis.laid)
+    if diagnosis.could_not_be_seen:
+        lines.append(f"these frames could not have shown: {', '.join(diagnosis.could_not_be_seen)}")
+    lines += [f"to see more, take {views}" for views in diagnosis.next_views]
+    return lines + list(diagnosis.notes)
+
+
+def _say_added(effect: CameraEffect) -> str:
+    beside = f"; these frames fit {', '.join(effect.rivals)} as well" if effect.rivals else ""
+    kind = "the error in brightness" if effect.nats is None else "the displacement of markings"
+    gain = "" if effect.nats is None else f"log-likelihood gain {effect.nats:.0f} nats, "
+    return f"added {effect.effect}: {gain}without it {kind} grows by {_growth(effect)} %{beside}"
+
+
+def _say_immaterial(effect: CameraEffect, values: Mapping[str, Estimate]) -> str:
+    known = [values[name] for name in effect.names if name in values]
+    value = "".join(f" {short(one.value)} {one.unit}".rstrip() for one in known)
+    change = f"without it the displacement of markings grows by {_growth(effect)} %"
+    return f"detectable but immaterial: {effect.effect}{value}, {change}"
+
+
+def _growth(effect: CameraEffect) -> str:
+    return fixed(100.0 * (effect.error_without - 1.0), 0 if effect.error_without > 1.1 else 1)
+
+
+def _say_left_over(diagnosis: CameraDiagnosis) -> list[str]:
+    _, after = diagnosis.gates
+    if not after.open:
+        return []
+    field = f"markings lie {after.rms_px:.2f} px (RMS) from their places in the picture, wherever the robot stands"
+    beware = "; values of added effects are no physics yet" if diagnosis.effects else ""
+    return [f"left over and fixed to the camera: {field}; no effect of the catalogue bends pictures so{beware}"]
+
+
+def _say_blemish(blemish: Blemish, rows: int, columns: int) -> str:
+    (left, right), (top, bottom) = blemish.columns, blemish.rows
+    across = _third((left + right + 1) / 2.0 / columns, ("left", "middle", "right"))
+    down = _third((top + bottom + 1) / 2.0 / rows, ("upper", "middle", "lower"))
+    where = "middle" if across == down else " ".join(word for word in (down, across) if word != "middle")
+    place = f"columns {left} to {right}, rows {top} to {bottom} of {columns} × {rows}"
+    return f"something covers the {where} of the picture: {place}"
+
+
+def _third(share: float, words: tuple[str, str, str]) -> str:
+    return words[min(2, int(3.0 * share))]
+
+
+def _say_map(laid: LaidMap) -> list[str]:
+    lines = [_say_line(line) for line in laid.lines[:MOST_LINES]]
+    rest = len(laid.lines) - MOST_LINES
+    if rest > 0:
+        lines.append(f"{rest} more lines of the map lie beside their places: see `map` in diagnosis.json")
+    lines += [
+        f"{name} are {1e3 * abs(width.value):.1f} mm {_wider(name, width.value)} than on the map"
+        for name, width in laid.widths.items()
+        if abs(width.value) >= WIDER_M and not width.interval[0] <= 0.0 <= width.interval[1]
+    ]
+    moved = [
+        f"{fixed(1e3 * one.value, 0)} mm in {name[0]}" if one.unit == "m" else f"{fixed(one.value, 2)}° in heading"
+        for name, one in laid.offset.items()
+        if not one.interval[0] <= 0.0 <= one.interval[1]
+    ]
+    return [*lines, f"the whole map lies off by {listed(moved)}"] if moved else lines
+
+
+def _say_line(line: LaidLine) -> str:
+    ahead = line.line.endswith("dashes")
+    ways = ("ahead of", "behind") if ahead else ("to the right of", "to the left of")
+    verb, their = ("lie", "their") if ahead else ("lies", "its")
+    low, high = sorted(abs(1e3 * end) for end in line.interval)
+    size = f"{abs(1e3 * line.right_m):.0f} mm ({low:.0f} to {high:.0f})"
+    way = ways[0] if line.right_m > 0.0 else ways[1]
+    return f"the {line.line} of stretch {line.stretch} {verb} {size} {way} {their} place, driving counter-clockwise"
+
+
+def _wider(name: str, by: float) -> str:
+    larger, smaller = ("longer", "shorter") if name.endswith("dashes") else ("wider", "narrower")
+    return larger if by > 0.0 else smaller

@@ -1,0 +1,227 @@
+"""`diagnose` takes frames as it takes poses: a camera alone, motion and camera together, and refusals in one line."""
+
+import io
+import json
+import math
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+from circling import circling_log
+from pictured import add_frames, lane_poses, write_still_frames
+from planted import CALM, TRUTH, write_log
+
+from proxytune.cli.diagnose import _shares
+from proxytune.cli.main import main
+from proxytune.effects import read_model
+from proxytune.logs import read_log
+
+ROLLED = {"camera_pitch": 19.15, "camera_roll": 4.0}
+KEYS = {
+    "verdict",
+    "declared",
+    "effects",
+    "immaterial",
+    "candidates",
+    "error",
+    "grey_error",
+    "fixed_to_camera",
+    "blemishes",
+    "could_not_be_seen",
+    "next_views",
+    "map",
+    "matched_share",
+    "frames",
+    "pose_scatter",
+    "notes",
+}
+MEASURED = Path(__file__).resolve().parents[2] / "../shared/data/logs/gym_duckietown_frames"
+
+
+class Found(NamedTuple):
+    folder: Path
+    document: dict
+    out: str
+    err: str
+
+
+def diagnosed(capsys, *words):
+    assert main(["diagnose", *map(str, words), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def refused(capsys, *words):
+    """The one line that a command ends with."""
+    assert main(["diagnose", *map(str, words), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("proxytune diagnose: ") == 1
+    return err.splitlines()[-1]
+
+
+@pytest.fixture(scope="module")
+def stills(tmp_path_factory):
+    return write_still_frames(tmp_path_factory.mktemp("stills") / "log", ROLLED, lane_poses(30), columns=96)
+
+
+@pytest.fixture(scope="module")
+def found(stills, tmp_path_factory):
+    """The folder and the document of a diagnosis of still frames, what people read, and the steps."""
+    folder, out, err = tmp_path_factory.mktemp("found") / "out", io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        assert main(["diagnose", str(stills), "--output", str(folder)]) == 0
+    return Found(folder, json.loads((folder / "diagnosis.json").read_text()), out.getvalue(), err.getvalue())
+
+
+def short_drives(folder):
+    """Drives too short for motion, with frames enough for the camera."""
+    log = circling_log(TRUTH, noise=CALM, episodes=2, seconds=6.0)
+    return add_frames(write_log(log, folder), log, ROLLED, every=6)
+
+
+def test_a_roll_that_nobody_declared_is_found_in_still_frames(found):
+    camera = found.document["camera"]
+    assert set(camera) >= KEYS
+    (effect,) = camera["effects"]
+    assert (camera["verdict"], effect["name"]) == ("explained", "camera_roll")
+    assert set(effect) == {"name", "parameters", "held_out_gain", "indistinguishable_from", "error_without"}
+    low, high = effect["parameters"]["camera_roll"]["interval"]
+    assert low < 4.0 < high < 6.0
+    assert effect["error_without"] > 2.0
+    assert camera["error"]["after"] < 0.4 * camera["error"]["before"]
+    assert (camera["error"]["unit"], camera["grey_error"]["unit"]) == ("px", "grey levels")
+    assert camera["frames"] == {"used": 30, "of": 30}
+    assert camera["pose_scatter"] == pytest.approx({"position_m": 0.002, "heading_deg": 0.3})
+    before, after = camera["fixed_to_camera"]["before"], camera["fixed_to_camera"]["after"]
+    assert set(before) == {"nats", "share", "rms_px", "open"}
+    assert before["rms_px"] > 2.0 * after["rms_px"]
+    assert after["open"] is False
+
+
+def test_where_there_is_no_motion_the_top_of_the_document_is_the_camera_s(found):
+    document = found.document
+    for key in ("verdict", "declared", "effects", "could_not_be_seen"):
+        assert document[key] == document["camera"][key]
+    assert (document["log"], document["robot"]) == ("pictured", "duckiebot")
+    assert not {"residual_depends_on", "next_manoeuvre", "clocks"} & set(document)
+    assert document["motion_refused"] is None
+
+
+def test_every_number_of_the_document_is_plain_and_finite(found):
+    def walk(value):
+        if isinstance(value, dict | list):
+            for one in value.values() if isinstance(value, dict) else value:
+                yield from walk(one)
+        else:
+            yield value
+
+    leaves = list(walk(found.document["camera"]))
+    assert {type(leaf) for leaf in leaves} <= {float, int, str, bool, type(None)}
+    assert all(math.isfinite(leaf) for leaf in leaves if isinstance(leaf, float))
+    assert sum(isinstance(leaf, float) for leaf in leaves) > 50
+
+
+def test_model_toml_holds_the_camera_with_intervals_and_says_the_verdict(found):
+    model = read_model(found.folder / "model.toml")
+    told = found.document["camera"]["effects"][0]["parameters"]["camera_roll"]
+    assert model.theta["camera_roll"] == pytest.approx(told["value"])
+    assert model.intervals["camera_roll"] == pytest.approx(tuple(told["interval"]))
+    comment = "# camera: explained: fitted to pictured; added to what was declared: camera_roll"
+    assert comment in (found.folder / "model.toml").read_text().splitlines()
+
+
+def test_figures_of_the_camera_are_written_and_none_of_motion(found):
+    pictures = {path.name for path in found.folder.glob("*.png")}
+    assert pictures == {f"camera_{name}.png" for name in ("markings", "displacement", "ranking", "error")}
+
+
+def test_people_read_the_verdict_the_roll_and_both_errors(found):
+    words = " ".join(found.out.split())
+    assert "pictured: camera: explained: with the effects added, the camera explains the frames" in words
+    assert "added camera_roll: log-likelihood gain" in words
+    assert "markings [px]" in words
+    assert "brightness [grey]" in words
+    assert "these frames could not have shown: " in words
+    assert "fitting the camera" in found.err
+
+
+def test_what_is_declared_is_tuned_and_not_added(stills, tmp_path, capsys):
+    declared = "trim,camera_pitch,camera_roll"
+    document = diagnosed(capsys, stills, "--declared", declared, "--output", tmp_path / "out")
+    assert set(document["declared"]) == {"camera_pitch", "camera_roll"}
+    assert (document["verdict"], document["effects"]) == ("nothing missing", [])
+
+
+def test_an_unknown_effect_is_told_with_the_nearest_of_both_kinds(stills, tmp_path, capsys):
+    line = refused(capsys, stills, "--declared", "camera_rol", "--output", tmp_path / "out")
+    assert "--declared camera_rol: no effect on motion, camera or pictures has this name; did you mean" in line
+    assert "'camera_roll'" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_log_to_test_on_is_refused_where_there_is_no_motion(stills, tmp_path, capsys):
+    line = refused(capsys, stills, "--test", stills, "--output", tmp_path / "out")
+    assert "--test: pictured has no commands" in line
+
+
+def test_too_few_frames_are_refused_in_one_line(tmp_path, capsys):
+    folder = write_still_frames(tmp_path / "few", ROLLED, lane_poses(8), columns=96)
+    assert "8 of 8 frames show markings; the camera needs 20" in refused(capsys, folder, "--output", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_where_motion_is_refused_the_camera_still_comes_out(tmp_path, capsys):
+    folder = short_drives(tmp_path / "log")
+    document = diagnosed(capsys, folder, "--output", tmp_path / "out")
+    assert "at least 20 s" in document["motion_refused"]
+    assert [effect["name"] for effect in document["effects"]] == ["camera_roll"]
+    assert not {"errors", "clocks"} & set(document)
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {Path(name).name for name in document["files"]} == names >= {"model.toml", "camera_markings.png"}
+
+
+def test_where_both_are_refused_both_reasons_are_told_in_one_line(tmp_path, capsys):
+    log = circling_log(TRUTH, noise=CALM, episodes=2, seconds=6.0)
+    folder = add_frames(write_log(log, tmp_path / "log"), log, ROLLED, every=20)
+    line = refused(capsys, folder, "--output", tmp_path / "out")
+    assert "at least 20 s" in line
+    assert "camera: pictured: frames: 9 of 12 frames show markings" in line
+
+
+@pytest.mark.slow
+def test_motion_and_camera_come_out_in_one_document_one_model_and_one_folder(tmp_path, capsys):
+    log = circling_log({**TRUTH, "yaw_scrub": 0.12}, noise=CALM)
+    folder = add_frames(write_log(log, tmp_path / "log"), log, ROLLED, every=36)
+    document = diagnosed(capsys, folder, "--output", tmp_path / "out")
+    assert [effect["name"] for effect in document["effects"]] == ["yaw_scrub"]
+    assert [effect["name"] for effect in document["camera"]["effects"]] == ["camera_roll"]
+    assert set(document["declared"]) == {"trim", "delay"}
+    assert set(document["camera"]["declared"]) >= {"camera_pitch"}
+    assert (document["error"]["unit"], document["camera"]["error"]["unit"]) == ("m", "px")
+    theta = read_model(tmp_path / "out" / "model.toml").theta
+    assert theta["yaw_scrub"] == pytest.approx(0.12, abs=0.005)
+    assert theta["camera_roll"] == pytest.approx(4.0, abs=0.5)
+    assert (tmp_path / "out" / "model.toml").read_text().count("added to what was declared") == 2
+    names = {path.stem for path in (tmp_path / "out").glob("*.png")}
+    assert names >= {"residual_map", "error", "camera_markings", "camera_error"}
+
+
+def test_progress_of_both_goes_from_motion_to_the_camera(tmp_path):
+    shares = _shares(read_log(short_drives(tmp_path / "log")))
+    assert list(shares.values()) == sorted(shares.values()) or shares["drawing"] == max(shares.values())
+    assert shares["testing on drives kept aside"] < shares["reading frames"] < shares["testing on frames kept aside"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not MEASURED.is_dir(), reason=f"needs measured data in {MEASURED.parent.name}/{MEASURED.name}")
+def test_nothing_is_missing_of_the_camera_that_took_the_measured_frames(tmp_path, capsys):
+    document = diagnosed(capsys, MEASURED, "--output", tmp_path / "out")
+    assert (document["verdict"], document["effects"]) == ("nothing missing", [])
+    low, high = document["declared"]["camera_pitch"]["interval"]
+    assert low < 19.15 < high
+    assert document["camera"]["error"]["after"] < 1.0

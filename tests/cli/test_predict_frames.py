@@ -1,0 +1,100 @@
+"""`predict --frames` draws what a model's camera would have seen, as a log's frames, and says how far off it is."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+from pictured import lane_poses, pictures, write_still_frames
+from planted import TRUTH, planted_log, write_log
+
+from proxytune.cli.main import main
+from proxytune.effects import Model, model_text
+from proxytune.logs import read_log
+
+ROLLED = {"camera_pitch": 17.0, "camera_roll": 4.0}
+POSES = lane_poses(65)
+
+
+@pytest.fixture(scope="module")
+def stills(tmp_path_factory):
+    return write_still_frames(tmp_path_factory.mktemp("stills") / "log", ROLLED, POSES, columns=80)
+
+
+@pytest.fixture
+def predicted(stills, tmp_path, capsys):
+    """Predict with these effects, and read the document."""
+
+    def run(theta):
+        path = model(tmp_path, theta)
+        assert main(["predict", str(path), str(stills), "--frames", "--output", str(tmp_path / "out"), "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    return run
+
+
+def model(folder, theta):
+    path = folder / "model.toml"
+    path.write_text(model_text(Model("duckiebot", None, theta, {})), encoding="utf-8")
+    return path
+
+
+def refused(capsys, *words):
+    assert main(["predict", *map(str, words), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    return err
+
+
+def test_the_true_model_draws_the_very_pictures_and_the_nominal_one_others(predicted, tmp_path):
+    told = predicted(ROLLED)
+    assert told == {"frames": 65, "output": str(tmp_path / "out"), "grey_error": told["grey_error"]}
+    assert told["grey_error"] < 0.1
+    drawn = np.stack([np.asarray(Image.open(path)) for path in sorted((tmp_path / "out" / "frames").glob("*.png"))])
+    assert np.array_equal(drawn, pictures(ROLLED, POSES, columns=80))
+    assert predicted({})["grey_error"] > 5.0
+
+
+def test_the_pictures_read_as_the_frames_of_the_log(predicted, stills, tmp_path):
+    predicted(ROLLED)
+    table = pd.read_csv(tmp_path / "out" / "frames.csv")
+    assert list(table.columns) == ["frame", "episode", "time"]
+    for name in ("log.toml", "samples.csv"):
+        shutil.copy(stills / name, tmp_path / "out" / name)
+    frames, own = read_log(tmp_path / "out").frames, read_log(stills).frames
+    assert [path.name for path in frames.paths] == [path.name for path in own.paths]
+    assert np.array_equal(frames.times, own.times)
+
+
+def test_effects_on_pictures_are_drawn_too(predicted, tmp_path):
+    predicted(ROLLED)
+    plain = np.asarray(Image.open(tmp_path / "out" / "frames" / "000000.png")).astype(float)
+    predicted({**ROLLED, "exposure.gain": 0.5})
+    dim = np.asarray(Image.open(tmp_path / "out" / "frames" / "000000.png")).astype(float)
+    assert dim.mean() == pytest.approx(0.5 * plain.mean(), rel=0.02)
+
+
+def test_people_read_the_difference_in_grey_levels(stills, tmp_path, capsys):
+    words = ["predict", model(tmp_path, ROLLED), stills, "--frames", "--output", tmp_path / "out"]
+    assert main([str(word) for word in words]) == 0
+    assert "65 frames: mean absolute difference on the floor 0.0 grey levels" in capsys.readouterr().out
+
+
+def test_a_log_without_frames_is_refused(tmp_path, capsys):
+    folder = write_log(planted_log(TRUTH, episodes=1, seconds=5.0), tmp_path / "log")
+    line = refused(capsys, model(tmp_path, {}), folder, "--frames", "--output", tmp_path / "out")
+    assert "has no frames to predict; add [camera] to log.toml, or leave --frames out" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_frames_alone_have_no_poses_to_predict(stills, tmp_path, capsys):
+    line = refused(capsys, model(tmp_path, {}), stills, "--output", tmp_path / "poses.csv")
+    assert "has no commands to predict poses from; give a log of drives, or give --frames" in line
+    assert not (tmp_path / "poses.csv").exists()

@@ -1,0 +1,161 @@
+"""The figures and sentences of a camera's diagnosis, on frames whose camera is known."""
+
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+from pictured import ROBOT, lane_poses, write_still_frames
+
+from proxytune.diagnosis.camera.diagnose import diagnose_camera
+from proxytune.diagnosis.camera.look.blemishes import Blemish
+from proxytune.diagnosis.camera.result import LaidLine, LaidMap
+from proxytune.diagnosis.result import Estimate
+from proxytune.logs import read_log
+from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure, measured_displacements
+from proxytune.report.diagnosis.camera.figures import camera_figures, loss_of_nothing
+from proxytune.report.diagnosis.camera.markings_figure import outline_field
+from proxytune.report.diagnosis.camera.models import camera_models
+from proxytune.report.diagnosis.camera.words import camera_headline, camera_notes
+from proxytune.report.diagnosis.model_names import BEFORE
+
+AFTER = "with camera roll"
+
+
+@pytest.fixture(scope="module")
+def diagnosis(tmp_path_factory):
+    theta = {"camera_pitch": 19.15, "camera_roll": 4.0}
+    folder = write_still_frames(tmp_path_factory.mktemp("rolled") / "log", theta, lane_poses(30), columns=96)
+    found = diagnose_camera(read_log(folder), ROBOT, ("camera_pitch", "blur"))
+    assert [effect.effect for effect in found.effects] == ["camera_roll"]
+    return found
+
+
+@pytest.fixture(scope="module")
+def clean(diagnosis):
+    """The same frames, as if nothing had been added."""
+    named = replace(diagnosis.named, declared=diagnosis.named.model, effects=())
+    return replace(diagnosis, verdict="nothing missing", effects=(), named=named)
+
+
+@pytest.fixture(scope="module")
+def figures(diagnosis):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        drawn = camera_figures(diagnosis)
+        for figure in drawn.values():
+            figure.draw_without_rendering()
+    return drawn
+
+
+def test_there_are_four_figures_for_a_column(figures):
+    assert set(figures) == {"camera_markings", "camera_displacement", "camera_ranking", "camera_error"}
+    assert all(3.4 <= figure.get_figwidth() <= 7.0 for figure in figures.values())
+
+
+def test_axes_say_what_they_show_in_which_unit(figures):
+    for name in ("camera_markings", "camera_displacement"):
+        labels = {(axes.get_xlabel(), axes.get_ylabel()) for axes in figures[name].axes}
+        assert {"column [px]", "row [px]"} <= {label for pair in labels for label in pair}
+    (ranking,) = figures["camera_ranking"].axes
+    assert "[nats]" in ranking.get_xlabel()
+    place, grey = figures["camera_error"].axes
+    assert place.get_ylabel() == "displacement of markings [px]"
+    assert grey.get_ylabel() == "difference in brightness [grey levels]"
+
+
+def test_the_markings_are_drawn_before_and_after_on_two_frames(figures, clean):
+    titles = [axes.get_title() for axes in figures["camera_markings"].axes]
+    assert [title.split(",")[0] for title in titles] == [BEFORE, AFTER] * 2
+    assert all(axes.images and axes.collections for axes in figures["camera_markings"].axes)
+    assert len(camera_figures(clean)["camera_markings"].axes) == 2
+
+
+def test_outlines_of_the_fitted_camera_lie_on_the_edges_of_the_picture(diagnosis):
+    edges, distances = diagnosis.named.full.views.edges, {}
+    for name, fit in camera_models(diagnosis).items():
+        own = (edges.frame == 4) & ~edges.white
+        field = outline_field(fit, 4, white=False)[2]
+        at = np.abs(field[edges.row[own].astype(int), edges.column[own].astype(int)])
+        distances[name] = np.nanmedian(at)
+    assert 4.0 * distances[AFTER] < 2.0 < distances[BEFORE]
+
+
+def test_displaced_edges_are_drawn_where_they_went(diagnosis):
+    fit = diagnosis.named.model
+    edges = fit.views.edges
+    moved = replace(fit, views=replace(fit.views, edges=edges._replace(row=edges.row + 0.5)))
+    there, here = (np.median(measured_displacements(one).lengths, axis=0) for one in (moved, fit))
+    assert there - here == pytest.approx((0.0, 0.5), abs=0.2)
+
+
+def test_what_is_fixed_to_the_camera_points_as_the_measured_edges_do(diagnosis):
+    measured, _, fixed, _ = (axes.collections[0] for axes in displacement_figure(diagnosis).axes)
+    agreement = (measured.U * fixed.U + measured.V * fixed.V).sum()
+    assert agreement > 0.3 * np.hypot(measured.U, measured.V) @ np.hypot(fixed.U, fixed.V)
+
+
+def test_arrows_after_are_shorter_on_the_same_scale(diagnosis):
+    before, after, *_ = (axes.collections[0] for axes in displacement_figure(diagnosis).axes)
+    assert before.scale == after.scale
+    assert np.hypot(after.U, after.V).mean() < 0.3 * np.hypot(before.U, before.V).mean()
+
+
+def test_the_ranking_holds_every_loss_against_that_of_nothing_added(diagnosis, figures):
+    (axes,) = figures["camera_ranking"].axes
+    dots = [line for line in axes.get_lines() if line.get_marker() == "o"]
+    assert [float(dot.get_xdata()[0]) for dot in dots] == [max(one.loss, 0.0) for one in diagnosis.candidates]
+    nothing = next(line for line in axes.get_lines() if line.get_label() == "nothing added")
+    assert nothing.get_xdata()[0] == loss_of_nothing(diagnosis) > 10.0 * diagnosis.candidates[0].loss
+    assert axes.get_yticklabels()[0].get_text() == "camera roll"
+    assert dots[0].get_label() == "added"
+
+
+def test_every_frame_kept_aside_is_in_the_figure_of_errors(diagnosis, figures, clean):
+    for axes, error in zip(figures["camera_error"].axes, (diagnosis.pixels, diagnosis.grey), strict=True):
+        before, after = (line for line in axes.get_lines() if line.get_marker() == ".")
+        known = np.isfinite(error.before.frames)
+        assert sorted(before.get_ydata()) == list(before.get_ydata())
+        assert sorted(before.get_ydata()) == pytest.approx(sorted(error.before.frames[known]))
+        assert sorted(after.get_ydata()) == pytest.approx(sorted(error.after.frames[known]))
+    (axes, _) = camera_figures(clean)["camera_error"].axes
+    assert [line.get_marker() for line in axes.get_lines()].count(".") == 1
+
+
+def test_a_line_beside_its_place_is_told_in_millimetres_and_by_side(diagnosis):
+    lines = (
+        LaidLine("yellow line", 3, -0.006, (-0.008, -0.004)),
+        LaidLine("yellow dashes", 1, 0.004, (0.002, 0.006)),
+    )
+    none = Estimate(0.0, (-0.001, 0.001), "m")
+    turned = Estimate(0.5, (0.4, 0.6), "deg")
+    laid = LaidMap(
+        {"x_m": none, "heading_deg": turned}, lines, {"white lines": Estimate(-0.003, (-0.004, -0.002), "m")}
+    )
+    told = camera_notes(replace(diagnosis, laid=laid))
+    assert "the yellow line of stretch 3 lies 6 mm (4 to 8) to the left of its place, driving counter-clockwise" in told
+    assert "the yellow dashes of stretch 1 lie 4 mm (2 to 6) ahead of their place, driving counter-clockwise" in told
+    assert "white lines are 3.0 mm narrower than on the map" in told
+    assert "the whole map lies off by 0.50° in heading" in told
+
+
+def test_what_covers_the_lens_is_told_with_its_place(diagnosis):
+    told = camera_notes(replace(diagnosis, blemishes=(Blemish((60, 95), (60, 71), 0.0, 0.05),)))
+    assert "something covers the lower right of the picture: columns 60 to 95, rows 60 to 71 of 96 × 72" in told
+
+
+def test_the_headline_says_what_a_verdict_means(clean):
+    assert camera_headline("mine", clean) == "mine: camera: nothing missing: the declared camera explains the frames"
+
+
+def test_something_left_over_is_told_in_pixels(diagnosis):
+    gate = replace(diagnosis.gates[0], nats=100.0, share=0.2)
+    still_open = replace(diagnosis, gates=(gate, gate))
+    (note,) = [line for line in camera_notes(still_open) if line.startswith("left over")]
+    assert f"{diagnosis.gates[0].rms_px:.2f} px" in note
+    assert "no physics yet" in note

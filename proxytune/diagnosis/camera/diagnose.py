@@ -93,9 +93,8 @@ def _conclude(found: _Found, notes: tuple[str, ...], seed: int) -> CameraDiagnos
     grey = compare_brightness(found.gathered, named, (before, after), seed)
     geometric = [_geometric(named, effect, ratios[effect]) for effect in named.effects]
     effects = [effect for effect in geometric if effect.error_without >= MATERIAL]
-    effects += [
-        CameraEffect(name, _names(look, name), None, grey.before.value / grey.after.value, ()) for name in changes
-    ]
+    brighter = grey.before.value / max(grey.after.value, 1e-9)
+    effects += [CameraEffect(effect, _names(look, effect), None, brighter, ()) for effect in added]
     gates = (find_leftover(named.declared), find_leftover(named.model))
     hidden = _hidden(found)
     return CameraDiagnosis(

@@ -49,7 +49,7 @@ ROUGH = 0.06
 SLOW = 5.0
 """Edges that all move alike to this tell nothing of blur [pixel/s]."""
 
-WIDEST = (0.04, 0.01)
+WIDEST = (0.06, 0.01)
 """Intervals of blur [s] and defocus that still tell something."""
 
 

@@ -1,5 +1,6 @@
-"""The figures and sentences of a camera's diagnosis, on frames whose camera is known."""
+"""The document, figures and sentences of a camera's diagnosis, on frames whose camera is known."""
 
+import math
 import sys
 import warnings
 from dataclasses import replace
@@ -18,6 +19,7 @@ from proxytune.diagnosis.camera.result import LaidLine, LaidMap
 from proxytune.diagnosis.result import Estimate
 from proxytune.logs import read_log
 from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure, measured_displacements
+from proxytune.report.diagnosis.camera.document import camera_document
 from proxytune.report.diagnosis.camera.figures import camera_figures, loss_of_nothing
 from proxytune.report.diagnosis.camera.markings_figure import outline_field
 from proxytune.report.diagnosis.camera.models import camera_models
@@ -51,6 +53,38 @@ def figures(diagnosis):
         for figure in drawn.values():
             figure.draw_without_rendering()
     return drawn
+
+
+def leaves(value):
+    if isinstance(value, dict | list):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from leaves(one)
+    else:
+        yield value
+
+
+def test_every_number_of_the_document_is_plain_and_finite(diagnosis):
+    blemish = Blemish((np.int64(3), 9), (2, 8), np.float32(0.5), 0.01)
+    endless = {"camera_roll": Estimate(4.0, (-np.inf, np.float64(np.nan)), "deg")}
+    document = camera_document(replace(diagnosis, theta=endless, blemishes=(blemish,)))
+    assert document["effects"][0]["parameters"]["camera_roll"]["interval"] == [None, None]
+    told = list(leaves(document))
+    assert {type(leaf) for leaf in told} <= {float, int, str, bool, type(None)}
+    assert all(math.isfinite(leaf) for leaf in told if isinstance(leaf, float))
+    assert sum(isinstance(leaf, float) for leaf in told) > 50
+
+
+def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis):
+    (roll,) = diagnosis.effects
+    document = camera_document(replace(diagnosis, effects=(), immaterial=(roll,), theta={}))
+    low, high = document["immaterial"][0]["parameters"]["camera_roll"]["interval"]
+    assert low < 4.0 < high < 6.0
+
+
+def test_brightness_has_no_floor_where_none_is_known(diagnosis):
+    document = camera_document(diagnosis)
+    assert document["grey_error"]["noise_floor"] is None
+    assert 0.0 < document["error"]["noise_floor"] <= document["error"]["after"]
 
 
 def test_there_are_four_figures_for_a_column(figures):

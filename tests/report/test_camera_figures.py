@@ -15,7 +15,7 @@ from pictured import ROBOT, lane_poses, write_still_frames
 
 from proxytune.diagnosis.camera.blemishes import Blemish
 from proxytune.diagnosis.camera.diagnose import diagnose_camera
-from proxytune.diagnosis.camera.result import LaidLine, LaidMap
+from proxytune.diagnosis.camera.result import CameraEffect, LaidLine, LaidMap
 from proxytune.diagnosis.result import Estimate
 from proxytune.logs import read_log
 from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure, measured_displacements
@@ -193,3 +193,16 @@ def test_something_left_over_is_told_in_pixels(diagnosis):
     (note,) = [line for line in camera_notes(still_open) if line.startswith("left over")]
     assert f"{diagnosis.gates[0].rms_px:.2f} px" in note
     assert "no physics yet" in note
+
+
+def test_effects_on_the_look_alone_are_told_together(diagnosis):
+    looks = tuple(CameraEffect(name, (name,), None, 1.25, ()) for name in ("defocus", "vignetting"))
+    told = camera_notes(replace(diagnosis, effects=(*diagnosis.effects, *looks)))
+    assert "added defocus and vignetting: without them the error in brightness grows by 25 %" in told
+    assert sum(line.startswith("added") for line in told) == 2
+
+
+def test_rivals_are_told_with_what_was_added(diagnosis):
+    (roll,) = diagnosis.effects
+    told = camera_notes(replace(diagnosis, effects=(replace(roll, rivals=("camera_yaw", "heading_offset")),)))
+    assert told[0].endswith("; these frames fit camera_yaw, heading_offset as well")

@@ -8,13 +8,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.diagnose import camera_effects
-from proxytune.diagnosis.camera.drawing import draw_pictures
-from proxytune.diagnosis.camera.edges import Edges
 from proxytune.diagnosis.camera.gathering import read_road
-from proxytune.diagnosis.camera.optics import Optics
-from proxytune.diagnosis.camera.projection import neutral_state
-from proxytune.diagnosis.camera.tracks import track_frames
-from proxytune.diagnosis.camera.views import Views
+from proxytune.diagnosis.camera.measured.edges import Edges
+from proxytune.diagnosis.camera.measured.tracks import track_frames
+from proxytune.diagnosis.camera.model.drawing import draw_pictures
+from proxytune.diagnosis.camera.model.optics import Optics
+from proxytune.diagnosis.camera.model.projection import neutral_state
+from proxytune.diagnosis.camera.model.views import Views
 from proxytune.driving.cameras import ground_points
 from proxytune.driving.road.markings import Markings
 from proxytune.driving.robot import Robot

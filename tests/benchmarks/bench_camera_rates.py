@@ -49,7 +49,7 @@ def line(answer: Answer) -> str:
 
 def report(answers: Sequence[Answer]) -> str:
     """The rates and what was said of what."""
-    lines = [f"{name}: {rate}" for name, rate in rates(answers).items()]
+    lines = [f"{name}: {rate}" for name, rate in rates(answers).items() if rate.of]
     held = [f"  {name}: {rate}" for name, rate in coverage(answers).items()]
     table = ("intervals that hold the truth:", *held, "", confusion(answers))
     return "\n".join((f"{len(answers)} sets", *lines, "", *table))

@@ -13,8 +13,8 @@ sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
 from pictured import ROBOT, lane_poses, write_still_frames
 
-from proxytune.diagnosis.camera.blemishes import Blemish
 from proxytune.diagnosis.camera.diagnose import diagnose_camera
+from proxytune.diagnosis.camera.look.blemishes import Blemish
 from proxytune.diagnosis.camera.result import CameraEffect, LaidLine, LaidMap
 from proxytune.diagnosis.result import Estimate
 from proxytune.logs import read_log

@@ -3,17 +3,17 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from proxytune.diagnosis.camera.appearance import Appearance, look_at, matters
-from proxytune.diagnosis.camera.checks import check_match, matched_share
-from proxytune.diagnosis.camera.comparing import compare_brightness, compare_displacement
-from proxytune.diagnosis.camera.fitting import CameraFit
-from proxytune.diagnosis.camera.gate import Leftover, find_leftover
+from proxytune.diagnosis.camera.error.comparing import compare_brightness, compare_displacement
 from proxytune.diagnosis.camera.gathering import Gathered, gather_views
 from proxytune.diagnosis.camera.laying import TWO_SIDED, describe_map
-from proxytune.diagnosis.camera.naming import Named, fit_everything, name_camera_effects
-from proxytune.diagnosis.camera.optics import DISTORTION, MOVING, READOUT, effects_of
+from proxytune.diagnosis.camera.look.appearance import Appearance, changes, look_at
+from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.optics import DISTORTION, MOVING, READOUT, effects_of
+from proxytune.diagnosis.camera.naming.checks import check_match, matched_share
+from proxytune.diagnosis.camera.naming.gate import Leftover, find_leftover
+from proxytune.diagnosis.camera.naming.search import Named, fit_everything, name_camera_effects
+from proxytune.diagnosis.camera.naming.visibility import ALWAYS, hidden_effects, next_views
 from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect
-from proxytune.diagnosis.camera.visibility import ALWAYS, hidden_effects, next_views
 from proxytune.diagnosis.result import Estimate
 from proxytune.driving.robot import Robot
 from proxytune.effects import DECLARED, Catalogue, Stage, effect_of
@@ -88,21 +88,20 @@ def _parameters(gathered: Gathered, frames: Frames) -> tuple[tuple[str, ...], Ma
 def _conclude(found: _Found, notes: tuple[str, ...], seed: int) -> CameraDiagnosis:
     named, look = found.named, found.look
     pixels, ratios = compare_displacement(named, seed)
-    changes = _changes(look, found.declared)
-    before, after = _look_before(found), _look_before(found) | _values(look, changes)
+    added = tuple(effect for effect in changes(look) if effect not in found.declared)
+    before, after = _look_before(found), _look_before(found) | _values(look, added)
     grey = compare_brightness(found.gathered, named, (before, after), seed)
     geometric = [_geometric(named, effect, ratios[effect]) for effect in named.effects]
     effects = [effect for effect in geometric if effect.error_without >= MATERIAL]
-    effects += [
-        CameraEffect(name, _names(look, name), None, grey.before.value / grey.after.value, ()) for name in changes
-    ]
+    brighter = grey.before.value / max(grey.after.value, 1e-9)
+    effects += [CameraEffect(effect, _names(look, effect), None, brighter, ()) for effect in added]
     gates = (find_leftover(named.declared), find_leftover(named.model))
     hidden = _hidden(found)
     return CameraDiagnosis(
         verdict=_verdict(gates[1], look, named=bool(effects)),
         declared=_estimates(named.declared, found.declared) | _figures(look, _tuned(look, found.declared)),
         theta=_estimates(named.model, (*found.declared, *(effect.effect for effect in effects)))
-        | _figures(look, (*_tuned(look, found.declared), *(name for one in changes for name in _names(look, one)))),
+        | _figures(look, (*_tuned(look, found.declared), *(name for one in added for name in _names(look, one)))),
         effects=tuple(effects),
         immaterial=tuple(effect for effect in geometric if effect.error_without < MATERIAL),
         candidates=named.alone,
@@ -130,12 +129,6 @@ def _geometric(named: Named, effect: str, ratio: float) -> CameraEffect:
     others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
     always = (ALWAYS[effect],) if effect in ALWAYS else ()
     return CameraEffect(effect, names, loss, ratio, (*always, *sorted(others)))
-
-
-def _changes(look: Appearance, declared: Sequence[str]) -> tuple[str, ...]:
-    """Effects on pictures that were not declared, and that these pictures need."""
-    needed = effects_of(tuple(name for name, figure in look.figures.items() if matters(name, figure)))
-    return tuple(effect for effect in needed if effect not in declared)
 
 
 def _names(look: Appearance, effect: str) -> tuple[str, ...]:

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.edges import find_edges
-from proxytune.diagnosis.camera.optics import Optics
-from proxytune.diagnosis.camera.tracks import track_frames
-from proxytune.diagnosis.camera.views import Views
+from proxytune.diagnosis.camera.measured.edges import find_edges
+from proxytune.diagnosis.camera.measured.tracks import track_frames
+from proxytune.diagnosis.camera.model.optics import Optics
+from proxytune.diagnosis.camera.model.views import Views
 from proxytune.driving.road.maps import Road
 from proxytune.driving.road.markings import Markings
 from proxytune.driving.road.reading import read_map, shipped_map

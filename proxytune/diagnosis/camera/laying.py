@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from proxytune.diagnosis.camera.fitting import CameraFit
+from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.views import Tape
 from proxytune.diagnosis.camera.result import LaidLine, LaidMap
-from proxytune.diagnosis.camera.views import Tape
 from proxytune.diagnosis.result import Estimate
 from proxytune.driving.road.markings import LINES
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.blemishes import Blemish
-from proxytune.diagnosis.camera.choice import Subset
-from proxytune.diagnosis.camera.gate import Leftover
+from proxytune.diagnosis.camera.error.unseen import PictureError
 from proxytune.diagnosis.camera.gathering import Gathered
-from proxytune.diagnosis.camera.naming import Named
-from proxytune.diagnosis.camera.unseen import PictureError
+from proxytune.diagnosis.camera.look.blemishes import Blemish
+from proxytune.diagnosis.camera.naming.choice import Subset
+from proxytune.diagnosis.camera.naming.gate import Leftover
+from proxytune.diagnosis.camera.naming.search import Named
 from proxytune.diagnosis.result import Estimate
 
 Floats = NDArray[np.float64]

@@ -51,10 +51,11 @@ class Rate:
 
 
 def rates(answers: Sequence[Answer]) -> dict[str, Rate]:
-    """How often the diagnosis is right, by what was wrong with the camera."""
-    whole = [one for one in answers if not one.outside]
+    """How often the diagnosis is right, by what was wrong with the camera; those that failed count for that alone."""
+    sound = [one for one in answers if not one.problem]
+    whole = [one for one in sound if not one.outside]
     clean = [one for one in whole if not one.missing]
-    outside = [one for one in answers if one.outside]
+    outside = [one for one in sound if one.outside]
     pairs = [one for one in whole if len(one.missing) > 1]
     lone = [one for one in whole if len(one.missing) == 1]
     told = {}

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from proxytune.diagnosis.camera.blemishes import Blemish
-from proxytune.diagnosis.camera.gate import Leftover
 from proxytune.diagnosis.camera.laying import TWO_SIDED
+from proxytune.diagnosis.camera.look.blemishes import Blemish
+from proxytune.diagnosis.camera.naming.gate import Leftover
 from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect, Comparison, LaidMap
 from proxytune.diagnosis.result import Estimate
 

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.camera.choice import LEAST_NATS, rank_subsets
-from proxytune.diagnosis.camera.optics import effects_of
+from proxytune.diagnosis.camera.model.optics import effects_of
+from proxytune.diagnosis.camera.naming.choice import LEAST_NATS, rank_subsets
 from proxytune.diagnosis.camera.result import CameraDiagnosis, Comparison
 from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure
 from proxytune.report.diagnosis.camera.markings_figure import markings_figure

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.edges import Edges
-from proxytune.diagnosis.camera.fitting import CameraFit
-from proxytune.diagnosis.camera.projection import project
+from proxytune.diagnosis.camera.measured.edges import Edges
+from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.projection import project
 from proxytune.diagnosis.camera.result import CameraDiagnosis
 from proxytune.report.diagnosis.camera.models import COLOURS, camera_models, label_places
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from proxytune.diagnosis.camera.blemishes import Blemish
+from proxytune.diagnosis.camera.look.blemishes import Blemish
 from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect, LaidLine, LaidMap
 from proxytune.diagnosis.result import Estimate
 from proxytune.report.diagnosis.camera.document import dropped_values

@@ -5,8 +5,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from proxytune.diagnosis.camera.fitting import CameraFit
-from proxytune.diagnosis.camera.optics import LATENCY, MOVING, READOUT, effects_of
+from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.optics import LATENCY, MOVING, READOUT, effects_of
 from proxytune.effects import effect_of
 
 ALWAYS: Mapping[str, str] = MappingProxyType(

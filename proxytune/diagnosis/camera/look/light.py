@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,13 +122,14 @@ def fit_light(
     """
     means = _means(measured, predicted, floor)
     if means.frame.size == 0:
-        neutral = (Fitted(value, ends, False) for value, ends in zip((1.0, 1.0, 0.0), RANGES, strict=True))
-        return Light(*neutral, np.ones(len(measured)))
+        gain, gamma, vignetting = (Fitted(*figure, False) for figure in zip((1.0, 1.0, 0.0), RANGES, strict=True))
+        return Light(gain, gamma, vignetting, np.ones(len(measured)))
     best, gains = _fit(means, fixed_exposure)
     half = _half_intervals(means, best, lambda kept: _fit(kept, fixed_exposure)[0], len(measured))
     levels = np.ones(len(measured))
     levels[: len(gains)] = gains
-    return Light(*(_fitted(*figure) for figure in zip(best, half, RANGES, WIDEST, strict=True)), levels)
+    gain, gamma, vignetting = (_fitted(*figure) for figure in zip(best, half, RANGES, WIDEST, strict=True))
+    return Light(gain, gamma, vignetting, levels)
 
 
 def _half_intervals(means: "_Means", best: Floats, fit: Callable[["_Means"], Floats], frames: int) -> Floats:
@@ -161,16 +162,7 @@ def _fitted(value: float, half: float, ends: tuple[float, float], widest: float)
 
 
 class _Means(NamedTuple):
-    """Mean brightness of places alike: of one frame, paint, ring and colour channel.
-
-    Attributes:
-        frame: Its number (M,).
-        paint: Number in PAINTS (M,).
-        colour: Number of the channel (M,).
-        squared_radius: Mean of the squared radius (M,).
-        log_grey: Logarithm of the mean share of full brightness (M,).
-        weight: Of each mean (M,).
-    """
+    """Mean brightness of places alike (M,): of one frame, paint (number in PAINTS), colour channel and ring."""
 
     frame: NDArray[np.intp]
     paint: NDArray[np.intp]
@@ -179,8 +171,9 @@ class _Means(NamedTuple):
     log_grey: Floats
     weight: Floats
 
-    def without(self, drop: NDArray[np.bool_]) -> "_Means":
-        return _Means(*(values[~drop] for values in self))
+    def without(self, drop: NDArray[np.bool_]) -> Self:
+        kept: Any = (values[~drop] for values in self)
+        return type(self)(*kept)
 
 
 def _means(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_]) -> _Means:

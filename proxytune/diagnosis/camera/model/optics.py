@@ -15,8 +15,9 @@ MOVING = (LATENCY, READOUT)
 
 DISTORTION = "lens_distortion"
 
-SPREAD = 0.2
-"""Standard deviation that is expected of a parameter, as a share of its range: it decides what views cannot."""
+SPREAD = 0.4
+"""Standard deviation that is expected of a parameter, as a share of the way to the farther end of its range: it decides
+what views cannot."""
 
 STEP = 1e-4
 """How far a parameter is moved for a derivative, as a share of its range."""
@@ -59,7 +60,8 @@ class Optics:
 
     def spread(self, name: str) -> float:
         """How far a parameter may be expected from its neutral value, as a standard deviation."""
-        return SPREAD * self._range(name)
+        parameter, neutral = self.robot.catalogue.parameters[name], self.neutral(name)
+        return SPREAD * max(parameter.high - neutral, neutral - parameter.low)
 
     def step(self, name: str) -> float:
         """How far a parameter is moved for a derivative."""

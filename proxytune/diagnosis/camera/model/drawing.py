@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.optics import LATENCY, READOUT
-from proxytune.diagnosis.camera.projection import State
-from proxytune.diagnosis.camera.views import Views
+from proxytune.diagnosis.camera.model.optics import LATENCY, READOUT
+from proxytune.diagnosis.camera.model.projection import State
+from proxytune.diagnosis.camera.model.views import Views
 from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.road.texture import draw_floor
 from proxytune.effects import Setting, Stage, effects_from, stage_chain

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.edges import Edges
-from proxytune.diagnosis.camera.optics import Optics
-from proxytune.diagnosis.camera.tracks import Tracks
+from proxytune.diagnosis.camera.measured.edges import Edges
+from proxytune.diagnosis.camera.measured.tracks import Tracks
+from proxytune.diagnosis.camera.model.optics import Optics
 from proxytune.driving.road.markings import LINES, Markings
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.fitting import CameraFit
-from proxytune.diagnosis.camera.optics import effects_of
+from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.optics import effects_of
 
 Floats = NDArray[np.float64]
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from proxytune.diagnosis.camera.choice import LEAST_NATS, MOST, TRIED, Subset, rank_subsets
-from proxytune.diagnosis.camera.fitting import EVIDENCE, SCALE_PX, CameraFit, fit_camera
-from proxytune.diagnosis.camera.optics import MOVING, effects_of
-from proxytune.diagnosis.camera.projection import neutral_state, project
-from proxytune.diagnosis.camera.scatter import PASSES, pose_scatter
-from proxytune.diagnosis.camera.views import Views
+from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, CameraFit, fit_camera
+from proxytune.diagnosis.camera.model.optics import MOVING, effects_of
+from proxytune.diagnosis.camera.model.projection import neutral_state, project
+from proxytune.diagnosis.camera.model.scatter import PASSES, pose_scatter
+from proxytune.diagnosis.camera.model.views import Views
+from proxytune.diagnosis.camera.naming.choice import LEAST_NATS, MOST, TRIED, Subset, rank_subsets
 
 FIRST = ("camera_pitch", "camera_roll", "camera_yaw", "camera_height", "field_of_view")
 """What is fitted first, from far away: nothing of it stands in for something else."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from proxytune.diagnosis.camera.fitting import CameraFit
+from proxytune.diagnosis.camera.model.fitting import CameraFit
 
 PASSES = 2
 """The scatter is estimated so many times over, each with poses fitted under the one before."""

@@ -1,12 +1,13 @@
 """The noise of a camera's pixels, told from the texture of the floor."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.light import MARGIN, Fitted, Floats, Pictures, flat_places
+from proxytune.diagnosis.camera.look.light import MARGIN, Fitted, Floats, Pictures, flat_places
 
 BANDS = 6
 """Bands of rows that are compared: a floor's texture changes with distance, noise does not."""
@@ -32,8 +33,8 @@ class Grain:
     """How noisy the pixels are.
 
     Attributes:
-        noise: Standard deviation of a pixel as it is logged [grey level]. Where it is not identified, only the interval's
-            upper end says something: the floor's texture may be all that was seen.
+        noise: Standard deviation of a pixel as it is logged [grey level]. Where it is not identified, only the
+            interval's upper end says something: the floor's texture may be all that was seen.
         still_pairs: How many pairs of frames from the same place it was taken from; 0 where the robot never stood.
     """
 
@@ -69,8 +70,8 @@ def _noise(low: float, best: float, high: float) -> Fitted:
 
 
 def _still_variances(measured: Pictures, predicted: NDArray[Any], paint: NDArray[np.int8]) -> Floats:
-    """Variance of a pixel between each two successive frames from the same place; the same frame twice tells nothing."""
-    moved = [np.abs(after - before).mean() for before, after in zip(predicted[:-1], predicted[1:], strict=True)]
+    """Variance of a pixel between successive frames from the same place; the same frame twice tells nothing."""
+    moved = [np.abs(after - before).mean() for before, after in pairwise(predicted)]
     variances = []
     for first in np.flatnonzero(np.array(moved) < STILL):
         change = measured[first + 1].astype(float) - measured[first]

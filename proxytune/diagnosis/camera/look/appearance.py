@@ -6,15 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.blemishes import Blemish, find_blemishes
-from proxytune.diagnosis.camera.drawing import draw_pictures
-from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.camera.gathering import Gathered
-from proxytune.diagnosis.camera.grain import Grain, fit_grain
-from proxytune.diagnosis.camera.light import Fitted, Light, fit_light
-from proxytune.diagnosis.camera.projection import pose_slopes, project
-from proxytune.diagnosis.camera.sharpness import Edges, Sharpness, fit_sharpness
+from proxytune.diagnosis.camera.look.blemishes import Blemish, find_blemishes
+from proxytune.diagnosis.camera.look.grain import Grain, fit_grain
+from proxytune.diagnosis.camera.look.light import Fitted, Light, fit_light
+from proxytune.diagnosis.camera.look.sharpness import Edges, Sharpness, fit_sharpness
+from proxytune.diagnosis.camera.model.drawing import NOISE, draw_pictures
+from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.projection import pose_slopes, project
 from proxytune.driving.cameras import ground_points
+from proxytune.effects import effect_of
 
 SHARP_PX = 2.0
 """Edges that lie farther from the map's are not those that the model draws."""
@@ -56,11 +57,14 @@ LEAST: Mapping[str, tuple[float, float]] = {
     "vignetting": (0.0, 0.05),
     "exposure.gain": (1.0, 0.08),
     "exposure.gamma": (1.0, 0.1),
-    "image_noise": (0.0, 1.5),
-    "defocus": (0.0, 0.004),
+    "image_noise": (0.0, 2.0),
+    "defocus": (0.0, 0.006),
     "blur": (0.0, 0.01),
 }
 """The neutral value of each, and how far from it a figure must lie to matter for what an agent sees."""
+
+NARROW = 0.12
+"""Half of an interval of gain or gamma that is found only where every paint is as declared."""
 
 
 def look_at(gathered: Gathered, fit: CameraFit) -> Appearance:
@@ -86,11 +90,28 @@ def floor_pixels(fit: CameraFit) -> NDArray[np.bool_]:
     return np.asarray(on_floor & below)
 
 
-def matters(name: str, figure: Fitted) -> bool:
-    """Whether a figure is told, differs from its neutral value beyond doubt, and by enough to matter."""
+def changes(look: Appearance) -> tuple[str, ...]:
+    """The effects on pictures that there is no doubt of, and that matter, by name.
+
+    Exposure is told where every paint says the same of it: else the paint may be another than the map declares. Noise
+    is told by its size: no floor's texture is so strong everywhere.
+    """
+    names = [name for name in look.figures if _matters(name, look.figures[name])]
+    exposure = [name for name in look.figures if name.startswith("exposure.")]
+    if any(_half(look.figures[name]) > NARROW for name in exposure):
+        names = [name for name in names if name not in exposure]
+    return tuple(dict.fromkeys(effect_of(name) for name in names))
+
+
+def _matters(name: str, figure: Fitted) -> bool:
     neutral, least = LEAST[name]
     low, high = figure.interval
-    return figure.identified and not low <= neutral <= high and abs(figure.value - neutral) >= least
+    sure = name == NOISE or (figure.identified and not low <= neutral <= high)
+    return sure and abs(figure.value - neutral) >= least
+
+
+def _half(figure: Fitted) -> float:
+    return (figure.interval[1] - figure.interval[0]) / 2.0
 
 
 def _soft(blur_s: float, defocus: float) -> dict[str, float]:

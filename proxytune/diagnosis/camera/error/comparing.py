@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.appearance import floor_pixels
-from proxytune.diagnosis.camera.drawing import Pictures, draw_pictures
-from proxytune.diagnosis.camera.fitting import CameraFit, fit_camera
+from proxytune.diagnosis.camera.error.unseen import FOLDS, SCALES, error_over, fit_poses, pixel_errors, unseen_residuals
 from proxytune.diagnosis.camera.gathering import Gathered
-from proxytune.diagnosis.camera.naming import Named, fit_set
-from proxytune.diagnosis.camera.optics import effects_of
+from proxytune.diagnosis.camera.look.appearance import floor_pixels
+from proxytune.diagnosis.camera.model.drawing import Pictures, draw_pictures
+from proxytune.diagnosis.camera.model.fitting import CameraFit, fit_camera
+from proxytune.diagnosis.camera.model.optics import effects_of
+from proxytune.diagnosis.camera.naming.search import Named, fit_set
 from proxytune.diagnosis.camera.result import Comparison
-from proxytune.diagnosis.camera.unseen import FOLDS, SCALES, error_over, fit_poses, pixel_errors, unseen_residuals
 
 Floats = NDArray[np.float64]
 

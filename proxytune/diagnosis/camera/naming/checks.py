@@ -6,11 +6,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from proxytune.diagnosis.camera.edges import Edges
-from proxytune.diagnosis.camera.fitting import CameraFit, fit_camera
-from proxytune.diagnosis.camera.naming import FAR, FIRST
-from proxytune.diagnosis.camera.projection import neutral_state, project
-from proxytune.diagnosis.camera.views import Views
+from proxytune.diagnosis.camera.measured.edges import Edges
+from proxytune.diagnosis.camera.model.fitting import CameraFit, fit_camera
+from proxytune.diagnosis.camera.model.projection import neutral_state, project
+from proxytune.diagnosis.camera.model.views import Views
+from proxytune.diagnosis.camera.naming.search import FAR, FIRST
 from proxytune.errors import LogError
 
 MATCHED_PX = 2.0

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.fitting import EVIDENCE, SCALE_PX, CameraFit, Normal, common_slopes, robust_weight
-from proxytune.diagnosis.camera.projection import pose_slopes, project
-from proxytune.diagnosis.camera.views import MAP_SCATTER, Views
+from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, CameraFit, Normal, common_slopes, robust_weight
+from proxytune.diagnosis.camera.model.projection import pose_slopes, project
+from proxytune.diagnosis.camera.model.views import MAP_SCATTER, Views
 
 Floats = NDArray[np.float64]
 
@@ -17,10 +17,10 @@ POWERS = tuple((right, down) for right in range(4) for down in range(4) if right
 FIELD_PX = 1.0
 """Standard deviation that each term's coefficient is expected to have [pixel]."""
 
-LEAST_NATS = 12.0
+LEAST_NATS = 2.5
 """A field that explains less on frames that it was not fitted to is chance."""
 
-LEAST_SHARE = 0.03
+LEAST_SHARE = 0.035
 """A field that explains a smaller share of the cost is of no matter."""
 
 LEAST_PX = 0.1

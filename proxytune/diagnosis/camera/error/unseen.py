@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.fitting import EVIDENCE, SCALE_PX, Normal, fit_camera, robust_weight
-from proxytune.diagnosis.camera.projection import State, pose_slopes, project
-from proxytune.diagnosis.camera.views import Views
+from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, Normal, fit_camera, robust_weight
+from proxytune.diagnosis.camera.model.projection import State, pose_slopes, project
+from proxytune.diagnosis.camera.model.views import Views
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.optics import LATENCY, READOUT
-from proxytune.diagnosis.camera.views import Tape, Views
+from proxytune.diagnosis.camera.model.optics import LATENCY, READOUT
+from proxytune.diagnosis.camera.model.views import Tape, Views
 from proxytune.driving.cameras import CameraFigures, floor_points
 from proxytune.driving.road.markings import LINES, Marks
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.projection import (
+from proxytune.diagnosis.camera.model.projection import (
     Projection,
     State,
     camera_slopes,
@@ -16,7 +16,7 @@ from proxytune.diagnosis.camera.projection import (
     project,
     tape_slopes,
 )
-from proxytune.diagnosis.camera.views import MAP_SCATTER, Tape, Views
+from proxytune.diagnosis.camera.model.views import MAP_SCATTER, Tape, Views
 
 Floats = NDArray[np.float64]
 

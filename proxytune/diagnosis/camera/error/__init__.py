@@ -1,0 +1,1 @@
+"""Errors on frames that were not fitted."""

@@ -1,0 +1,1 @@
+"""Brightness, sharpness, noise and blemishes of pictures."""

@@ -1,0 +1,1 @@
+"""What frames show, and where they were taken."""

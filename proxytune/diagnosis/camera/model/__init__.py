@@ -1,0 +1,1 @@
+"""The camera, the tape, the map and the poses, fitted together; and the pictures of a fitted camera."""

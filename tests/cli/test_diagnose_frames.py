@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -112,20 +111,6 @@ def test_where_there_is_no_motion_the_top_of_the_document_is_the_camera_s(found)
     assert document["motion_refused"] is None
 
 
-def test_every_number_of_the_document_is_plain_and_finite(found):
-    def walk(value):
-        if isinstance(value, dict | list):
-            for one in value.values() if isinstance(value, dict) else value:
-                yield from walk(one)
-        else:
-            yield value
-
-    leaves = list(walk(found.document["camera"]))
-    assert {type(leaf) for leaf in leaves} <= {float, int, str, bool, type(None)}
-    assert all(math.isfinite(leaf) for leaf in leaves if isinstance(leaf, float))
-    assert sum(isinstance(leaf, float) for leaf in leaves) > 50
-
-
 def test_model_toml_holds_the_camera_with_intervals_and_says_the_verdict(found):
     model = read_model(found.folder / "model.toml")
     told = found.document["camera"]["effects"][0]["parameters"]["camera_roll"]
@@ -213,8 +198,8 @@ def test_motion_and_camera_come_out_in_one_document_one_model_and_one_folder(tmp
 
 def test_progress_of_both_goes_from_motion_to_the_camera(tmp_path):
     shares = _shares(read_log(short_drives(tmp_path / "log")))
-    assert list(shares.values()) == sorted(shares.values()) or shares["drawing"] == max(shares.values())
     assert shares["testing on drives kept aside"] < shares["reading frames"] < shares["testing on frames kept aside"]
+    assert shares["drawing"] == max(shares.values()) < 1.0
 
 
 @pytest.mark.slow

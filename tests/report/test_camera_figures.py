@@ -1,5 +1,6 @@
-"""The figures and sentences of a camera's diagnosis, on frames whose camera is known."""
+"""The document, figures and sentences of a camera's diagnosis, on frames whose camera is known."""
 
+import math
 import sys
 import warnings
 from dataclasses import replace
@@ -14,10 +15,11 @@ from pictured import ROBOT, lane_poses, write_still_frames
 
 from proxytune.diagnosis.camera.diagnose import diagnose_camera
 from proxytune.diagnosis.camera.look.blemishes import Blemish
-from proxytune.diagnosis.camera.result import LaidLine, LaidMap
+from proxytune.diagnosis.camera.result import CameraEffect, LaidLine, LaidMap
 from proxytune.diagnosis.result import Estimate
 from proxytune.logs import read_log
 from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure, measured_displacements
+from proxytune.report.diagnosis.camera.document import camera_document
 from proxytune.report.diagnosis.camera.figures import camera_figures, loss_of_nothing
 from proxytune.report.diagnosis.camera.markings_figure import outline_field
 from proxytune.report.diagnosis.camera.models import camera_models
@@ -51,6 +53,38 @@ def figures(diagnosis):
         for figure in drawn.values():
             figure.draw_without_rendering()
     return drawn
+
+
+def leaves(value):
+    if isinstance(value, dict | list):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from leaves(one)
+    else:
+        yield value
+
+
+def test_every_number_of_the_document_is_plain_and_finite(diagnosis):
+    blemish = Blemish((np.int64(3), 9), (2, 8), np.float32(0.5), 0.01)
+    endless = {"camera_roll": Estimate(4.0, (-np.inf, np.float64(np.nan)), "deg")}
+    document = camera_document(replace(diagnosis, theta=endless, blemishes=(blemish,)))
+    assert document["effects"][0]["parameters"]["camera_roll"]["interval"] == [None, None]
+    told = list(leaves(document))
+    assert {type(leaf) for leaf in told} <= {float, int, str, bool, type(None)}
+    assert all(math.isfinite(leaf) for leaf in told if isinstance(leaf, float))
+    assert sum(isinstance(leaf, float) for leaf in told) > 50
+
+
+def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis):
+    (roll,) = diagnosis.effects
+    document = camera_document(replace(diagnosis, effects=(), immaterial=(roll,), theta={}))
+    low, high = document["immaterial"][0]["parameters"]["camera_roll"]["interval"]
+    assert low < 4.0 < high < 6.0
+
+
+def test_brightness_has_no_floor_where_none_is_known(diagnosis):
+    document = camera_document(diagnosis)
+    assert document["grey_error"]["noise_floor"] is None
+    assert 0.0 < document["error"]["noise_floor"] <= document["error"]["after"]
 
 
 def test_there_are_four_figures_for_a_column(figures):
@@ -159,3 +193,16 @@ def test_something_left_over_is_told_in_pixels(diagnosis):
     (note,) = [line for line in camera_notes(still_open) if line.startswith("left over")]
     assert f"{diagnosis.gates[0].rms_px:.2f} px" in note
     assert "no physics yet" in note
+
+
+def test_effects_on_the_look_alone_are_told_together(diagnosis):
+    looks = tuple(CameraEffect(name, (name,), None, 1.25, ()) for name in ("defocus", "vignetting"))
+    told = camera_notes(replace(diagnosis, effects=(*diagnosis.effects, *looks)))
+    assert "added defocus and vignetting: without them the error in brightness grows by 25 %" in told
+    assert sum(line.startswith("added") for line in told) == 2
+
+
+def test_rivals_are_told_with_what_was_added(diagnosis):
+    (roll,) = diagnosis.effects
+    told = camera_notes(replace(diagnosis, effects=(replace(roll, rivals=("camera_yaw", "heading_offset")),)))
+    assert told[0].endswith("; these frames fit camera_yaw, heading_offset as well")

@@ -21,6 +21,11 @@ MOST_LINES = 3
 WIDER_M = 0.002
 """Tape is told to be wider or narrower than on the map from here on."""
 
+RELATIVE = (
+    "exposure is relative to the map's declared paint: it makes pictures match, and is no figure of the camera where "
+    "the paint is not known"
+)
+
 
 def camera_headline(log: str, diagnosis: CameraDiagnosis) -> str:
     """The verdict on the camera and what it means."""
@@ -29,15 +34,13 @@ def camera_headline(log: str, diagnosis: CameraDiagnosis) -> str:
 
 def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
-    lines = [_say_added(effect) for effect in diagnosis.effects]
+    lines = _say_added(diagnosis.effects)
     dropped = dropped_values(diagnosis)
     lines += [_say_immaterial(effect, dropped) for effect in diagnosis.immaterial]
     lines += _say_left_over(diagnosis)
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
     lines += [_say_blemish(blemish, rows, columns) for blemish in diagnosis.blemishes]
-    if any(name.startswith("exposure") for name in diagnosis.theta):
-        lines.append("exposure is relative to the map's declared paint: it makes pictures match, and is no figure of")
-        lines[-1] += " the camera where the paint is not known"
+    lines += [RELATIVE] if any(name.startswith("exposure") for name in diagnosis.theta) else []
     lines += _say_map(diagnosis.laid)
     if diagnosis.could_not_be_seen:
         lines.append(f"these frames could not have shown: {', '.join(diagnosis.could_not_be_seen)}")
@@ -45,11 +48,20 @@ def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
     return lines + list(diagnosis.notes)
 
 
-def _say_added(effect: CameraEffect) -> str:
+def _say_added(effects: tuple[CameraEffect, ...]) -> list[str]:
+    """A line for each effect that moves markings, and one for all that change only how the pictures look."""
+    looks = [effect for effect in effects if effect.nats is None]
+    lines = [_say_moving(effect, effect.nats) for effect in effects if effect.nats is not None]
+    if looks:
+        names, them = listed([effect.effect for effect in looks]), "it" if len(looks) == 1 else "them"
+        lines.append(f"added {names}: without {them} the error in brightness grows by {_growth(looks[0])} %")
+    return lines
+
+
+def _say_moving(effect: CameraEffect, nats: float) -> str:
     beside = f"; these frames fit {', '.join(effect.rivals)} as well" if effect.rivals else ""
-    kind = "the error in brightness" if effect.nats is None else "the displacement of markings"
-    gain = "" if effect.nats is None else f"log-likelihood gain {effect.nats:.0f} nats, "
-    return f"added {effect.effect}: {gain}without it {kind} grows by {_growth(effect)} %{beside}"
+    worth = f"log-likelihood gain {nats:.0f} nats, without it the displacement of markings grows by {_growth(effect)} %"
+    return f"added {effect.effect}: {worth}{beside}"
 
 
 def _say_immaterial(effect: CameraEffect, values: Mapping[str, Estimate]) -> str:

@@ -1,22 +1,17 @@
 """From a log's frames to a verdict on the camera: tuned, tested, named, and the error before and after."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
-from proxytune.diagnosis.camera.error.comparing import compare_brightness, compare_displacement
+from proxytune.diagnosis.camera.conclusion import Evidence, conclude
+from proxytune.diagnosis.camera.error.weighing import weigh_effects
 from proxytune.diagnosis.camera.gathering import Gathered, gather_views
-from proxytune.diagnosis.camera.laying import TWO_SIDED, describe_map
-from proxytune.diagnosis.camera.look.appearance import Appearance, changes, look_at
-from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.look.appearance import look_at
 from proxytune.diagnosis.camera.model.optics import DISTORTION, MOVING, READOUT, effects_of
-from proxytune.diagnosis.camera.naming.checks import check_match, matched_share
-from proxytune.diagnosis.camera.naming.gate import Leftover, find_leftover
-from proxytune.diagnosis.camera.naming.search import Named, fit_everything, name_camera_effects
-from proxytune.diagnosis.camera.naming.visibility import ALWAYS, hidden_effects, next_views
-from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect
-from proxytune.diagnosis.result import Estimate
+from proxytune.diagnosis.camera.naming.checks import check_match
+from proxytune.diagnosis.camera.naming.search import fit_everything, name_camera_effects
+from proxytune.diagnosis.camera.result import CameraDiagnosis
 from proxytune.driving.robot import Robot
-from proxytune.effects import DECLARED, Catalogue, Stage, effect_of
+from proxytune.effects import DECLARED, Catalogue, Stage
 from proxytune.errors import LogError
 from proxytune.logs import Frames, Log
 
@@ -60,20 +55,11 @@ def diagnose_camera(
     notes = check_match(log.name, full)
     report("looking for what the camera lacks")
     named = name_camera_effects(full, [effect for effect in declared if effect in effects_of(names)])
-    report("looking at brightness and sharpness")
-    look = look_at(gathered, named.model)
     report("testing on frames kept aside")
-    return _conclude(_Found(gathered, named, look, tuple(declared)), notes, seed)
-
-
-@dataclass(frozen=True)
-class _Found:
-    """What the steps of a diagnosis came to."""
-
-    gathered: Gathered
-    named: Named
-    look: Appearance
-    declared: tuple[str, ...]
+    weighed = weigh_effects(named, seed)
+    report("looking at brightness and sharpness")
+    look = look_at(gathered, weighed.named.model)
+    return conclude(Evidence(gathered, weighed, look, tuple(declared), notes), seed)
 
 
 def _parameters(gathered: Gathered, frames: Frames) -> tuple[tuple[str, ...], Mapping[str, float]]:
@@ -83,98 +69,3 @@ def _parameters(gathered: Gathered, frames: Frames) -> tuple[tuple[str, ...], Ma
     fixed = {} if frames.readout_s is None else {READOUT: frames.readout_s}
     names += [name for name in MOVING if views.tracks.moving and name not in fixed]
     return tuple(names), fixed
-
-
-def _conclude(found: _Found, notes: tuple[str, ...], seed: int) -> CameraDiagnosis:
-    named, look = found.named, found.look
-    pixels, ratios = compare_displacement(named, seed)
-    added = tuple(effect for effect in changes(look) if effect not in found.declared)
-    before, after = _look_before(found), _look_before(found) | _values(look, added)
-    grey = compare_brightness(found.gathered, named, (before, after), seed)
-    geometric = [_geometric(named, effect, ratios[effect]) for effect in named.effects]
-    effects = [effect for effect in geometric if effect.error_without >= MATERIAL]
-    brighter = grey.before.value / max(grey.after.value, 1e-9)
-    effects += [CameraEffect(effect, _names(look, effect), None, brighter, ()) for effect in added]
-    gates = (find_leftover(named.declared), find_leftover(named.model))
-    hidden = _hidden(found)
-    return CameraDiagnosis(
-        verdict=_verdict(gates[1], look, named=bool(effects)),
-        declared=_estimates(named.declared, found.declared) | _figures(look, _tuned(look, found.declared)),
-        theta=_estimates(named.model, (*found.declared, *(effect.effect for effect in effects)))
-        | _figures(look, (*_tuned(look, found.declared), *(name for one in added for name in _names(look, one)))),
-        effects=tuple(effects),
-        immaterial=tuple(effect for effect in geometric if effect.error_without < MATERIAL),
-        candidates=named.alone,
-        pixels=pixels,
-        grey=grey,
-        gates=gates,
-        blemishes=look.blemishes,
-        could_not_be_seen=hidden,
-        next_views=next_views(hidden, repeated=look.grain.still_pairs > 0),
-        laid=describe_map(named.model),
-        matched=matched_share(named.model),
-        notes=notes,
-        named=named,
-        gathered=found.gathered,
-    )
-
-
-MATERIAL = 1.03
-"""An effect matters if the error without it is larger by this factor."""
-
-
-def _geometric(named: Named, effect: str, ratio: float) -> CameraEffect:
-    names = tuple(name for name in named.full.names if effect_of(name) == effect)
-    loss = next(one.loss for one in named.losses if effect not in one.effects)
-    others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
-    always = (ALWAYS[effect],) if effect in ALWAYS else ()
-    return CameraEffect(effect, names, loss, ratio, (*always, *sorted(others)))
-
-
-def _names(look: Appearance, effect: str) -> tuple[str, ...]:
-    return tuple(name for name in look.figures if effect_of(name) == effect)
-
-
-def _tuned(look: Appearance, declared: Sequence[str]) -> tuple[str, ...]:
-    """Declared figures of the pictures' look that these frames can tell."""
-    return tuple(name for name, one in look.figures.items() if effect_of(name) in declared and one.identified)
-
-
-def _look_before(found: _Found) -> dict[str, float]:
-    return {name: found.look.figures[name].value for name in _tuned(found.look, found.declared)}
-
-
-def _values(look: Appearance, effects: Sequence[str]) -> dict[str, float]:
-    return {name: look.figures[name].value for effect in effects for name in _names(look, effect)}
-
-
-def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:
-    units = {"blur": "s", "image_noise": "grey level"}
-    return {
-        name: Estimate(look.figures[name].value, look.figures[name].interval, units.get(name, "")) for name in names
-    }
-
-
-def _estimates(fit: CameraFit, effects: Sequence[str]) -> dict[str, Estimate]:
-    """Values with their intervals, of the parameters that were free."""
-    parameters = fit.views.optics.robot.catalogue.parameters
-    known = {}
-    for name, sd in zip(fit.names, fit.sd, strict=True):
-        if effect_of(name) in effects:
-            value = fit.theta[name]
-            known[name] = Estimate(value, (value - TWO_SIDED * sd, value + TWO_SIDED * sd), parameters[name].unit)
-    return known
-
-
-def _hidden(found: _Found) -> tuple[str, ...]:
-    """Effects that could not be seen, or that there were no means to."""
-    fitted = effects_of(found.named.model.names)
-    hidden = [effect for effect in hidden_effects(found.named.full, fitted) if effect not in fitted]
-    dark = [name for name, figure in found.look.figures.items() if not figure.identified]
-    return effects_of((*hidden, *dark))
-
-
-def _verdict(gate: Leftover, look: Appearance, *, named: bool) -> str:
-    if gate.open or look.blemishes:
-        return "partly explained" if named else "unexplained"
-    return "explained" if named else "nothing missing"

@@ -25,14 +25,15 @@ class CameraEffect:
         effect: Its name.
         names: Its parameters by name in θ.
         nats: What leaving it out costs, None for what shows in brightness or sharpness.
-        error_without: Error on unseen frames without it over the error with it.
+        error_without: Error on unseen frames without it over the error with it; None for noise, which no
+            model predicts.
         rivals: Effects, the tracker's among them, that explain the same pictures.
     """
 
     effect: str
     names: tuple[str, ...]
     nats: float | None
-    error_without: float
+    error_without: float | None
     rivals: tuple[str, ...]
 
 
@@ -43,13 +44,13 @@ class Comparison:
     Attributes:
         before: Of the declared model.
         after: Of the model with the effects that were found.
-        floor: Of the most flexible camera there is: what no camera could remove.
+        floor: Of the most flexible camera there is, what no camera could remove; None where none is known.
         unit: "px" or "grey levels".
     """
 
     before: PictureError
     after: PictureError
-    floor: PictureError
+    floor: PictureError | None
     unit: str
 
 

@@ -1,11 +1,19 @@
 """Errors of cameras on frames that they were not fitted to: displacement of markings, and brightness of the floor."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.error.unseen import FOLDS, SCALES, error_over, fit_poses, pixel_errors, unseen_residuals
+from proxytune.diagnosis.camera.error.unseen import (
+    FOLDS,
+    SCALES,
+    PictureError,
+    error_over,
+    fit_poses,
+    pixel_errors,
+    unseen_residuals,
+)
 from proxytune.diagnosis.camera.gathering import Gathered
 from proxytune.diagnosis.camera.look.appearance import floor_pixels
 from proxytune.diagnosis.camera.model.drawing import Pictures, draw_pictures
@@ -13,6 +21,7 @@ from proxytune.diagnosis.camera.model.fitting import CameraFit, fit_camera
 from proxytune.diagnosis.camera.model.optics import effects_of
 from proxytune.diagnosis.camera.naming.search import Named, fit_set
 from proxytune.diagnosis.camera.result import Comparison
+from proxytune.effects import effect_of
 
 Floats = NDArray[np.float64]
 
@@ -38,34 +47,45 @@ def compare_displacement(named: Named, seed: int) -> tuple[Comparison, dict[str,
     return Comparison(before, after, lowest, "px"), ratios
 
 
-def compare_brightness(gathered: Gathered, named: Named, looks: tuple[Look, Look], seed: int) -> Comparison:
-    """Differences of brightness on the floor, of a third of the frames, before and after.
+def compare_brightness(
+    gathered: Gathered, named: Named, looks: tuple[Look, Look], seed: int
+) -> tuple[Comparison, dict[str, float]]:
+    """Differences of brightness on the floor, of a third of the frames, and the error without each effect.
 
     Args:
         gathered: The measured pictures.
         named: The cameras that were fitted.
         looks: Effects on pictures before and after.
         seed: Of the bootstrap.
+
+    Returns:
+        The errors before and after, and by effect that was added the error without it over the error with all.
     """
     out = np.arange(named.full.views.count) % FOLDS == 0
-    errors = [
-        _grey_errors(gathered, fit, look, out) for fit, look in zip((named.declared, named.model), looks, strict=True)
-    ]
-    before, after = (error_over(sums, counts, seed) for sums, counts in errors)
-    return Comparison(before, after, after if after.value < before.value else before, "grey levels")
+    plain, full = looks
+    added = [effect for effect in effects_of(tuple(full)) if effect not in effects_of(tuple(plain))]
+    without = [{name: value for name, value in full.items() if effect_of(name) != effect} for effect in added]
+    before = _grey_errors(gathered, named.declared, [plain], out, seed)[0]
+    after, *others = _grey_errors(gathered, named.model, [full, *without], out, seed)
+    ratios = {effect: one.value / max(after.value, 1e-9) for effect, one in zip(added, others, strict=True)}
+    return Comparison(before, after, None, "grey levels"), ratios
 
 
-def _grey_errors(gathered: Gathered, fit: CameraFit, look: Look, out: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Sums of the floor's differences and how many pixels they are of, for each frame left out."""
+def _grey_errors(
+    gathered: Gathered, fit: CameraFit, looks: Sequence[Look], out: NDArray[np.bool_], seed: int
+) -> list[PictureError]:
+    """Errors of frames left out (N,), by a camera that was fitted without them, for each look."""
     views, frames = fit.views, np.flatnonzero(out)
     state = fit_poses(views, fit_camera(views, fit.state, fit.names, SCALES, ~out).state, out)
-    drawn = draw_pictures(views, state, look, frames)
-    measured = gathered.pictures[frames].astype(np.float32)
-    floor = floor_pixels(fit)
-    if not gathered.frames.fixed_exposure:
-        drawn = drawn * _levels(measured, drawn, floor)
-    differences = np.abs(measured - np.clip(drawn, 0.0, 255.0)).mean(axis=-1)[:, floor]
-    return differences.sum(axis=1).astype(float), np.full(len(frames), float(floor.sum()))
+    measured, floor = gathered.pictures[frames].astype(np.float32), floor_pixels(fit)
+    counts, errors = np.full(len(frames), float(floor.sum())), []
+    for look in looks:
+        drawn = draw_pictures(views, state, look, frames)
+        if not gathered.frames.fixed_exposure:
+            drawn = drawn * _levels(measured, drawn, floor)
+        differences = np.abs(measured - np.clip(drawn, 0.0, 255.0)).mean(axis=-1)[:, floor]
+        errors.append(error_over(differences.sum(axis=1).astype(float), counts, seed))
+    return errors
 
 
 def _levels(measured: Pictures, drawn: Pictures, floor: NDArray[np.bool_]) -> Pictures:

@@ -79,7 +79,8 @@ def look_at(gathered: Gathered, fit: CameraFit) -> Appearance:
         lambda blur, defocus: light.shine(draw_pictures(fit.views, fit.state, _soft(blur, defocus), every)),
     )
     grain = fit_grain(gathered.pictures, drawn, floor)
-    return Appearance(light, grain, sharpness, find_blemishes(gathered.pictures, drawn, floor, light))
+    soft = draw_pictures(fit.views, fit.state, _soft(sharpness.blur.value, sharpness.defocus.value), every)
+    return Appearance(light, grain, sharpness, find_blemishes(gathered.pictures, soft, floor, light))
 
 
 def floor_pixels(fit: CameraFit) -> NDArray[np.bool_]:
@@ -106,7 +107,7 @@ def changes(look: Appearance) -> tuple[str, ...]:
 def _matters(name: str, figure: Fitted) -> bool:
     neutral, least = LEAST[name]
     low, high = figure.interval
-    sure = name == NOISE or (figure.identified and not low <= neutral <= high)
+    sure = name == NOISE or not low <= neutral <= high
     return sure and abs(figure.value - neutral) >= least
 
 

@@ -42,8 +42,15 @@ scatter spoil the first contrast, not this one."""
 SURE = 3.0
 """Standard deviations by which the contrast must be below that."""
 
+PARTS = 3
+"""Parts of the log, one after another, each of which must show that a place is hidden: one odd passage is none."""
+
 SMALLEST = 7
 """Windows that a blemish has at least."""
+
+LEAST_SHARE = 0.004
+"""Share of the picture that the largest blemish covers, less than a spot of 10 pixels across: smaller ones alone are
+stains of the floor that few passages showed."""
 
 ROUNDS = 5
 """Rounds of reweighting."""
@@ -81,22 +88,33 @@ def find_blemishes(
         light: What fit_light says.
     """
     contrast, error, variation = _contrast(measured, predicted, floor, light)
-    known = np.isfinite(contrast)
-    if not known.any():
+    if not np.isfinite(contrast).any():
         return ()
     left = _against_usual(contrast)
-    hidden = known & (left + SURE * error < HIDDEN) & (_against_usual(variation) < SUBDUED)
+    hidden = (left + SURE * error < HIDDEN) & (_against_usual(variation) < SUBDUED)
+    for third in np.array_split(np.arange(len(measured)), PARTS):
+        hidden &= ~_follows(measured[third], predicted[third], floor, light.only(third))
     parts, _ = label(hidden, structure=np.ones((3, 3)))
     blemishes = [
         _blemish(parts == number, place, left, floor.shape)
         for number, place in enumerate(find_objects(parts), start=1)
         if (parts == number).sum() >= SMALLEST
     ]
-    return tuple(sorted(blemishes, key=lambda blemish: -blemish.share))
+    blemishes.sort(key=lambda blemish: -blemish.share)
+    return tuple(blemishes) if blemishes and blemishes[0].share >= LEAST_SHARE else ()
+
+
+def _follows(measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], light: Light) -> NDArray[np.bool_]:
+    """Windows whose brightness follows what is drawn in some of the frames; not where these do not show it."""
+    contrast, _, variation = _contrast(measured, predicted, floor, light, FEWEST // PARTS)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((_against_usual(contrast) > HIDDEN) | (_against_usual(variation) > HIDDEN))
 
 
 def _against_usual(contrast: Singles) -> Singles:
     """Each window's contrast over that of its neighbourhood."""
+    if not np.isfinite(contrast).any():
+        return contrast
     filled = np.where(np.isfinite(contrast), contrast, np.nanmedian(contrast))
     usual = median_filter(filled, AROUND, mode="nearest")
     return np.asarray(contrast / np.maximum(usual, 0.5), dtype=np.float32)
@@ -115,7 +133,7 @@ def _blemish(
 
 
 def _contrast(
-    measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], light: Light
+    measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], light: Light, fewest: int = FEWEST
 ) -> tuple[Singles, Singles, Singles]:
     """How the measured brightness of each window follows the expected one over the frames; NaN if unknown.
 
@@ -123,13 +141,14 @@ def _contrast(
         The slope, its standard error, and the standard deviation of the measured over that of the expected.
     """
     green = np.ascontiguousarray(predicted[..., 1], dtype=np.float32)
-    expected, logged = _windows(light.shine(green)), _windows(measured[..., 1].astype(np.float32))
+    level = light.levels.astype(np.float32)[:, None, None]
+    expected, logged = (_windows(one) / level for one in (light.shine(green), measured[..., 1].astype(np.float32)))
     on_map = minimum_filter(green, (0, WINDOW, WINDOW))[:, ::STEP, ::STEP] > DARKEST
     weight = on_map.astype(np.float32)
     slope, error = _regress(expected, logged, weight)
     spread = _spread(expected, weight)
     judged = minimum_filter(floor, WINDOW + 2 * HORIZON)[::STEP, ::STEP]
-    judged &= (spread > VARIED) & (on_map.sum(axis=0) >= FEWEST)
+    judged &= (spread > VARIED) & (on_map.sum(axis=0) >= fewest)
     variation = _spread(logged, weight) / np.maximum(spread, 1e-3)
     return np.where(judged, slope, np.nan), error, np.where(judged, variation, np.nan)
 

@@ -1,7 +1,7 @@
 """How a camera's brightness differs from the drawn frames': exposure and vignetting."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -82,6 +82,10 @@ class Light:
     gamma: Fitted
     vignetting: Fitted
     levels: Floats
+
+    def only(self, frames: NDArray[np.intp]) -> "Light":
+        """The light of some frames."""
+        return replace(self, levels=self.levels[frames])
 
     def shine(self, predicted: NDArray[Any]) -> NDArray[np.float32]:
         """What a camera of this light logs of drawn frames (N, rows, columns[, colours]), before it is rounded."""

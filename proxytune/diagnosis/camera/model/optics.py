@@ -63,18 +63,16 @@ class Optics:
         parameter, neutral = self.robot.catalogue.parameters[name], self.neutral(name)
         return SPREAD * max(parameter.high - neutral, neutral - parameter.low)
 
-    def step(self, name: str) -> float:
-        """How far a parameter is moved for a derivative."""
-        return STEP * self._range(name)
+    def step(self, name: str, value: float) -> float:
+        """How far a parameter is moved from a value for a derivative, away from the end of its range."""
+        parameter = self.robot.catalogue.parameters[name]
+        step = STEP * (parameter.high - parameter.low)
+        return step if value + step <= parameter.high else -step
 
     def clipped(self, name: str, value: float) -> float:
         """The nearest value within the parameter's bounds."""
         parameter = self.robot.catalogue.parameters[name]
         return min(max(value, parameter.low), parameter.high)
-
-    def _range(self, name: str) -> float:
-        parameter = self.robot.catalogue.parameters[name]
-        return parameter.high - parameter.low
 
 
 def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -83,7 +83,7 @@ def _system(fit: CameraFit, half: NDArray[np.bool_]) -> tuple[Floats, Floats, fl
     chosen = np.flatnonzero(weight > 1e-4)
     terms = _terms(*_places(views))[chosen]
     normal = views.edges.normal[chosen]
-    field = np.concatenate((-normal[:, :1] * terms, -normal[:, 1:] * terms), axis=1)
+    field = np.concatenate((normal[:, :1] * terms, normal[:, 1:] * terms), axis=1)
     columns = np.concatenate((field, common_slopes(views, fit.state, there, names)[chosen]), axis=1)
     residual, counted = there.residual[chosen], EVIDENCE * weight[chosen]
     normal_equations = Normal.of(columns, pose_slopes(there)[chosen], residual, counted)

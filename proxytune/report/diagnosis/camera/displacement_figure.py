@@ -88,7 +88,7 @@ def _field(diagnosis: CameraDiagnosis, gate: Leftover, places: Floats) -> Arrows
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
     right, down = (2.0 * places / (columns, rows) - 1.0).T
     # The gate's field is how far the model lies from the markings
-    return Arrows(places, -gate.displacement(right, down))
+    return Arrows(places, gate.displacement(right, down))
 
 
 def _say(gate: Leftover) -> str:

@@ -74,14 +74,13 @@ def _effect(effect: CameraEffect, diagnosis: CameraDiagnosis, theta: Mapping[str
         "parameters": {own[name]: _estimate(theta[name]) for name in effect.names if name in theta},
         "held_out_gain": None if effect.nats is None else _number(effect.nats),
         "indistinguishable_from": list(effect.rivals),
-        "error_without": _number(effect.error_without),
+        "error_without": _number(effect.error_without) if effect.error_without is not None else None,
     }
 
 
 def noise_floor(error: Comparison) -> float | None:
-    """The error that no camera could remove; None where only the two cameras' own errors are known."""
-    known = error.unit == "px" or not any(error.floor is own for own in (error.before, error.after))
-    return _number(error.floor.value) if known else None
+    """The error that no camera could remove; None where it is not known."""
+    return None if error.floor is None else _number(error.floor.value)
 
 
 def _comparison(error: Comparison) -> dict[str, Any]:

@@ -75,7 +75,8 @@ def _errors(diagnosis: CameraDiagnosis) -> Figure:
     bent = [effect.effect for effect in diagnosis.effects if effect.nats is not None]
     every = [effect.effect for effect in diagnosis.effects]
     _draw_frames(place, diagnosis.pixels, bent)
-    place.axhline(diagnosis.pixels.floor.value, color=GREEN, lw=1.4, label="floor: any camera, mean")
+    if diagnosis.pixels.floor is not None:
+        place.axhline(diagnosis.pixels.floor.value, color=GREEN, lw=1.4, label="floor: any camera, mean")
     _draw_frames(grey, diagnosis.grey, every)
     place.set_ylabel("displacement of markings [px]", fontsize=8)
     grey.set_ylabel("difference in brightness [grey levels]", fontsize=8)

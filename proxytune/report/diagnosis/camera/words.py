@@ -49,13 +49,8 @@ def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
 
 
 def _say_added(effects: tuple[CameraEffect, ...]) -> list[str]:
-    """A line for each effect that moves markings, and one for all that change only how the pictures look."""
-    looks = [effect for effect in effects if effect.nats is None]
-    lines = [_say_moving(effect, effect.nats) for effect in effects if effect.nats is not None]
-    if looks:
-        names, them = listed([effect.effect for effect in looks]), "it" if len(looks) == 1 else "them"
-        lines.append(f"added {names}: without {them} the error in brightness grows by {_growth(looks[0])} %")
-    return lines
+    """A line for each effect."""
+    return [_say_look(effect) if effect.nats is None else _say_moving(effect, effect.nats) for effect in effects]
 
 
 def _say_moving(effect: CameraEffect, nats: float) -> str:
@@ -71,7 +66,16 @@ def _say_immaterial(effect: CameraEffect, values: Mapping[str, Estimate]) -> str
     return f"detectable but immaterial: {effect.effect}{value}, {change}"
 
 
+def _say_look(effect: CameraEffect) -> str:
+    beside = f"; {', '.join(effect.rivals)} looks like it" if effect.rivals else ""
+    if effect.error_without is None:
+        return f"added {effect.effect}, which no model can predict pixel by pixel{beside}"
+    return f"added {effect.effect}: without it the error in brightness grows by {_growth(effect)} %{beside}"
+
+
 def _growth(effect: CameraEffect) -> str:
+    if effect.error_without is None:
+        return "an unknown number of"
     return fixed(100.0 * (effect.error_without - 1.0), 0 if effect.error_without > 1.1 else 1)
 
 

@@ -195,11 +195,13 @@ def test_something_left_over_is_told_in_pixels(diagnosis):
     assert "no physics yet" in note
 
 
-def test_effects_on_the_look_alone_are_told_together(diagnosis):
-    looks = tuple(CameraEffect(name, (name,), None, 1.25, ()) for name in ("defocus", "vignetting"))
+def test_each_effect_on_the_look_is_told_with_its_own_worth(diagnosis):
+    sizes = {"defocus": 1.25, "vignetting": 1.5, "image_noise": None}
+    looks = tuple(CameraEffect(name, (name,), None, size, ()) for name, size in sizes.items())
     told = camera_notes(replace(diagnosis, effects=(*diagnosis.effects, *looks)))
-    assert "added defocus and vignetting: without them the error in brightness grows by 25 %" in told
-    assert sum(line.startswith("added") for line in told) == 2
+    assert "added defocus: without it the error in brightness grows by 25 %" in told
+    assert "added vignetting: without it the error in brightness grows by 50 %" in told
+    assert "added image_noise, which no model can predict pixel by pixel" in told
 
 
 def test_rivals_are_told_with_what_was_added(diagnosis):

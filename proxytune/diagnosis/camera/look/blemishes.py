@@ -48,8 +48,8 @@ PARTS = 3
 SMALLEST = 7
 """Windows that a blemish has at least."""
 
-LEAST_SHARE = 0.004
-"""Share of the picture that the largest blemish covers, less than a spot of 10 pixels across: smaller ones alone are
+LEAST_SHARE = 0.0022
+"""Share of the picture that the largest blemish covers, half of a spot of 10 pixels across: smaller ones alone are
 stains of the floor that few passages showed."""
 
 ROUNDS = 5

@@ -16,6 +16,7 @@ from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.road.lane import lane_point, lane_pose, off_map
 from proxytune.driving.road.maps import Road
 from proxytune.driving.task import start_pose
+from proxytune.effects.sight.shutter import Blur, RollingShutter
 from proxytune.errors import EpisodeError
 from proxytune.logs import LogEpisode
 
@@ -37,7 +38,7 @@ class FilmedDrive(NamedTuple):
 
     Attributes:
         episode: Commands, and the measured pose at each.
-        times: When each picture was finished (n,) [s]: with a blur of b seconds its light is b / 2 older in the mean.
+        times: Middle of each exposure (n,) [s]: half the blur and half the readout before the picture was finished.
         pictures: Red, green and blue (n, rows, columns, 3), all effects of the instance in them.
     """
 
@@ -108,7 +109,7 @@ def _in_other_lane(road: Road, pose: Floats) -> Floats:
 
 
 def _instants(instance: Instance, driven: Drive, lap: _Lap) -> tuple[list[int], Floats]:
-    """Control steps at which the newest picture is another one, spread over the drive, and when it was finished [s]."""
+    """Control steps at which the newest picture is another one, spread over the drive, and when it was exposed [s]."""
     hold, every = (round(TICK_HZ / instance.robot.figures[rate]) for rate in ("control_rate", "camera_rate"))
     finished = np.arange(len(driven.commands)) * hold // every * every
     fresh = np.flatnonzero(np.diff(finished, prepend=0) > 0)
@@ -119,4 +120,11 @@ def _instants(instance: Instance, driven: Drive, lap: _Lap) -> tuple[list[int], 
             "pictures; record fewer frames, or correct the model"
         )
     steps = fresh[(np.arange(lap.frames) + 1) * len(fresh) // lap.frames - 1]
-    return steps.tolist(), finished[steps] / TICK_HZ
+    return steps.tolist(), finished[steps] / TICK_HZ - _middle(instance)
+
+
+def _middle(instance: Instance) -> float:
+    """How long before a picture is finished the middle of its exposure is, that of its middle row [s]."""
+    lasting = {Blur.name: "blur", RollingShutter.name: "readout"}
+    parts = [getattr(effect, lasting[effect.name]) for effect in instance.image.effects if effect.name in lasting]
+    return float(sum(parts)) / 2.0

@@ -87,7 +87,7 @@ def test_a_picture_is_the_one_that_an_agent_is_shown_when_it_is_finished(family,
     shape, signal = ticks.shape[1:], ticks.reshape(len(ticks), -1).astype(np.float32)
     memory = instance.image.begin(Setting(60, ticks[0].reshape(-1), instance.robot.figures))
     filtered = np.rint(instance.image.apply(signal, memory)[0])
-    (picture,), tick = taken.pictures, round(float(taken.times[0]) * 60)
+    (picture,), tick = taken.pictures, round((float(taken.times[0]) + 0.07 / 2) * 60)
     np.testing.assert_array_equal(picture, filtered[tick].reshape(shape))
     assert (picture != ticks[tick]).mean() > 0.05
 

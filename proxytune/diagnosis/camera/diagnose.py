@@ -59,7 +59,7 @@ def diagnose_camera(
     weighed = weigh_effects(named, seed)
     report("looking at brightness and sharpness")
     look = look_at(gathered, weighed.named.model)
-    return conclude(Evidence(gathered, weighed, look, tuple(declared), notes), seed)
+    return conclude(Evidence(gathered, weighed, look, tuple(declared), (*gathered.notes, *notes)), seed)
 
 
 def _parameters(gathered: Gathered, frames: Frames) -> tuple[tuple[str, ...], Mapping[str, float]]:

@@ -72,8 +72,9 @@ def conclude(found: Evidence, seed: int) -> CameraDiagnosis:
 
 
 def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
-    """Values of the look's figures, by name in θ."""
-    return {name: look.figures[name].value for name in names}
+    """Values of the look's figures by name in θ, within their bounds."""
+    bounds = {name: (PARAMETERS[name].low, PARAMETERS[name].high) for name in names}
+    return {name: min(max(look.figures[name].value, low), high) for name, (low, high) in bounds.items()}
 
 
 def _geometric(found: Evidence, effects: Sequence[str]) -> tuple[CameraEffect, ...]:
@@ -109,8 +110,8 @@ def _names(look: Appearance, effect: str) -> tuple[str, ...]:
 
 
 def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:
-    figures = {name: look.figures[name] for name in names}
-    return {name: Estimate(one.value, one.interval, PARAMETERS[name].unit) for name, one in figures.items()}
+    values = look_values(look, names)
+    return {name: Estimate(values[name], look.figures[name].interval, PARAMETERS[name].unit) for name in names}
 
 
 def _estimates(fit: CameraFit, effects: Sequence[str]) -> dict[str, Estimate]:

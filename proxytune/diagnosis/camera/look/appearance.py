@@ -15,7 +15,7 @@ from proxytune.diagnosis.camera.model.drawing import NOISE, draw_pictures
 from proxytune.diagnosis.camera.model.fitting import CameraFit
 from proxytune.diagnosis.camera.model.projection import pose_slopes, project
 from proxytune.driving.cameras import ground_points
-from proxytune.effects import effect_of
+from proxytune.effects import PARAMETERS, effect_of
 
 SHARP_PX = 2.0
 """Edges that lie farther from the map's are not those that the model draws."""
@@ -105,10 +105,12 @@ def changes(look: Appearance) -> tuple[str, ...]:
 
 
 def _matters(name: str, figure: Fitted) -> bool:
+    """Whether a figure differs from its neutral value beyond doubt, by enough, and to where a camera's can be."""
     neutral, least = LEAST[name]
     low, high = figure.interval
     sure = name == NOISE or not low <= neutral <= high
-    return sure and abs(figure.value - neutral) >= least
+    possible = PARAMETERS[name].low <= figure.value <= PARAMETERS[name].high
+    return sure and possible and abs(figure.value - neutral) >= least
 
 
 def _half(figure: Fitted) -> float:

@@ -22,6 +22,9 @@ from proxytune.logs import Frames, Log
 
 Report = Callable[[str], None]
 
+MATERIAL = 1.03
+"""An effect matters if the error without it is larger by this factor."""
+
 
 def camera_effects(catalogue: Catalogue) -> tuple[str, ...]:
     """The effects on a camera and its pictures."""
@@ -89,19 +92,18 @@ def _conclude(found: _Found, notes: tuple[str, ...], seed: int) -> CameraDiagnos
     named, look = found.named, found.look
     pixels, ratios = compare_displacement(named, seed)
     added = tuple(effect for effect in changes(look) if effect not in found.declared)
-    before, after = _look_before(found), _look_before(found) | _values(look, added)
-    grey = compare_brightness(found.gathered, named, (before, after), seed)
+    before = _values(look, _tuned(look, found.declared))
+    grey = compare_brightness(found.gathered, named, (before, before | _values(look, _names(look, added))), seed)
     geometric = [_geometric(named, effect, ratios[effect]) for effect in named.effects]
     effects = [effect for effect in geometric if effect.error_without >= MATERIAL]
     brighter = grey.before.value / max(grey.after.value, 1e-9)
-    effects += [CameraEffect(effect, _names(look, effect), None, brighter, ()) for effect in added]
+    effects += [CameraEffect(effect, _names(look, [effect]), None, brighter, ()) for effect in added]
     gates = (find_leftover(named.declared), find_leftover(named.model))
-    hidden = _hidden(found)
+    hidden, model = _hidden(found), (*found.declared, *(effect.effect for effect in effects))
     return CameraDiagnosis(
         verdict=_verdict(gates[1], look, named=bool(effects)),
         declared=_estimates(named.declared, found.declared) | _figures(look, _tuned(look, found.declared)),
-        theta=_estimates(named.model, (*found.declared, *(effect.effect for effect in effects)))
-        | _figures(look, (*_tuned(look, found.declared), *(name for one in added for name in _names(look, one)))),
+        theta=_estimates(named.model, model) | _figures(look, (*_tuned(look, found.declared), *_names(look, added))),
         effects=tuple(effects),
         immaterial=tuple(effect for effect in geometric if effect.error_without < MATERIAL),
         candidates=named.alone,
@@ -119,10 +121,6 @@ def _conclude(found: _Found, notes: tuple[str, ...], seed: int) -> CameraDiagnos
     )
 
 
-MATERIAL = 1.03
-"""An effect matters if the error without it is larger by this factor."""
-
-
 def _geometric(named: Named, effect: str, ratio: float) -> CameraEffect:
     names = tuple(name for name in named.full.names if effect_of(name) == effect)
     loss = next(one.loss for one in named.losses if effect not in one.effects)
@@ -131,8 +129,8 @@ def _geometric(named: Named, effect: str, ratio: float) -> CameraEffect:
     return CameraEffect(effect, names, loss, ratio, (*always, *sorted(others)))
 
 
-def _names(look: Appearance, effect: str) -> tuple[str, ...]:
-    return tuple(name for name in look.figures if effect_of(name) == effect)
+def _names(look: Appearance, effects: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in look.figures if effect_of(name) in effects)
 
 
 def _tuned(look: Appearance, declared: Sequence[str]) -> tuple[str, ...]:
@@ -140,12 +138,8 @@ def _tuned(look: Appearance, declared: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name, one in look.figures.items() if effect_of(name) in declared and one.identified)
 
 
-def _look_before(found: _Found) -> dict[str, float]:
-    return {name: found.look.figures[name].value for name in _tuned(found.look, found.declared)}
-
-
-def _values(look: Appearance, effects: Sequence[str]) -> dict[str, float]:
-    return {name: look.figures[name].value for effect in effects for name in _names(look, effect)}
+def _values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
+    return {name: look.figures[name].value for name in names}
 
 
 def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:

@@ -16,8 +16,8 @@ MOVING = (LATENCY, READOUT)
 DISTORTION = "lens_distortion"
 
 SPREAD = 0.4
-"""Standard deviation that is expected of a parameter, as a share of the way to the farther end of its range: it decides
-what views cannot."""
+"""Standard deviation that is expected of a parameter, as a share of the way to the farther end of its range: a
+weak prior for what views do not tell."""
 
 STEP = 1e-4
 """How far a parameter is moved for a derivative, as a share of its range."""
@@ -54,10 +54,6 @@ class Optics:
         """The value at which a parameter changes nothing."""
         return self.robot.catalogue.parameters[name].neutral_value(self.robot.figures)
 
-    def start(self, name: str) -> float:
-        """The value that the robot states, else the neutral one."""
-        return self.robot.theta.get(name, self.neutral(name))
-
     def spread(self, name: str) -> float:
         """How far a parameter may be expected from its neutral value, as a standard deviation."""
         parameter, neutral = self.robot.catalogue.parameters[name], self.neutral(name)
@@ -65,16 +61,13 @@ class Optics:
 
     def step(self, name: str) -> float:
         """How far a parameter is moved for a derivative."""
-        return STEP * self._range(name)
+        parameter = self.robot.catalogue.parameters[name]
+        return STEP * (parameter.high - parameter.low)
 
     def clipped(self, name: str, value: float) -> float:
         """The nearest value within the parameter's bounds."""
         parameter = self.robot.catalogue.parameters[name]
         return min(max(value, parameter.low), parameter.high)
-
-    def _range(self, name: str) -> float:
-        parameter = self.robot.catalogue.parameters[name]
-        return parameter.high - parameter.low
 
 
 def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:

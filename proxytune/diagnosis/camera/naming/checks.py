@@ -84,8 +84,8 @@ MISTAKES: Mapping[str, Callable[[Views], Views]] = MappingProxyType(
         "heading is clockwise": _posed(lambda poses: poses * (1.0, 1.0, -1.0)),
         "headings are in degrees": _posed(lambda poses: poses * (1.0, 1.0, np.radians(1.0))),
         "x and y are swapped": _posed(lambda poses: poses[:, (1, 0, 2)]),
-        "each frame is one row late": _posed(lambda poses: np.roll(poses, -1, axis=0)),
-        "each frame is one row early": _posed(lambda poses: np.roll(poses, 1, axis=0)),
+        "each frame belongs to the next row": _posed(lambda poses: np.roll(poses, -1, axis=0)),
+        "each frame belongs to the row before": _posed(lambda poses: np.roll(poses, 1, axis=0)),
     }
 )
 """Usual mistakes in logs, and what undoes each."""

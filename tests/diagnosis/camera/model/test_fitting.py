@@ -70,7 +70,7 @@ def test_poses_are_told_better_than_the_tracker_has_them():
     fit = fit_camera(views, at_truth(views), ["camera_roll"], (*FAR, *NEAR))
     exact = stood({"camera_roll": 4.0}, noisy=False).tracks.poses
     before, after = views.tracks.poses - exact, views.tracks.poses + fit.state.poses - exact
-    assert (after.std(axis=0) < 0.7 * before.std(axis=0)).all()
+    assert (after.std(axis=0) < 0.85 * before.std(axis=0)).all()
     assert (fit.pose_sd < (SCATTER[0], *SCATTER)).all()
 
 
@@ -100,12 +100,12 @@ def test_only_the_frames_that_count_are_fitted():
 
 def test_values_end_at_their_bounds_and_not_beyond():
     views = stood({"camera_roll": 9.9}, count=20)
-    turned = replace(views, tracks=replace(views.tracks, poses=views.tracks.poses + (0.0, 0.0, 0.6)))
+    turned = replace(views, tracks=replace(views.tracks, poses=views.tracks.poses + (0.0, 0.0, 0.35)))
     fit = fit_camera(turned, at_truth(turned), ["camera_yaw", "camera_roll"], (*FAR, *FAR))
     for name, value in fit.theta.items():
         parameter = OPTICS.robot.catalogue.parameters[name]
         assert parameter.low <= value <= parameter.high
-    assert fit.theta["camera_yaw"] == pytest.approx(-15.0)
+    assert fit.theta["camera_yaw"] == -15.0
 
 
 def test_what_is_not_named_stays_where_it_was():

@@ -66,7 +66,7 @@ def test_slopes_by_latency_and_readout_are_true(name):
     change = (one.residual * one.metres - other.residual * other.metres) / there.metres / (2.0 * step)
     slope = camera_slopes(views, state, there, [name])[:, 0]
     assert np.quantile(np.abs(change - slope)[same], 0.95) < 0.1 * np.abs(slope[same]).max()
-    assert np.corrcoef(change[same], slope[same])[0, 1] > 0.99
+    assert np.corrcoef(change[same], slope[same])[0, 1] > 0.98
 
 
 @pytest.mark.parametrize("column", range(3))

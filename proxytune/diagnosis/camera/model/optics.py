@@ -59,10 +59,11 @@ class Optics:
         parameter, neutral = self.robot.catalogue.parameters[name], self.neutral(name)
         return SPREAD * max(parameter.high - neutral, neutral - parameter.low)
 
-    def step(self, name: str) -> float:
-        """How far a parameter is moved for a derivative."""
+    def step(self, name: str, value: float) -> float:
+        """How far a parameter is moved from a value for a derivative: up, but down from its upper bound."""
         parameter = self.robot.catalogue.parameters[name]
-        return STEP * (parameter.high - parameter.low)
+        step = STEP * (parameter.high - parameter.low)
+        return step if value + step <= parameter.high else -step
 
     def clipped(self, name: str, value: float) -> float:
         """The nearest value within the parameter's bounds."""

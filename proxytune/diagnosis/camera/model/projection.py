@@ -107,7 +107,7 @@ def camera_slopes(views: Views, state: State, there: Projection, names: Sequence
             motion = (pose_slopes(there) * there.rates).sum(axis=1)
             columns.append(-motion if name == LATENCY else motion * _row_share(views))
             continue
-        step = views.optics.step(name)
+        step = views.optics.step(name, state.theta[name])
         moved = views.optics.figures({**state.theta, name: state.theta[name] + step})
         change = np.nan_to_num((_ground(moved, views, 0.0) - points) / step)
         columns.append((ahead * change).sum(axis=1))

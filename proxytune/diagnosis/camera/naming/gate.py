@@ -49,7 +49,7 @@ class Leftover:
         return self.nats > LEAST_NATS and self.share > LEAST_SHARE and self.rms_px > LEAST_PX
 
     def displacement(self, right: Floats, down: Floats) -> Floats:
-        """How far markings lie from where the model has them [pixel], at places from −1 to 1 across the picture."""
+        """How far the model has markings from where they lie [pixel], at places from −1 to 1 across the picture."""
         return _terms(right, down) @ self.field
 
 

@@ -98,14 +98,15 @@ def test_only_the_frames_that_count_are_fitted():
     np.testing.assert_array_equal(fit.state.poses[~first], 0.0)
 
 
-def test_values_end_at_their_bounds_and_not_beyond():
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_values_end_at_their_bounds_and_not_beyond(way):
     views = stood({"camera_roll": 9.9}, count=20)
-    turned = replace(views, tracks=replace(views.tracks, poses=views.tracks.poses + (0.0, 0.0, 0.35)))
+    turned = replace(views, tracks=replace(views.tracks, poses=views.tracks.poses - (0.0, 0.0, 0.35 * way)))
     fit = fit_camera(turned, at_truth(turned), ["camera_yaw", "camera_roll"], (*FAR, *FAR))
     for name, value in fit.theta.items():
         parameter = OPTICS.robot.catalogue.parameters[name]
         assert parameter.low <= value <= parameter.high
-    assert fit.theta["camera_yaw"] == -15.0
+    assert fit.theta["camera_yaw"] == 15.0 * way
 
 
 def test_what_is_not_named_stays_where_it_was():

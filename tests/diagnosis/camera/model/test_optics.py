@@ -48,8 +48,16 @@ def test_values_are_clipped_to_the_nearest_bound(name, value):
 @given(MOUNTING)
 def test_a_step_is_a_small_part_of_a_spread_and_a_spread_lies_within_the_range(name):
     parameter = PARAMETERS[name]
-    assert 0.0 < OPTICS.step(name) < 0.01 * OPTICS.spread(name)
+    assert 0.0 < OPTICS.step(name, OPTICS.neutral(name)) < 0.01 * OPTICS.spread(name)
     assert OPTICS.spread(name) < parameter.high - parameter.low
+
+
+@given(MOUNTING, st.floats(0.0, 1.0))
+def test_a_step_never_leaves_the_bounds(name, share):
+    """A camera cannot be made beyond them."""
+    parameter = PARAMETERS[name]
+    value = OPTICS.clipped(name, parameter.low + share * (parameter.high - parameter.low))
+    assert parameter.low <= value + OPTICS.step(name, value) <= parameter.high
 
 
 def test_parameters_of_one_effect_are_one_effect():

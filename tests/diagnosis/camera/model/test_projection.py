@@ -49,7 +49,7 @@ def check(views, state, one, other, step, slope):
 @pytest.mark.parametrize("name", OPTICS.mounting)
 def test_slopes_by_the_camera_are_true(name):
     views, state = scene()
-    step = OPTICS.step(name)
+    step = OPTICS.step(name, state.theta[name])
     moved = [replace(state, theta={**state.theta, name: state.theta[name] + way * step}) for way in (1.0, -1.0)]
     check(views, state, *moved, step, camera_slopes(views, state, project(views, state), [name])[:, 0])
 

@@ -24,9 +24,9 @@ def places(views):
 
 
 def bend(views):
-    """Up to 3 pixels to the side, as no lens of the catalogue does it."""
-    right, down = places(views)
-    return 2.0 * (right**2 - 0.3) + 2.0 * right**2 * down, 1.5 * right * (right**2 - 0.6)
+    """A wave of 1.5 pixels up and down across the picture, as no lens of the catalogue has it."""
+    right, _ = places(views)
+    return 0.0 * right, 1.5 * np.sin(3.0 * right)
 
 
 def displaced(views, by):
@@ -58,11 +58,12 @@ def test_a_missing_effect_is_left_over():
 def test_a_bend_that_the_catalogue_does_not_have_is_left_over_with_everything_free():
     leftover = find_leftover(bent())
     assert leftover.open
-    assert leftover.nats > 10.0
+    assert leftover.nats > 5.0
+    assert leftover.share > 0.1
 
 
-def test_the_field_says_where_markings_lie_from_where_the_model_has_them():
-    """Compared along the edges' normals, at points that a fit with nothing free leaves where they are."""
+def test_the_field_says_how_far_the_model_has_markings_from_where_they_lie():
+    """Markings are moved down on the right and up on the left; nothing of the camera is free."""
     views = stood(count=COUNT)
     moved = displaced(views, (0.0 * views.edges.row, 0.8 * places(views)[0]))
     fit = fit_camera(moved, at_truth(moved), [], NEAR)
@@ -70,17 +71,17 @@ def test_the_field_says_where_markings_lie_from_where_the_model_has_them():
     assert leftover.open
     valid = project(moved, fit.state).valid
     found = leftover.displacement(*places(moved))[valid, 1]
-    assert np.corrcoef(found, 0.8 * places(views)[0][valid])[0, 1] > 0.9
+    assert np.corrcoef(found, 0.8 * places(views)[0][valid])[0, 1] < -0.9
     assert leftover.rms_px == pytest.approx(np.sqrt((0.8 * places(views)[0][valid] ** 2).mean()), rel=0.7)
 
 
 def test_tape_beside_its_place_is_nothing_of_the_camera_s():
-    """Each line of each tile 5 mm aside, in poses' own frame: the map is what is changed."""
+    """Each line of each tile is moved by 5 mm along its edges' normals, in pixels of its place."""
     views = replace(stood(count=COUNT), tape_m=0.005)
     shift = np.random.default_rng(1).normal(0.0, 0.005, (4, 40))
     there = project(views, at_truth(views))
     by = shift[there.marks.line, there.marks.stretch] * there.marks.side / there.metres
-    moved = displaced(views, -(views.edges.normal * -by[:, None]).T)
+    moved = displaced(views, (views.edges.normal * by[:, None]).T)
     fit = fit_everything(moved, OPTICS.mounting, {}, learn_scatter=False)
     assert not find_leftover(fit_set(fit, ("camera_pitch",))).open
 

@@ -15,7 +15,7 @@ from proxytune.diagnosis.camera.naming.checks import USUAL_MATCHED, check_match,
 from proxytune.diagnosis.camera.naming.search import fit_everything
 from proxytune.errors import LogError
 
-COUNT = 30
+COUNT = 60
 ROLLED = {"camera_roll": 3.0}
 
 

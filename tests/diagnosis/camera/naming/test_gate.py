@@ -62,17 +62,19 @@ def test_a_bend_that_the_catalogue_does_not_have_is_left_over_with_everything_fr
     assert leftover.share > 0.1
 
 
-def test_the_field_says_how_far_the_model_has_markings_from_where_they_lie():
-    """Markings are moved down on the right and up on the left; nothing of the camera is free."""
+@pytest.mark.parametrize("axis", [0, 1], ids=["right", "down"])
+def test_the_field_says_how_far_the_model_has_markings_from_where_they_lie(axis):
+    """Markings are moved to one side on the right and to the other on the left; nothing of the camera is free."""
     views = stood(count=COUNT)
-    moved = displaced(views, (0.0 * views.edges.row, 0.8 * places(views)[0]))
+    by = 0.8 * places(views)[0]
+    moved = displaced(views, np.eye(2)[axis][:, None] * by)
     fit = fit_camera(moved, at_truth(moved), [], NEAR)
     leftover = find_leftover(fit)
     assert leftover.open
     valid = project(moved, fit.state).valid
-    found = leftover.displacement(*places(moved))[valid, 1]
-    assert np.corrcoef(found, 0.8 * places(views)[0][valid])[0, 1] < -0.9
-    assert leftover.rms_px == pytest.approx(np.sqrt((0.8 * places(views)[0][valid] ** 2).mean()), rel=0.7)
+    found = leftover.displacement(*places(moved))[valid, axis]
+    assert np.corrcoef(found, by[valid])[0, 1] < -0.9
+    assert leftover.rms_px == pytest.approx(np.sqrt((by[valid] ** 2).mean()), rel=0.7)
 
 
 def test_tape_beside_its_place_is_nothing_of_the_camera_s():

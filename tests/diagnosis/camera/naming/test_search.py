@@ -28,7 +28,7 @@ PLANTED = {
 }
 
 
-def on(name, theta, count=40, seed=3):
+def on(name, theta, count=30, seed=3):
     """Views of a shipped map from both lanes, each driven its own way."""
     road, random = shipped_map(name), np.random.default_rng(seed)
     outer = np.arange(count) % 2 == 0

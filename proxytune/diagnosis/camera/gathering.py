@@ -66,7 +66,7 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
         LogError: If too few show markings.
         SettingsError: If the robot has no camera, or the map cannot be read.
     """
-    robot.camera_figures()
+    robot.camera_figures()  # Refuses a robot without a camera before anything is read
     road = read_road(frames.road)
     tracks, numbers = track_frames(log, frames)
     used = _spread(len(numbers), MOST_FRAMES)
@@ -75,7 +75,6 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     edges = find_edges(pictures)
     _check_markings(log, np.bincount(edges.frame, minlength=len(numbers)))
     edges = edges.only(np.arange(len(edges.row)) % EVERY == 0)
-    edges = edges.only(np.argsort(edges.frame, kind="stable"))
     optics = Optics(robot, *pictures.shape[1:3])
     position_m = tracks.share * _stated(frames.position_m, ASSUMED_M)
     heading_rad = tracks.share * np.radians(_stated(frames.heading_deg, ASSUMED_DEG))

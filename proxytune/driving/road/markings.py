@@ -21,7 +21,8 @@ class Marks(NamedTuple):
     """The nearest marking to each of n places.
 
     Attributes:
-        distance: Signed distance from its edge, inside negative (n,) [m].
+        distance: Signed distance from its edge, inside negative (n,) [m]; from a dash's end along the centre line, as
+            it is painted.
         slope: Unit vector in which the distance grows (n, 2).
         stretch: Which of the road's segments it is on (n,).
         line: Which of LINES it is (n,); the ends of dashes are the last.

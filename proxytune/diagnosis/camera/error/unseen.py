@@ -60,7 +60,7 @@ def fit_poses(views: Views, state: State, frames: NDArray[np.bool_]) -> State:
     for scale in np.geomspace(4.0 * SCALE_PX, SCALE_PX, POSE_STEPS):
         there = project(views, state)
         weight = np.where(there.valid & frames[views.edges.frame], robust_weight(there.residual, scale), 0.0)
-        problem = Normal.of(np.zeros((len(weight), 0)), pose_slopes(there), there.residual, EVIDENCE * weight)
+        problem = Normal(np.zeros((len(weight), 0)), pose_slopes(there), there.residual, EVIDENCE * weight)
         own = problem.marginal(views.edges.frame, state.poses, views.pose_scatter)[-1]
         state = replace(state, poses=state.poses - np.where(frames[:, None], own, 0.0))
     return state

@@ -15,7 +15,7 @@ LEAST_SLOPE = 0.15
 """A weaker gradient of whiteness or yellowness, from 0 to 1, is none of a marking [1/pixel]."""
 
 YELLOW = 0.55
-"""How much a yellow marking is bluer than white, as a share of the range from the floor to white."""
+"""How far a yellow marking's blue lies below its red and green, as a share of the range from the floor to white."""
 
 SKY = 40
 """A pixel whose blue is so much above its red [grey levels] is sky; so are those within SKY_MARGIN pixels."""
@@ -49,7 +49,7 @@ class Edges(NamedTuple):
 
 
 def find_edges(pictures: NDArray[np.uint8]) -> Edges:
-    """Find the edges of markings in pictures (N, rows, columns, 3), red, green, blue."""
+    """Find the edges of markings in pictures (N, rows, columns, 3), red, green, blue; sorted by picture."""
     maps = [_colour_maps(picture) for picture in pictures]
     parts = [_edges_of(number, white, one) for number, pair in enumerate(maps) for white, one in pair]
     return Edges._make(np.concatenate(field) for field in zip(*parts, strict=True))

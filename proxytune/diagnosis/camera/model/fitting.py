@@ -106,7 +106,7 @@ def robust_weight(residual: Floats, scale_px: float) -> Floats:
 def _solve(views: Views, state: State, names: tuple[str, ...], there: Projection, weight: Floats) -> _Step:
     chosen = np.flatnonzero(weight > 1e-4)
     columns = common_slopes(views, state, there, names)[chosen]
-    system = Normal.of(columns, pose_slopes(there)[chosen], there.residual[chosen], EVIDENCE * weight[chosen])
+    system = Normal(columns, pose_slopes(there)[chosen], there.residual[chosen], EVIDENCE * weight[chosen])
     frame = views.edges.frame[chosen]
     matrix, right, inverse, coupling, own = system.marginal(frame, state.poses, views.pose_scatter)
     precision, pull = _priors(views, state, names)
@@ -136,15 +136,15 @@ class Normal(NamedTuple):
     residual: Floats
     weight: Floats
 
-    @classmethod
-    def of(cls, columns: Floats, poses: Floats, residual: Floats, weight: Floats) -> "Normal":
-        """The problem with these rows."""
-        return cls(columns, poses, residual, weight)
-
     def marginal(
         self, frame: NDArray[np.intp], corrections: Floats, scatter: Floats
     ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """Normal equations of the common columns with every frame's pose eliminated under its prior.
+
+        Args:
+            frame: Of each row (n,), in ascending order.
+            corrections: What is added to each frame's tracked pose so far (N, 3).
+            scatter: Standard deviations of tracked poses (3,).
 
         Returns:
             Their matrix and right side, the inverse of each pose's block (N, 3, 3), how poses follow the common
@@ -153,17 +153,7 @@ class Normal(NamedTuple):
         weighted = self.columns * self.weight[:, None]
         matrix, right = weighted.T @ self.columns, weighted.T @ self.residual
         count = len(corrections)
-        edges = np.searchsorted(frame, np.arange(count + 1))
-        blocks, cross, pulls = (
-            np.zeros((count, 3, 3)),
-            np.zeros((count, 3, self.columns.shape[1])),
-            np.zeros((count, 3)),
-        )
-        for number in range(count):
-            own = slice(edges[number], edges[number + 1])
-            slopes = self.poses[own] * self.weight[own, None]
-            blocks[number], cross[number] = slopes.T @ self.poses[own], slopes.T @ self.columns[own]
-            pulls[number] = slopes.T @ self.residual[own]
+        blocks, cross, pulls = self._by_frame(frame, count)
         blocks[:, (0, 1, 2), (0, 1, 2)] += 1.0 / scatter**2
         pulls += corrections / scatter**2
         inverse = np.asarray(np.linalg.inv(blocks), dtype=float)
@@ -173,6 +163,18 @@ class Normal(NamedTuple):
         matrix -= flat.T @ coupling.reshape(3 * count, self.columns.shape[1])
         right -= flat.T @ own_step.ravel()
         return matrix, right, inverse, coupling, own_step
+
+    def _by_frame(self, frame: NDArray[np.intp], count: int) -> tuple[Floats, Floats, Floats]:
+        """Each pose's block (count, 3, 3), its part with the common columns (count, 3, columns) and right side."""
+        first = np.searchsorted(frame, np.arange(count + 1))
+        blocks, cross = np.zeros((count, 3, 3)), np.zeros((count, 3, self.columns.shape[1]))
+        pulls = np.zeros((count, 3))
+        for number in range(count):
+            own = slice(first[number], first[number + 1])
+            slopes = self.poses[own] * self.weight[own, None]
+            blocks[number], cross[number] = slopes.T @ self.poses[own], slopes.T @ self.columns[own]
+            pulls[number] = slopes.T @ self.residual[own]
+        return blocks, cross, pulls
 
 
 def _precisions(views: Views, names: tuple[str, ...]) -> Floats:

@@ -54,10 +54,6 @@ class Optics:
         """The value at which a parameter changes nothing."""
         return self.robot.catalogue.parameters[name].neutral_value(self.robot.figures)
 
-    def start(self, name: str) -> float:
-        """The value that the robot states, else the neutral one."""
-        return self.robot.theta.get(name, self.neutral(name))
-
     def spread(self, name: str) -> float:
         """How far a parameter may be expected from its neutral value, as a standard deviation."""
         parameter, neutral = self.robot.catalogue.parameters[name], self.neutral(name)

@@ -22,6 +22,14 @@ FEWEST_MATCHED = 0.2
 USUAL_MATCHED = 0.6
 """A smaller share is told."""
 
+LIKELY = 0.4
+"""A mistake that, undone, brings this share to the map is the cause where hardly any match as they are."""
+
+ADVICE = (
+    "check that frames and rows are the same instants, the map is the right one, heading is counter-clockwise in "
+    "radians, and the pictures are not mirrored"
+)
+
 
 def matched_share(fit: CameraFit) -> float:
     """Share of edge points near markings that lie on the map's, as the fit has them."""
@@ -37,19 +45,17 @@ def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
         LogError: If they do not belong to the poses, with what would make them, where that is found.
     """
     share = matched_share(fit)
+    if share >= USUAL_MATCHED:
+        return ()
+    causes = {cause: _share_if(fit.views, change) for cause, change in MISTAKES.items()}
+    likely = max(causes, key=causes.__getitem__)
+    problem = f"{name}: frames do not fit the poses: {100 * share:.0f} % of the markings' edges match at best"
+    if causes[likely] > max(2.0 * share, LIKELY if share < FEWEST_MATCHED else USUAL_MATCHED):
+        raise LogError(f"{problem}; {100 * causes[likely]:.0f} % match if {likely}; correct that")
     if share < FEWEST_MATCHED:
-        causes = {cause: _share_if(fit.views, change) for cause, change in MISTAKES.items()}
-        likely = max(causes, key=causes.__getitem__)
-        advice = "check that frames and rows are the same instants, the map is the right one, heading is "
-        advice += "counter-clockwise in radians, and the pictures are not mirrored"
-        if causes[likely] > max(2.0 * share, 0.4):
-            advice = f"{100 * causes[likely]:.0f} % match if {likely}; correct that"
-        problem = f"frames do not fit the poses: {100 * share:.0f} % of the markings' edges match at best"
-        raise LogError(f"{name}: {problem}; {advice}")
-    if share < USUAL_MATCHED:
-        usual = f"{100 * USUAL_MATCHED:.0f} % or more is usual"
-        return (f"{100 * share:.0f} % of the markings' edges match ({usual}): poses or map are off by centimetres",)
-    return ()
+        raise LogError(f"{problem}; {ADVICE}")
+    usual = f"{100 * USUAL_MATCHED:.0f} % or more is usual"
+    return (f"{100 * share:.0f} % of the markings' edges match ({usual}): poses or map are off by centimetres",)
 
 
 def _share_if(views: Views, change: Callable[[Views], Views]) -> float:
@@ -84,8 +90,8 @@ MISTAKES: Mapping[str, Callable[[Views], Views]] = MappingProxyType(
         "heading is clockwise": _posed(lambda poses: poses * (1.0, 1.0, -1.0)),
         "headings are in degrees": _posed(lambda poses: poses * (1.0, 1.0, np.radians(1.0))),
         "x and y are swapped": _posed(lambda poses: poses[:, (1, 0, 2)]),
-        "each frame is one row late": _posed(lambda poses: np.roll(poses, -1, axis=0)),
-        "each frame is one row early": _posed(lambda poses: np.roll(poses, 1, axis=0)),
+        "each frame belongs to the next row": _posed(lambda poses: np.roll(poses, -1, axis=0)),
+        "each frame belongs to the row before": _posed(lambda poses: np.roll(poses, 1, axis=0)),
     }
 )
 """Usual mistakes in logs, and what undoes each."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, CameraFit, Normal, common_slopes, robust_weight
-from proxytune.diagnosis.camera.model.projection import pose_slopes, project
+from proxytune.diagnosis.camera.model.projection import Projection, pose_slopes, project
 from proxytune.diagnosis.camera.model.views import MAP_SCATTER, Views
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ class Leftover:
         return self.nats > LEAST_NATS and self.share > LEAST_SHARE and self.rms_px > LEAST_PX
 
     def displacement(self, right: Floats, down: Floats) -> Floats:
-        """How far markings lie from where the model has them [pixel], at places from −1 to 1 across the picture."""
+        """How far the model has markings from where they lie [pixel], at places from −1 to 1 across the picture."""
         return _terms(right, down) @ self.field
 
 
@@ -60,7 +60,7 @@ def find_leftover(fit: CameraFit) -> Leftover:
     """
     there = project(fit.views, fit.state)
     halves = [np.arange(fit.views.count) % 2 == part for part in (0, 1)]
-    systems = [_system(fit, half) for half in halves]
+    systems = [_system(fit, there, half) for half in halves]
     ridge = np.eye(len(systems[0][1])) / FIELD_PX**2
     fields = [np.asarray(-np.linalg.solve(matrix + ridge, right), dtype=float) for matrix, right, _ in systems]
     gains = [_gain(fields[1 - part], *systems[part][:2]) for part in (0, 1)]
@@ -75,10 +75,9 @@ def _gain(field: Floats, matrix: Floats, right: Floats) -> float:
     return float(-(right @ field + 0.5 * field @ matrix @ field))
 
 
-def _system(fit: CameraFit, half: NDArray[np.bool_]) -> tuple[Floats, Floats, float]:
+def _system(fit: CameraFit, there: Projection, half: NDArray[np.bool_]) -> tuple[Floats, Floats, float]:
     """Normal equations of the field on some frames, all else eliminated, and those frames' cost [nats]."""
     views, names = fit.views, fit.names
-    there = project(views, fit.state)
     weight = np.where(there.valid & half[views.edges.frame], robust_weight(there.residual, SCALE_PX), 0.0)
     chosen = np.flatnonzero(weight > 1e-4)
     terms = _terms(*_places(views))[chosen]
@@ -86,7 +85,7 @@ def _system(fit: CameraFit, half: NDArray[np.bool_]) -> tuple[Floats, Floats, fl
     field = np.concatenate((normal[:, :1] * terms, normal[:, 1:] * terms), axis=1)
     columns = np.concatenate((field, common_slopes(views, fit.state, there, names)[chosen]), axis=1)
     residual, counted = there.residual[chosen], EVIDENCE * weight[chosen]
-    normal_equations = Normal.of(columns, pose_slopes(there)[chosen], residual, counted)
+    normal_equations = Normal(columns, pose_slopes(there)[chosen], residual, counted)
     matrix, right, *_ = normal_equations.marginal(views.edges.frame[chosen], fit.state.poses, views.pose_scatter)
     own, rest = slice(field.shape[1]), slice(field.shape[1], None)
     precision = np.concatenate((np.full(len(names), 1e-9), MAP_SCATTER**-2.0, views.tape_scatter**-2.0))

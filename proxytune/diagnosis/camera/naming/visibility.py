@@ -22,7 +22,7 @@ def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
         full: The fit with every effect.
         model: Effects of the model, beside which another one would have to show.
     """
-    hidden = [name for name in MOVING if name not in full.names]
+    hidden = [] if full.views.tracks.moving else list(MOVING)
     kept = [name for name in full.names if effect_of(name) in model]
     for name in full.names:
         if name not in kept and 2.0 * _sd_beside(full, kept, name) > _smallest(full, name):
@@ -48,7 +48,6 @@ def next_views(hidden: Sequence[str], *, repeated: bool) -> tuple[str, ...]:
     """What to take to see what was hidden.
 
     Args:
-        full: The fit with every effect.
         hidden: Effects that could not be seen.
         repeated: Whether some frames were taken standing still at one place.
     """

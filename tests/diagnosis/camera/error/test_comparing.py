@@ -1,0 +1,86 @@
+"""Before and after are compared on the same unseen frames, in pixels and in grey levels."""
+
+import functools
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1]))
+from pictured import lane_poses, pictures
+from viewed import everything
+
+from proxytune.diagnosis.camera.error.comparing import compare_brightness, compare_displacement
+from proxytune.diagnosis.camera.error.unseen import FOLDS
+from proxytune.diagnosis.camera.gathering import Gathered
+from proxytune.diagnosis.camera.naming.search import name_camera_effects
+
+ROLLED = {"camera_roll": 4.0}
+COUNT = 30
+
+
+@functools.cache
+def named():
+    return name_camera_effects(everything(ROLLED, count=COUNT), ("camera_pitch",))
+
+
+def gathered(shown, fixed=True):
+    return Gathered(named().full.views, np.arange(COUNT), shown, SimpleNamespace(fixed_exposure=fixed))
+
+
+@functools.cache
+def displaced():
+    return compare_displacement(named(), 1)
+
+
+@functools.cache
+def shown():
+    return pictures(ROLLED, lane_poses(COUNT))
+
+
+def test_the_added_effect_lowers_the_displacement_to_about_the_floor():
+    pixels, ratios = displaced()
+    assert pixels.unit == "px"
+    assert pixels.after.value < 0.5 * pixels.before.value
+    assert pixels.floor.value <= pixels.after.value
+    assert pixels.floor.value > 0.5 * pixels.after.value
+    assert set(ratios) == {"camera_roll"}
+    assert ratios["camera_roll"] > 2.0
+
+
+def test_intervals_hold_their_values_and_one_seed_gives_one_result():
+    pixels, ratios = displaced()
+    for error in (pixels.before, pixels.after, pixels.floor):
+        assert error.interval[0] < error.value < error.interval[1]
+    again, other = compare_displacement(named(), 1), compare_displacement(named(), 2)
+    assert again[0].after.interval == pixels.after.interval
+    assert other[0].after.interval != pixels.after.interval
+    assert again[1] == ratios
+    assert other[0].after.value == pixels.after.value
+
+
+def test_the_added_effect_lowers_the_difference_of_brightness():
+    grey = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
+    assert grey.unit == "grey levels"
+    assert grey.after.value < 0.7 * grey.before.value
+    assert grey.after.frames.shape == (-(-COUNT // FOLDS),)
+    assert grey.after.interval[0] < grey.after.value < grey.after.interval[1]
+
+
+def test_an_effect_on_pictures_counts_after_and_not_before():
+    dark = np.rint(shown() * 0.7).astype(np.uint8)
+    look = {"exposure.gain": 0.7, "exposure.gamma": 1.0}
+    plain, fitting = (compare_brightness(gathered(dark), named(), ({}, one), 1) for one in ({}, look))
+    assert fitting.after.value < 0.7 * plain.after.value
+    assert fitting.before.value == plain.before.value
+
+
+def test_an_automatic_exposure_is_no_difference():
+    levels = np.random.default_rng(1).uniform(0.6, 1.2, (COUNT, 1, 1, 1))
+    drifting = np.clip(np.rint(shown() * levels), 0, 255).astype(np.uint8)
+    fixed, free = (compare_brightness(gathered(drifting, one), named(), ({}, {}), 1) for one in (True, False))
+    assert free.after.value < 0.6 * fixed.after.value
+    right = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
+    assert free.after.value == pytest.approx(right.after.value, rel=0.25)

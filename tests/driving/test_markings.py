@@ -1,0 +1,150 @@
+"""Distances to markings are those that floors are painted with, their slopes are true, and lines have their names."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune.driving.road.lane import lane_length, lane_point
+from proxytune.driving.road.markings import LINES, Markings
+from proxytune.driving.road.reading import shipped_map
+from proxytune.driving.road.texture import _shapes, painted
+
+ROADS = {name: shipped_map(name) for name in ("small_loop", "horseshoe")}
+MARKINGS = {name: Markings(road) for name, road in ROADS.items()}
+BOTH = pytest.mark.parametrize("name", ROADS)
+SEEDS = st.integers(0, 2**32 - 1)
+STEP = 1e-6
+COLOURS = ("white", "yellow")
+
+
+CENTRES = {
+    name: replace(road, lane_offset=1e-7, segments=tuple(part for stretch in painted(road) for part in stretch))
+    for name, road in ROADS.items()
+}
+"""The painted centre lines, as lanes of no width: bends are painted tighter than they are driven."""
+
+
+class Beside(NamedTuple):
+    """Places beside the centre line (n, 2), the unit vectors onwards and to the left there, and how far left (n,)."""
+
+    places: np.ndarray
+    onward: np.ndarray
+    left: np.ndarray
+    aside: np.ndarray
+
+
+def beside(name, seed, count=200):
+    """Places up to half a road's width beside the painted centre line, none nearer to another part of it."""
+    road, random = CENTRES[name], np.random.default_rng(seed)
+    along, step = random.random(count) * lane_length(road, True), 1e-5
+    middle, aside = lane_point(road, True, along), random.uniform(-0.45, 0.45, count) * road.width
+    onward = lane_point(road, True, along + step) - lane_point(road, True, along - step)
+    onward /= np.linalg.norm(onward, axis=1)[:, None]
+    left = np.stack((-onward[:, 1], onward[:, 0]), axis=-1)
+    places = middle + aside[:, None] * left
+    edge = np.abs(np.abs(aside) - (road.width - road.paint.white_width) / 2.0) - road.paint.white_width / 2.0
+    own = np.abs(marks(name, "white", places).distance - edge) < 1e-6
+    return Beside(places[own], onward[own], left[own], aside[own])
+
+
+def marks(name, colour, places):
+    return getattr(MARKINGS[name], colour)(places)
+
+
+def steady(name, colour, places):
+    """Where the nearest marking, and which side of it, is the same all about a place."""
+    about = [marks(name, colour, places + STEP * np.array(way)) for way in ((3, 0), (-3, 0), (0, 3), (0, -3))]
+    here = marks(name, colour, places)
+    same = [(one.stretch == here.stretch) & (one.line == here.line) & (one.side == here.side) for one in about]
+    return np.all(same, axis=0) & np.all([np.abs(one.slope - here.slope).max(axis=1) < 0.01 for one in about], axis=0)
+
+
+def tolerance(here):
+    """The way to a dash's end is measured along the centre line: in bends longer or shorter than beside it."""
+    return np.where(here.line == LINES.index("yellow dashes"), 0.4, 1e-3)
+
+
+@BOTH
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_distances_are_those_that_the_floor_is_painted_with(name, seed):
+    road = ROADS[name]
+    places = np.random.default_rng(seed).uniform(-0.1, 1.1, (300, 2)) * road.size
+    shapes = _shapes(road, painted(road), places)
+    for colour in COLOURS:
+        np.testing.assert_allclose(marks(name, colour, places).distance, shapes[colour], atol=1e-9)
+
+
+@BOTH
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_slopes_are_unit_vectors_that_finite_differences_agree_with(name, seed):
+    places = beside(name, seed).places
+    for colour in COLOURS:
+        here = marks(name, colour, places)
+        slope = here.slope
+        np.testing.assert_allclose(np.linalg.norm(slope, axis=1), 1.0, atol=1e-9)
+        kept = steady(name, colour, places)
+        assert kept.mean() > 0.8
+        for axis in (0, 1):
+            step = STEP * np.eye(2)[axis]
+            change = marks(name, colour, places + step).distance - marks(name, colour, places - step).distance
+            off = np.abs(change / (2 * STEP) - slope[:, axis])
+            assert (off[kept] < tolerance(here)[kept]).all()
+
+
+@BOTH
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_side_is_the_derivative_by_a_shift_of_the_line_to_the_right(name, seed):
+    """A line that moves right by a step is the same as a place that moves left by it; the ends of dashes move on."""
+    road = beside(name, seed)
+    for colour in COLOURS:
+        here = marks(name, colour, road.places)
+        ends = (here.line == LINES.index("yellow dashes"))[:, None]
+        shifted = marks(name, colour, road.places - STEP * np.where(ends, road.onward, -road.left)).distance
+        kept = steady(name, colour, road.places)
+        assert kept.mean() > 0.8
+        off = np.abs((shifted - here.distance) / STEP - here.side)
+        assert (off[kept] < tolerance(here)[kept]).all()
+
+
+@BOTH
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_the_left_line_lies_to_the_left_of_a_driver_who_goes_counter_clockwise(name, seed):
+    road = beside(name, seed)
+    line = marks(name, "white", road.places).line
+    np.testing.assert_array_equal(line, np.where(road.aside > 0.0, 0, 1))
+    assert [LINES[number] for number in (0, 1)] == ["left white line", "right white line"]
+    assert 0 < line.mean() < 1
+
+
+@BOTH
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_yellow_is_nearest_to_its_side_or_to_the_end_of_a_dash(name, seed):
+    road = beside(name, seed)
+    yellow, width = marks(name, "yellow", road.places), ROADS[name].paint.yellow_width
+    side = yellow.line == LINES.index("yellow line")
+    np.testing.assert_allclose(yellow.distance[side], (np.abs(road.aside) - width / 2.0)[side], atol=1e-6)
+    assert (yellow.distance[~side] >= (np.abs(road.aside) - width / 2.0)[~side] - 1e-6).all()
+    assert set(yellow.line) <= {2, 3}
+
+
+@BOTH
+def test_stretches_and_shares_follow_a_lap(name):
+    road = ROADS[name]
+    along = np.linspace(0.0, float(lane_length(CENTRES[name], True)), 2000, endpoint=False)
+    white = marks(name, "white", lane_point(CENTRES[name], True, along))
+    assert MARKINGS[name].stretches == len(road.segments)
+    assert set(white.stretch) == set(range(len(road.segments)))
+    change = np.diff(white.stretch)
+    assert set(change) <= {0, 1, 1 - len(road.segments)}
+    assert (np.diff(white.share)[change == 0] > -1e-9).all()
+    assert white.share.min() >= 0.0
+    assert white.share.max() <= 1.0

@@ -16,7 +16,8 @@ sys.path.append(str(Path(__file__).parent))
 from pictured import PICTURES, ROBOT, lane_poses, pictures, write_pictures, write_still_frames
 from viewed import NEUTRAL, driven, tracked
 
-from proxytune.diagnosis.camera.diagnose import _verdict, camera_effects, declared_camera_effects, diagnose_camera
+from proxytune.diagnosis.camera.conclusion import _verdict
+from proxytune.diagnosis.camera.diagnose import camera_effects, declared_camera_effects, diagnose_camera
 from proxytune.diagnosis.camera.model.drawing import draw_pictures
 from proxytune.diagnosis.camera.model.projection import neutral_state
 from proxytune.driving.robot import robot_from_geometry

@@ -27,7 +27,7 @@ def named():
 
 
 def gathered(shown, fixed=True):
-    return Gathered(named().full.views, np.arange(COUNT), shown, SimpleNamespace(fixed_exposure=fixed))
+    return Gathered(named().full.views, np.arange(COUNT), shown, SimpleNamespace(fixed_exposure=fixed), ())
 
 
 @functools.cache
@@ -62,7 +62,7 @@ def test_intervals_hold_their_values_and_one_seed_gives_one_result():
 
 
 def test_the_added_effect_lowers_the_difference_of_brightness():
-    grey = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
+    grey, _ = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
     assert grey.unit == "grey levels"
     assert grey.after.value < 0.7 * grey.before.value
     assert grey.after.frames.shape == (-(-COUNT // FOLDS),)
@@ -72,7 +72,8 @@ def test_the_added_effect_lowers_the_difference_of_brightness():
 def test_an_effect_on_pictures_counts_after_and_not_before():
     dark = np.rint(shown() * 0.7).astype(np.uint8)
     look = {"exposure.gain": 0.7, "exposure.gamma": 1.0}
-    plain, fitting = (compare_brightness(gathered(dark), named(), ({}, one), 1) for one in ({}, look))
+    (plain, _), (fitting, ratios) = (compare_brightness(gathered(dark), named(), ({}, one), 1) for one in ({}, look))
+    assert ratios == {"exposure": pytest.approx(plain.after.value / fitting.after.value)}
     assert fitting.after.value < 0.7 * plain.after.value
     assert fitting.before.value == plain.before.value
 
@@ -80,7 +81,7 @@ def test_an_effect_on_pictures_counts_after_and_not_before():
 def test_an_automatic_exposure_is_no_difference():
     levels = np.random.default_rng(1).uniform(0.6, 1.2, (COUNT, 1, 1, 1))
     drifting = np.clip(np.rint(shown() * levels), 0, 255).astype(np.uint8)
-    fixed, free = (compare_brightness(gathered(drifting, one), named(), ({}, {}), 1) for one in (True, False))
+    fixed, free = (compare_brightness(gathered(drifting, one), named(), ({}, {}), 1)[0] for one in (True, False))
     assert free.after.value < 0.6 * fixed.after.value
-    right = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
+    right, _ = compare_brightness(gathered(shown()), named(), ({}, {}), 1)
     assert free.after.value == pytest.approx(right.after.value, rel=0.25)

@@ -9,7 +9,7 @@ from proxytune.diagnosis.camera.gathering import Gathered
 from proxytune.diagnosis.camera.laying import TWO_SIDED, describe_map
 from proxytune.diagnosis.camera.look.appearance import Appearance, changes
 from proxytune.diagnosis.camera.model.fitting import CameraFit
-from proxytune.diagnosis.camera.model.optics import effects_of
+from proxytune.diagnosis.camera.model.optics import READOUT, effects_of
 from proxytune.diagnosis.camera.naming.checks import matched_share
 from proxytune.diagnosis.camera.naming.gate import Leftover, find_leftover
 from proxytune.diagnosis.camera.naming.search import Named
@@ -53,7 +53,9 @@ def conclude(found: Evidence, seed: int) -> CameraDiagnosis:
     return CameraDiagnosis(
         verdict=_verdict(gates[1], look, named=bool(effects)),
         declared=_estimates(named.declared, found.declared) | _figures(look, tuned),
-        theta=_estimates(named.model, (*found.declared, *named.effects)) | _figures(look, (*tuned, *on_look)),
+        theta=_estimates(named.model, (*found.declared, *named.effects))
+        | _stated(named)
+        | _figures(look, (*tuned, *on_look)),
         effects=effects,
         immaterial=_geometric(found, found.weighed.dropped),
         candidates=named.alone,
@@ -79,15 +81,15 @@ def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
 
 def _geometric(found: Evidence, effects: Sequence[str]) -> tuple[CameraEffect, ...]:
     """Effects on where things are in the picture, as they are told."""
-    return tuple(_told(found.weighed.named, effect, found.weighed.ratios[effect]) for effect in effects)
+    return tuple(_told(found.weighed, effect) for effect in effects)
 
 
-def _told(named: Named, effect: str, ratio: float) -> CameraEffect:
+def _told(weighed: Weighed, effect: str) -> CameraEffect:
+    named = weighed.named
     names = tuple(name for name in named.full.names if effect_of(name) == effect)
-    loss = next(one.loss for one in named.losses if effect not in one.effects)
     others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
     always = (ALWAYS[effect],) if effect in ALWAYS else ()
-    return CameraEffect(effect, names, loss, ratio, (*always, *sorted(others)))
+    return CameraEffect(effect, names, weighed.nats[effect], weighed.ratios[effect], (*always, *sorted(others)))
 
 
 def _on_look(look: Appearance, added: Sequence[str], ratios: dict[str, float]) -> tuple[CameraEffect, ...]:
@@ -107,6 +109,13 @@ def _on_look(look: Appearance, added: Sequence[str], ratios: dict[str, float]) -
 
 def _names(look: Appearance, effect: str) -> tuple[str, ...]:
     return tuple(name for name in look.figures if effect_of(name) == effect)
+
+
+def _stated(named: Named) -> dict[str, Estimate]:
+    """What the log states of the camera: its readout."""
+    value = named.full.theta[READOUT]
+    known = value > 0.0 and READOUT not in named.full.names
+    return {READOUT: Estimate(value, (value, value), PARAMETERS[READOUT].unit)} if known else {}
 
 
 def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:

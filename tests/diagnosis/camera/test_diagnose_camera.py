@@ -182,8 +182,8 @@ def test_steps_are_reported_as_they_begin():
         "reading frames",
         "fitting the camera",
         "looking for what the camera lacks",
-        "looking at brightness and sharpness",
         "testing on frames kept aside",
+        "looking at brightness and sharpness",
     ]
 
 

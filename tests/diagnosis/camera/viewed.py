@@ -25,7 +25,7 @@ EVERY = 2
 
 def still(poses):
     instants = np.arange(float(len(poses)))
-    return Tracks(instants, poses, np.zeros_like(poses), instants, 1.0)
+    return Tracks(instants, poses, np.zeros_like(poses), instants, instants, 1.0)
 
 
 def tracked(poses, seed=2, scatter=SCATTER):
@@ -66,7 +66,8 @@ def drive(count=60, period_s=0.6):
     places = places + aside[:, None] * np.stack((-np.sin(course), np.cos(course)), axis=-1)
     heading = course + np.arctan(0.06 * np.cos(2.0 * along))
     poses = np.column_stack((places, heading))
-    return Tracks(times, poses, np.gradient(poses, times, axis=0), 1.0 + np.arange(count) * period_s, 1.0)
+    instants = 1.0 + np.arange(count) * period_s
+    return Tracks(times, poses, np.gradient(poses, times, axis=0), instants, np.zeros(count), 1.0)
 
 
 @functools.cache

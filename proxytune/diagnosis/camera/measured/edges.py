@@ -66,8 +66,9 @@ def _colour_maps(picture: NDArray[np.uint8]) -> tuple[tuple[bool, Floats], tuple
         ground = np.ones_like(sky)
     dark = float(np.median(colours[ground].mean(axis=-1)))
     span = max(float(np.percentile(least[ground], 99.0)) - dark, 1.0)
-    white = np.clip((least - dark) / span, 0.0, 1.0)
-    yellow = np.clip((np.minimum(red, green) - blue) / (YELLOW * span), 0.0, 1.0)
+    # No upper end: where a bright marking is clipped, its edges move outwards
+    white = np.maximum((least - dark) / span, 0.0)
+    yellow = np.maximum((np.minimum(red, green) - blue) / (YELLOW * span), 0.0)
     return (True, np.where(sky, np.nan, white)), (False, np.where(sky, np.nan, yellow))
 
 

@@ -32,6 +32,7 @@ class Tracks:
         poses: Poses at these times (K, 3): x, y [m], heading [rad, unwrapped].
         rates: Their rates (K, 3) [m/s, rad/s]; 0 where pictures were taken standing still.
         instants: When each frame was taken, on the same axis (N,) [s].
+        begins: When the drive of each frame begins, on the same axis (N,) [s].
         share: How much of the tracker's scatter is left after smoothing.
     """
 
@@ -39,18 +40,19 @@ class Tracks:
     poses: Floats
     rates: Floats
     instants: Floats
+    begins: Floats
     share: float
 
     def at(self, late_s: float) -> tuple[Floats, Floats]:
         """Poses and rates (N, 3) so long before each frame's instant."""
-        when = self.instants - late_s
+        when = np.maximum(self.instants - late_s, self.begins)
         columns = (self.poses.T, self.rates.T)
         poses, rates = (np.stack([np.interp(when, self.times, one) for one in column], axis=-1) for column in columns)
         return poses, rates
 
     def only(self, chosen: NDArray[np.intp]) -> "Tracks":
         """The tracks of some frames."""
-        return replace(self, instants=self.instants[chosen])
+        return replace(self, instants=self.instants[chosen], begins=self.begins[chosen])
 
     @property
     def moving(self) -> bool:
@@ -65,15 +67,16 @@ def track_frames(log: Log, frames: Frames) -> tuple[Tracks, NDArray[np.intp]]:
         LogError: If no frame's pose is known.
     """
     still = log.rate_hz == 0.0
-    parts, offset, instants = [], 0.0, np.full(len(frames.times), np.nan)
+    parts, offset, instants, begins = [], 0.0, np.full(len(frames.times), np.nan), np.zeros(len(frames.times))
     for number, episode in enumerate(log.episodes):
         own = np.flatnonzero(frames.drives == number)
         known = np.asarray(np.isfinite(episode.poses).all(axis=1))
-        if not known.any():
+        # A drive shorter than the window tells no speed
+        if not known.any() or (not still and len(episode.times) < _samples(log.rate_hz)):
             continue
         shift = offset - episode.times[0]
         near = own[_within_poses(frames.times[own], episode.times[known], still)]
-        instants[near] = frames.times[near] + shift
+        instants[near], begins[own] = frames.times[near] + shift, episode.times[known][0] + shift
         parts.append((episode.times[known] + shift, *_smooth(episode, known, log.rate_hz)))
         offset += float(episode.times[-1] - episode.times[0]) + APART_S
     kept = np.flatnonzero(np.isfinite(instants))
@@ -81,7 +84,7 @@ def track_frames(log: Log, frames: Frames) -> tuple[Tracks, NDArray[np.intp]]:
         raise LogError(f"{log.name}: no frame has a pose near its time; check that times are on the poses' clock")
     times, poses, rates = (np.concatenate(column) for column in zip(*parts, strict=True))
     share = 1.0 if still else float(np.sqrt((savgol_coeffs(_samples(log.rate_hz), ORDER) ** 2).sum()))
-    return Tracks(times, poses, rates, instants[kept], share), kept
+    return Tracks(times, poses, rates, instants[kept], begins[kept], share), kept
 
 
 def _samples(rate_hz: float) -> int:
@@ -100,9 +103,9 @@ def _within_poses(times: Floats, known: Floats, still: bool) -> NDArray[np.bool_
 def _smooth(episode: LogEpisode, known: NDArray[np.bool_], rate_hz: float) -> tuple[Floats, Floats]:
     """Smoothed poses and their rates, at the samples that have a pose."""
     poses = episode.poses[known]
-    window = _samples(rate_hz) if rate_hz else 0
-    if not rate_hz or len(episode.times) < window:
+    if not rate_hz:
         return poses, np.zeros_like(poses)
+    window = _samples(rate_hz)
     filled = np.stack([np.interp(episode.times, episode.times[known], column) for column in poses.T], axis=-1)
     smooth = savgol_filter(filled, window, ORDER, axis=0)[known]
     rates = savgol_filter(filled, window, ORDER, deriv=1, delta=1.0 / rate_hz, axis=0)[known]

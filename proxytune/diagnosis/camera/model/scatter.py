@@ -4,7 +4,7 @@ import numpy as np
 
 from proxytune.diagnosis.camera.model.fitting import CameraFit
 
-PASSES = 2
+PASSES = 4
 """The scatter is estimated so many times over, each with poses fitted under the one before."""
 
 

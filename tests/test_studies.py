@@ -24,6 +24,7 @@ MADE_FROM = {
     "closing_the_loop": "twin.toml",
     "closing_the_loop/two_effects": "twin.toml",
     "closing_the_loop/no_name": "twin.toml",
+    "closing_the_camera_loop": "twin.toml",
     "teacher": "twin.toml",
     "truths": "truth.toml",
 }

@@ -135,6 +135,7 @@ def test_people_read_the_verdict_the_roll_and_both_errors(found):
     assert "fitting the camera" in found.err
 
 
+@pytest.mark.slow
 def test_what_is_declared_is_tuned_and_not_added(stills, tmp_path, capsys):
     declared = "trim,camera_pitch,camera_roll"
     document = diagnosed(capsys, stills, "--declared", declared, "--output", tmp_path / "out")
@@ -160,6 +161,7 @@ def test_too_few_frames_are_refused_in_one_line(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_where_motion_is_refused_the_camera_still_comes_out(tmp_path, capsys):
     folder = short_drives(tmp_path / "log")
     document = diagnosed(capsys, folder, "--output", tmp_path / "out")

@@ -30,7 +30,7 @@ def driven(domain, seed=5, **theta):
     return domain.drive(make_episode(theta, agent="wary", start=1, seed=seed)).poses
 
 
-@pytest.mark.parametrize("camera", ["ground_plane", "renderer"])
+@pytest.mark.parametrize("camera", ["ground_plane", pytest.param("renderer", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", SEEN)
 def test_the_picture_of_an_agent_shows_each_effect(tmp_path, name, camera):
     domain, commands = family(tmp_path, camera=camera), COMMANDS if name in IMAGE else COMMANDS[:1]

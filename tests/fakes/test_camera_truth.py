@@ -342,9 +342,11 @@ def test_outside_sets_are_flagged_by_the_verdict_or_by_a_place_in_the_picture():
 
 def test_coverage_compares_each_interval_with_its_own_truth():
     true = draw_case("lens_centre still", 1).sight.figures["lens_centre.right"]
-    told = {"right": {"value": true, "interval": [true - 0.01, true + 0.01], "unit": ""}}
+    right = {"lens_centre.right": {"value": true, "interval": [true - 0.01, true + 0.01], "unit": ""}}
     pitch = {"camera_pitch": {"value": 25.0, "interval": [24.0, 26.0], "unit": "deg"}}
-    counted = coverage([answer("lens_centre still", said("explained", "lens_centre", declared=pitch, **told))])
+    other = {"camera_roll": {"value": 1.0, "interval": [0.5, 1.5], "unit": "deg"}}
+    extended = {"extended": {**right, **pitch, **other}}
+    counted = coverage([answer("lens_centre still", {**said("explained", "lens_centre"), **extended})])
     assert (counted["lens_centre.right"], counted["camera_pitch"]) == (Rate(1, 1), Rate(0, 1))
     assert counted["all"] == Rate(1, 2)
 

@@ -79,11 +79,9 @@ class Answer:
         return tuple(names[0] for names in self.named if not set(names) & set(self.missing))
 
     def intervals(self) -> dict[str, tuple[float, float, float]]:
-        """Lower end, truth and upper end of every parameter that was told and truly is what was named."""
-        told = dict(self.camera.get("declared", {}))
-        for effect in self.camera.get("effects", ()):
-            if effect["name"] in self.missing:
-                told |= {_name(effect["name"], name, self.truth): one for name, one in effect["parameters"].items()}
+        """Lower end, truth and upper end of every parameter of the extended model that is declared or missing."""
+        known = (*DECLARED, *self.missing)
+        told = {name: one for name, one in self.camera.get("extended", {}).items() if name.split(".")[0] in known}
         figures = self.truth["figures"]
         return {
             name: (one["interval"][0], figures[name], one["interval"][1])
@@ -121,9 +119,3 @@ def read_answers(file: Path) -> list[Answer]:
         except (ValueError, TypeError):
             continue
     return answers
-
-
-def _name(effect: str, parameter: str, truth: Mapping[str, Any]) -> str:
-    """A parameter's name among the figures of the truth."""
-    whole = f"{effect}.{parameter}"
-    return whole if whole in truth["figures"] else effect

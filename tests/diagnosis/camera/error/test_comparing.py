@@ -40,6 +40,7 @@ def shown():
     return pictures(ROLLED, lane_poses(COUNT))
 
 
+@pytest.mark.slow
 def test_the_added_effect_lowers_the_displacement_to_about_the_floor():
     pixels, ratios = displaced()
     assert pixels.unit == "px"
@@ -50,6 +51,7 @@ def test_the_added_effect_lowers_the_displacement_to_about_the_floor():
     assert ratios["camera_roll"] > 2.0
 
 
+@pytest.mark.slow
 def test_intervals_hold_their_values_and_one_seed_gives_one_result():
     pixels, ratios = displaced()
     for error in (pixels.before, pixels.after, pixels.floor):

@@ -42,7 +42,12 @@ def on(name, theta, count=30, seed=3):
     return views_of(shown, still(tracked(poses)), markings=Markings(road))
 
 
-@pytest.mark.parametrize("effect", PLANTED)
+OFTEN = ("camera_roll", "lens_distortion")
+
+
+@pytest.mark.parametrize(
+    "effect", [name if name in OFTEN else pytest.param(name, marks=pytest.mark.slow) for name in PLANTED]
+)
 def test_a_planted_effect_is_named(effect):
     named = name_camera_effects(everything(PLANTED[effect]), DECLARED)
     assert named.effects == (effect,)
@@ -51,6 +56,7 @@ def test_a_planted_effect_is_named(effect):
         assert abs(named.model.theta[name] - value) < 3.0 * named.model.sd[place] + 0.01 * abs(value)
 
 
+@pytest.mark.slow
 def test_a_pair_is_named():
     named = name_camera_effects(everything({"camera_roll": -4.0, "lens_distortion": -0.25}), DECLARED)
     assert set(named.effects) == {"camera_roll", "lens_distortion"}
@@ -58,7 +64,7 @@ def test_a_pair_is_named():
     assert named.losses[0].loss > named.losses[1].loss > named.losses[2].loss
 
 
-@pytest.mark.parametrize("name", ["small_loop", "horseshoe"])
+@pytest.mark.parametrize("name", ["small_loop", pytest.param("horseshoe", marks=pytest.mark.slow)])
 def test_nothing_is_named_of_a_nominal_camera(name):
     full = fit_everything(on(name, {}), OPTICS.mounting, {}, learn_scatter=False)
     named = name_camera_effects(full, DECLARED)

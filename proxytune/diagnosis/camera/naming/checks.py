@@ -62,7 +62,7 @@ def _share_if(views: Views, change: Callable[[Views], Views]) -> float:
     changed = change(views)
     optics = changed.optics
     start = neutral_state(changed, {name: optics.neutral(name) for name in optics.mounting})
-    return matched_share(fit_camera(changed, start, FIRST, FAR))
+    return matched_share(fit_camera(changed, start, [name for name in FIRST if name in optics.mounting], FAR))
 
 
 def _turned_pictures(right: bool, down: bool) -> Callable[[Views], Views]:

@@ -12,7 +12,7 @@ from proxytune.diagnosis.camera.model.scatter import PASSES, pose_scatter
 from proxytune.diagnosis.camera.model.views import Views
 from proxytune.diagnosis.camera.naming.choice import LEAST_NATS, MOST, TRIED, Subset, rank_subsets
 
-FIRST = ("camera_pitch", "camera_roll", "camera_yaw", "camera_height", "field_of_view")
+FIRST = ("camera_pitch", "camera_roll", "camera_yaw", "camera_height", "field_of_view", "camera_latency")
 """What is fitted first, from far away: nothing of it stands in for something else."""
 
 FAR = tuple(16.0 * SCALE_PX * 2.0 ** (-step / 2.0) for step in range(7))

@@ -14,7 +14,7 @@ from joblib import Parallel, delayed
 sys.path.append(str(Path(__file__).resolve().parents[1] / "fakes"))
 
 from camera_truth.answers import Answer, append, diagnosed, read_answers
-from camera_truth.rates import all_sets, confusion, coverage, rates
+from camera_truth.rates import accuracy, all_sets, confusion, coverage, rates
 
 
 def arguments(words: Sequence[str] | None = None) -> argparse.Namespace:
@@ -51,7 +51,8 @@ def report(answers: Sequence[Answer]) -> str:
     """The rates and what was said of what."""
     lines = [f"{name}: {rate}" for name, rate in rates(answers).items() if rate.of]
     held = [f"  {name}: {rate}" for name, rate in coverage(answers).items()]
-    table = ("intervals that hold the truth:", *held, "", confusion(answers))
+    near = [f"  {name}: {rate}" for name, rate in accuracy(answers).items()]
+    table = ("intervals that hold the truth:", *held, "", "figures near the truth:", *near, "", confusion(answers))
     return "\n".join((f"{len(answers)} sets", *lines, "", *table))
 
 

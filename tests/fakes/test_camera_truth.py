@@ -13,7 +13,7 @@ from camera_truth.exposure import exposed, instants
 from camera_truth.ground import photographed_floor
 from camera_truth.lens import BENDS, rays
 from camera_truth.pinhole import Pinhole
-from camera_truth.rates import EXAM, Rate, all_sets, coverage, rates
+from camera_truth.rates import EXAM, Rate, accuracy, all_sets, coverage, rates
 from camera_truth.room import sky
 from camera_truth.sight import COLUMNS, PUBLIC, ROWS, Bend, Bumper, Sight, Spot
 from camera_truth.tape import lay_tape, line_distances, straight_tape
@@ -349,6 +349,13 @@ def test_coverage_compares_each_interval_with_its_own_truth():
     counted = coverage([answer("lens_centre still", {**said("explained", "lens_centre"), **extended})])
     assert (counted["lens_centre.right"], counted["camera_pitch"]) == (Rate(1, 1), Rate(0, 1))
     assert counted["all"] == Rate(1, 2)
+
+
+def test_a_figure_is_near_the_truth_within_what_is_asked_for():
+    true = draw_case("camera_roll still", 1).sight.figures["camera_roll"]
+    told = [{"camera_roll": {"value": true + off, "interval": [-9.0, 9.0], "unit": "deg"}} for off in (0.29, 0.31)]
+    answers = [answer(camera={**said("explained", "camera_roll"), "extended": one}) for one in told]
+    assert accuracy(answers) == {"camera_roll within 0.3": Rate(1, 2)}
 
 
 def test_answers_are_read_back_and_a_line_that_was_cut_off_is_not(tmp_path):

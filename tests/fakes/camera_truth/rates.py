@@ -86,6 +86,31 @@ def coverage(answers: Sequence[Answer]) -> dict[str, Rate]:
     return each | {"all": Rate(sum(one.hits for one in each.values()), sum(one.of for one in each.values()))}
 
 
+WITHIN = {
+    "camera_pitch": 0.3,
+    "camera_roll": 0.3,
+    "camera_yaw": 0.5,
+    "camera_height": 0.002,
+    "field_of_view": 1.0,
+    "lens_distortion": 0.02,
+    "camera_latency": 0.005,
+    "blur": 0.010,
+    "vignetting": 0.03,
+}
+"""How near the truth a figure is to come, in its unit."""
+
+
+def accuracy(answers: Sequence[Answer]) -> dict[str, Rate]:
+    """How often figures come so near the truth, where nothing outside the catalogue is wrong."""
+    near: dict[str, list[bool]] = {}
+    for answer in answers:
+        for name, (_, true, _) in ({} if answer.outside else answer.intervals()).items():
+            if name in WITHIN:
+                value = answer.camera["extended"][name]["value"]
+                near.setdefault(f"{name} within {WITHIN[name]:g}", []).append(abs(value - true) <= WITHIN[name])
+    return {name: Rate(sum(one), len(one)) for name, one in sorted(near.items())}
+
+
 def confusion(answers: Sequence[Answer]) -> str:
     """For everything that was wrong what was said, and how often."""
     said: dict[str, Counter[str]] = {}

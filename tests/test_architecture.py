@@ -14,6 +14,10 @@ ROOMS = {
     "torch": {"search"},
     "botorch": {"search"},
     "gpytorch": {"search"},
+    "gymnasium": {"environments"},
+    "stable_baselines3": {"environments"},
+    "mujoco": {"environments"},
+    "rosbags": {"importing"},
     "sqlite3": {"storage"},
     "argparse": {"cli"},
 }

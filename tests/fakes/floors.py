@@ -3,15 +3,15 @@
 FLOORS = (
     {"errors"},
     {"settings", "seeds", "meaning", "versions", "extensions", "space", "shipped", "scores", "logs"},
-    {"usefulness", "effects"},
+    {"usefulness", "effects", "importing"},
     {"domain"},
     {"driving"},
-    {"search", "learning"},
+    {"search", "learning", "environments"},
     {"storage", "running"},
     {"study"},
     {"sweep", "teaching", "comparison", "diagnosis"},
     {"report"},
-    {"api", "testing"},
+    {"api", "testing", "skeletons"},
     {"cli"},
     {"__main__", "__init__"},
 )

@@ -1,0 +1,1 @@
+"""Bags, CSV files, trajectories and arrays of others, made a log."""

@@ -1,0 +1,1 @@
+"""What `new` writes: a working robot, study or family to start from."""

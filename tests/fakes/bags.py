@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+import pytest
+
+rosbag1 = pytest.importorskip("rosbags.rosbag1")
+rosbag2 = pytest.importorskip("rosbags.rosbag2")
+typesys = pytest.importorskip("rosbags.typesys")
 
 STORAGES = ("ros1", "sqlite3", "mcap")
 TRANSFORMS = "geometry_msgs/TransformStamped[] transforms"
@@ -18,10 +19,10 @@ TWIST = "geometry_msgs/msg/Twist"
 
 def typestore(storage):
     """The types of messages, with two that a distribution may lack."""
-    store = get_typestore(Stores.ROS1_NOETIC if storage == "ros1" else Stores.ROS2_HUMBLE)
+    store = typesys.get_typestore(getattr(typesys.Stores, "ROS1_NOETIC" if storage == "ros1" else "ROS2_HUMBLE"))
     for kind, text in (("tf2_msgs/msg/TFMessage", TRANSFORMS), ("wheel_msgs/msg/WheelsCmdStamped", WHEELS)):
         if kind not in store.fielddefs:
-            store.register(get_types_from_msg(text, kind))
+            store.register(typesys.get_types_from_msg(text, kind))
     return store
 
 
@@ -87,9 +88,8 @@ def write_messages(path, storage, messages):
     """Write a bag of (topic, type, received [s], fields); ROS 1 as a file, ROS 2 as a folder."""
     path = Path(path)
     store = typestore(storage)
-    writer = Writer1(path) if storage == "ros1" else Writer2(path, version=9, storage_plugin=PLUGINS[storage])
     connections = {}
-    with writer:
+    with _writer(path, storage) as writer:
         for topic, kind, received_s, fields in messages:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
@@ -101,7 +101,10 @@ def write_messages(path, storage, messages):
     return path
 
 
-PLUGINS = {"sqlite3": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}
+def _writer(path, storage):
+    if storage == "ros1":
+        return rosbag1.Writer(path)
+    return rosbag2.Writer(path, version=9, storage_plugin=rosbag2.StoragePlugin[storage.upper()])
 
 
 def twist_messages(times, twists, topic="/cmd_vel", delay_s=0.0):

@@ -13,8 +13,7 @@ ROS1 = ".bag"
 ROS2 = (".db3", ".mcap")
 METADATA = "metadata.yaml"
 
-REPAIR = {ROS1: "repair it with rosbag reindex", ".mcap": "repair it with mcap recover"}
-REPAIR_FOLDER = "repair it with ros2 bag reindex"
+REPAIR = {"ROS 1 bag": "rosbag reindex", "ROS 2 bag (mcap)": "mcap recover", "ROS 2 bag (sqlite3)": "ros2 bag reindex"}
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ def open_bag(path: Path) -> Iterator[Bag]:
 
 def form_of(path: Path) -> str:
     """What a bag is, as in "ROS 2 bag (mcap)"."""
-    if path.suffix == ROS1:
+    if path.suffix == ROS1 and path.is_file():
         return "ROS 1 bag"
     files = [path] if path.is_file() else path.glob("*")
     return "ROS 2 bag (mcap)" if any(".mcap" in file.suffixes for file in files) else "ROS 2 bag (sqlite3)"
@@ -127,9 +126,15 @@ def _open_reader(path: Path) -> Any:
     except ModuleNotFoundError:
         raise LogError(f'{path}: reading bags needs rosbags; pip install "proxytune[ros]"') from None
     with _complaints(path, "cannot be read as a bag"):
-        reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        reader = AnyReader(_paths(path), default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         reader.open()
     return reader
+
+
+def _paths(path: Path) -> list[Path]:
+    """What the library opens: it would take a ROS 2 folder named run.bag for a file of ROS 1."""
+    inside = path.suffix == ROS1 and path.is_dir()
+    return sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
 
 
 @contextmanager
@@ -141,9 +146,10 @@ def _complaints(path: Path, what: str) -> Iterator[None]:
     try:
         yield
     except Exception as problem:
-        text = " ".join(str(problem).split())[:200].rstrip(".") or type(problem).__name__
-        repair = REPAIR.get(path.suffix, REPAIR_FOLDER)
-        raise LogError(f"{path}: {what} ({text}); copy it again, or {repair}") from None
+        text = "".join(letter if letter.isprintable() else " " for letter in str(problem))
+        reason = " ".join(text.split())[:200].rstrip(".") or type(problem).__name__
+        remedy = f"copy it again, or repair it with {REPAIR[form_of(path)]}"
+        raise LogError(f"{path}: {what} ({reason}); {remedy}") from None
 
 
 def _bags_in(path: Path) -> dict[str, Path]:

@@ -63,10 +63,6 @@ def _drive(family: LaneFollowing, duties: Floats, random: np.random.Generator, n
     instance = family.instance({})
     with family.plant_at(instance.robot, start) as plant:
         poses = follow(instance, plant, start, duties, number)
-    return _tracked(poses, random)
-
-
-def _tracked(poses: Floats, random: np.random.Generator) -> Floats:
     return tracked(poses, random)
 
 

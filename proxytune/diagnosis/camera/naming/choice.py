@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.model.fitting import CameraFit
 from proxytune.diagnosis.camera.model.optics import effects_of
+from proxytune.effects import effect_of
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +49,7 @@ def rank_subsets(full: CameraFit, declared: Sequence[str], size: int) -> list[Su
 
 def _loss(full: CameraFit, effects: Sequence[str]) -> float:
     """What is lost if only these effects' parameters may differ from their neutral values [nats]."""
-    kept = np.array([effects_of((name,))[0] in effects for name in full.names])
+    kept = np.array([effect_of(name) in effects for name in full.names])
     if kept.all():
         return 0.0
     off = np.array([full.theta[name] - full.views.optics.neutral(name) for name in full.names])[~kept]

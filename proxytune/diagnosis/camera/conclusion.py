@@ -58,6 +58,7 @@ def conclude(found: Evidence, seed: int) -> CameraDiagnosis:
         | _figures(look, (*tuned, *on_look)),
         effects=effects,
         immaterial=_geometric(found, found.weighed.dropped),
+        dropped=_estimates(found.weighed.with_dropped, found.weighed.dropped),
         candidates=named.alone,
         pixels=found.weighed.pixels,
         grey=grey,

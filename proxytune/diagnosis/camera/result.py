@@ -96,6 +96,7 @@ class CameraDiagnosis:
         theta: All parameters of the extended model, by name in θ.
         effects: The effects that were added.
         immaterial: Effects that there is evidence for, and which hardly change the error: no part of the model.
+        dropped: Parameters of those effects, as they were fitted before they were dropped, by name in θ.
         candidates: What each effect of the catalogue costs if it is the only one added [nats], the best first.
         pixels: Displacement of markings.
         grey: Differences in brightness on the floor.
@@ -115,6 +116,7 @@ class CameraDiagnosis:
     theta: Mapping[str, Estimate]
     effects: tuple[CameraEffect, ...]
     immaterial: tuple[CameraEffect, ...]
+    dropped: Mapping[str, Estimate]
     candidates: Sequence[Subset]
     pixels: Comparison
     grey: Comparison

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from proxytune.diagnosis.camera.error.comparing import compare_displacement
+from proxytune.diagnosis.camera.model.fitting import CameraFit
 from proxytune.diagnosis.camera.model.optics import effects_of
 from proxytune.diagnosis.camera.naming.search import Named, cost_of, fit_set
 from proxytune.diagnosis.camera.result import Comparison
@@ -18,6 +19,7 @@ class Weighed:
 
     Attributes:
         named: The fits; the model's without what was dropped.
+        with_dropped: The model as it was named, with what was dropped.
         pixels: Errors on unseen frames, before and after.
         ratios: Error without each effect over the error with all that were named, the dropped ones too.
         nats: What leaving each of these out costs.
@@ -25,6 +27,7 @@ class Weighed:
     """
 
     named: Named
+    with_dropped: CameraFit
     pixels: Comparison
     ratios: Mapping[str, float]
     nats: Mapping[str, float]
@@ -37,11 +40,11 @@ def weigh_effects(named: Named, seed: int) -> Weighed:
     dropped = tuple(effect for effect in named.effects if ratios[effect] < MATERIAL)
     nats = {effect: _cost_without(named, effect) for effect in named.effects}
     if not dropped:
-        return Weighed(named, pixels, ratios, nats, ())
+        return Weighed(named, named.model, pixels, ratios, nats, ())
     kept = tuple(effect for effect in named.effects if effect not in dropped)
     declared = effects_of(named.declared.names)
     left = replace(named, model=fit_set(named.full, (*declared, *kept)), effects=kept)
-    return Weighed(left, compare_displacement(left, seed)[0], ratios, nats, dropped)
+    return Weighed(left, named.model, compare_displacement(left, seed)[0], ratios, nats, dropped)
 
 
 def _cost_without(named: Named, effect: str) -> float:

@@ -5,21 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.error.unseen import (
-    FOLDS,
-    SCALES,
-    PictureError,
-    error_over,
-    fit_poses,
-    pixel_errors,
-    unseen_residuals,
-)
+from proxytune.diagnosis.camera.error.unseen import FOLDS, SCALES, PictureError, error_over, fit_poses, pixel_errors
 from proxytune.diagnosis.camera.gathering import Gathered
 from proxytune.diagnosis.camera.look.appearance import floor_pixels
 from proxytune.diagnosis.camera.model.drawing import Pictures, draw_pictures
 from proxytune.diagnosis.camera.model.fitting import CameraFit, fit_camera
 from proxytune.diagnosis.camera.model.optics import effects_of
-from proxytune.diagnosis.camera.naming.search import Named, fit_set
+from proxytune.diagnosis.camera.model.views import Views
+from proxytune.diagnosis.camera.naming.search import Named
 from proxytune.diagnosis.camera.result import Comparison
 from proxytune.effects import effect_of
 
@@ -29,22 +22,22 @@ Look = Mapping[str, float]
 """Values of effects on pictures, by name in θ."""
 
 
-def compare_displacement(named: Named, seed: int) -> tuple[Comparison, dict[str, float]]:
-    """Displacement of markings before and after, and the error without each effect over the error with all."""
-    views = named.full.views
-    without = {
-        effect: fit_set(named.full, [one for one in effects_of(named.model.names) if one != effect])
-        for effect in named.effects
-    }
-    fits = [named.declared, named.model, named.full, *without.values()]
-    residuals = [unseen_residuals(views, fit.state, fit.names) for fit in fits]
-    before, after, floor = pixel_errors(views, residuals[:3], seed)
-    lowest = floor if floor.value < after.value else after
-    ratios = {}
-    for effect, residual in zip(without, residuals[3:], strict=True):
-        with_all, missing = pixel_errors(views, (residuals[1], residual), seed)
-        ratios[effect] = missing.value / max(with_all.value, 1e-9)
-    return Comparison(before, after, lowest, "px"), ratios
+def compare_displacement(views: Views, residuals: tuple[Floats, Floats, Floats], seed: int) -> Comparison:
+    """Displacement of markings before and after, from residuals on unseen frames.
+
+    Args:
+        views: Whose edge points these are.
+        residuals: Of the declared camera, of the model's and of the one with every effect (n,) each [pixel].
+        seed: Of the bootstrap.
+    """
+    before, after, floor = pixel_errors(views, residuals, seed)
+    return Comparison(before, after, floor if floor.value < after.value else after, "px")
+
+
+def displacement_ratio(views: Views, residuals: tuple[Floats, Floats], seed: int) -> float:
+    """The error without an effect over the error with it, from residuals of both on unseen frames (n,) [pixel]."""
+    without, with_it = pixel_errors(views, residuals, seed)
+    return without.value / max(with_it.value, 1e-9)
 
 
 def compare_brightness(

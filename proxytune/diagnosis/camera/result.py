@@ -16,6 +16,9 @@ from proxytune.diagnosis.result import Estimate
 
 Floats = NDArray[np.float64]
 
+TWO_SIDED = 1.96
+"""Standard deviations on either side of a 95 % interval."""
+
 
 @dataclass(frozen=True)
 class CameraEffect:
@@ -129,3 +132,13 @@ class CameraDiagnosis:
     notes: tuple[str, ...]
     named: Named
     gathered: Gathered
+
+
+def interval_of(value: float, sd: float) -> tuple[float, float]:
+    """The 95 % interval of a value with this standard deviation."""
+    return float(value - TWO_SIDED * sd), float(value + TWO_SIDED * sd)
+
+
+def estimate_of(value: float, sd: float, unit: str) -> Estimate:
+    """A value with this standard deviation as an estimate."""
+    return Estimate(float(value), interval_of(value, sd), unit)

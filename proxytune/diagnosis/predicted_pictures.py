@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.diagnose import camera_effects
+from proxytune.diagnosis.camera.error.comparing import grey_differences
 from proxytune.diagnosis.camera.gathering import read_road
 from proxytune.diagnosis.camera.measured.edges import Edges
 from proxytune.diagnosis.camera.measured.tracks import track_frames
@@ -89,15 +90,8 @@ def _draw(frames: Frames, views: Views, numbers: NDArray[np.intp], theta: Theta)
         chosen = np.arange(first, min(first + AT_ONCE, len(numbers)))
         drawn = draw_pictures(views, state, on_pictures, chosen)
         measured = read_pictures(frames, numbers[chosen].tolist()).astype(np.float32)
-        levels = 1.0 if frames.fixed_exposure else _levels(measured[:, floor], drawn[:, floor])
-        apart = np.abs(measured[:, floor] - np.clip(drawn[:, floor] * levels, 0.0, 255.0)).mean(axis=(1, 2))
+        apart = grey_differences(measured, drawn, floor, fixed_exposure=frames.fixed_exposure).mean(axis=(1, 2))
         yield PredictedPictures(numbers[chosen], np.rint(drawn).astype(np.uint8), apart.astype(float))
-
-
-def _levels(measured: NDArray[np.float32], drawn: NDArray[np.float32]) -> NDArray[np.float32]:
-    """How much brighter each frame was exposed than drawn (n, 1, 1), of pixels (n, pixels, 3)."""
-    ratios = measured.mean(axis=2) / np.maximum(drawn.mean(axis=2), 1.0)
-    return np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)
 
 
 def predicted_frames_text(log: Log, numbers: Sequence[int]) -> str:

@@ -64,6 +64,22 @@ def compare_brightness(
     return Comparison(before, after, None, "grey levels"), ratios
 
 
+def grey_differences(
+    measured: Pictures, drawn: Pictures, floor: NDArray[np.bool_], *, fixed_exposure: bool
+) -> Pictures:
+    """Absolute differences on the floor (n, floor pixels, 3) [grey levels].
+
+    Args:
+        measured: Pictures (n, rows, columns, 3).
+        drawn: The same as a model has them.
+        floor: Pixels that look at the floor (rows, columns).
+        fixed_exposure: Whether pictures compare as they are; else each at its own brightness, which no model knows.
+    """
+    measured, drawn = measured[:, floor], drawn[:, floor]
+    levels = 1.0 if fixed_exposure else _levels(measured, drawn)
+    return np.asarray(np.abs(measured - np.clip(drawn * levels, 0.0, 255.0)))
+
+
 def _grey_errors(
     gathered: Gathered, fit: CameraFit, looks: Sequence[Look], out: NDArray[np.bool_], seed: int
 ) -> list[PictureError]:
@@ -74,14 +90,12 @@ def _grey_errors(
     counts, errors = np.full(len(frames), float(floor.sum())), []
     for look in looks:
         drawn = draw_pictures(views, state, look, frames)
-        if not gathered.frames.fixed_exposure:
-            drawn = drawn * _levels(measured, drawn, floor)
-        differences = np.abs(measured - np.clip(drawn, 0.0, 255.0)).mean(axis=-1)[:, floor]
-        errors.append(error_over(differences.sum(axis=1).astype(float), counts, seed))
+        differences = grey_differences(measured, drawn, floor, fixed_exposure=gathered.frames.fixed_exposure)
+        errors.append(error_over(differences.mean(axis=-1).sum(axis=1).astype(float), counts, seed))
     return errors
 
 
-def _levels(measured: Pictures, drawn: Pictures, floor: NDArray[np.bool_]) -> Pictures:
-    """How much brighter each frame was exposed than drawn (n, 1, 1, 1)."""
-    ratio = np.median(measured[:, floor].mean(axis=-1) / np.maximum(drawn[:, floor].mean(axis=-1), 1.0), axis=1)
-    return np.asarray(ratio[:, None, None, None], dtype=np.float32)
+def _levels(measured: Pictures, drawn: Pictures) -> Pictures:
+    """How much brighter each frame was exposed than drawn (n, 1, 1), of pixels (n, pixels, 3)."""
+    ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
+    return np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)

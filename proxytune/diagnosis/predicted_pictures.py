@@ -1,10 +1,9 @@
 """What a model's camera would have seen on a log's drives, and how far that is from what was seen."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.diagnose import camera_effects
@@ -57,7 +56,7 @@ def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[Predicted
         LogError: If the log has no frames, or no frame has a pose; while drawing, if a picture cannot be read.
         SettingsError: If the robot has no camera, or the map cannot be read.
     """
-    frames = _frames_of(log)
+    frames = frames_of(log)
     robot.camera_figures()
     sight = set(camera_effects(robot.catalogue))
     own = {name: value for name, value in {**robot.theta, **theta}.items() if effect_of(name) in sight}
@@ -65,7 +64,12 @@ def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[Predicted
     return _draw(frames, views, numbers, own)
 
 
-def _frames_of(log: Log) -> Frames:
+def frames_of(log: Log) -> Frames:
+    """The log's frames.
+
+    Raises:
+        LogError: If it has none.
+    """
     if log.frames is None:
         raise LogError(f"{log.name}: has no frames to predict; add [camera] to log.toml, or leave --frames out")
     return log.frames
@@ -92,11 +96,3 @@ def _draw(frames: Frames, views: Views, numbers: NDArray[np.intp], theta: Theta)
         measured = read_pictures(frames, numbers[chosen].tolist()).astype(np.float32)
         apart = grey_differences(measured, drawn, floor, fixed_exposure=frames.fixed_exposure).mean(axis=(1, 2))
         yield PredictedPictures(numbers[chosen], np.rint(drawn).astype(np.uint8), apart.astype(float))
-
-
-def predicted_frames_text(log: Log, numbers: Sequence[int]) -> str:
-    """A frames.csv for predicted pictures, numbered as the log's frames come, from 0."""
-    frames = _frames_of(log)
-    names = [log.episodes[drive].name for drive in frames.drives[list(numbers)]]
-    table = pd.DataFrame({"frame": numbers, "episode": names, "time": frames.times[list(numbers)]})
-    return table.to_csv(index=False, lineterminator="\n")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.normal_equations import eliminate
 from proxytune.diagnosis.camera.model.optics import effects_of
 from proxytune.effects import effect_of
 
@@ -57,5 +58,5 @@ def _loss(full: CameraFit, effects: Sequence[str]) -> float:
     across, inner = matrix[np.ix_(~kept, kept)], matrix[np.ix_(kept, kept)]
     left = matrix[np.ix_(~kept, ~kept)]
     if kept.any():
-        left = left - across @ np.linalg.solve(inner + 1e-9 * np.diag(np.diag(inner)), across.T)
+        left = eliminate(left, across, inner + 1e-9 * np.diag(np.diag(inner)), across.T)
     return float(0.5 * off @ left @ off)

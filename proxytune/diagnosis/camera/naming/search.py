@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, CameraFit, fit_camera
+from proxytune.diagnosis.camera.model.fitting import SCALE_PX, CameraFit, fit_camera
+from proxytune.diagnosis.camera.model.normal_equations import EVIDENCE
 from proxytune.diagnosis.camera.model.optics import MOVING
 from proxytune.diagnosis.camera.model.projection import neutral_state, project
 from proxytune.diagnosis.camera.model.scatter import PASSES, pose_scatter

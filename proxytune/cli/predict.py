@@ -11,8 +11,8 @@ from rich.text import Text
 from proxytune.cli.terminal.answer import Answer
 from proxytune.diagnosis.horizon.prediction import agreement, predict
 from proxytune.diagnosis.measured.vehicle import robot_of
-from proxytune.diagnosis.predicted_pictures import predict_pictures, predicted_frames_text
-from proxytune.diagnosis.recording import PICTURES
+from proxytune.diagnosis.predicted_pictures import frames_of, predict_pictures
+from proxytune.diagnosis.recording import PICTURES, frames_text
 from proxytune.driving.robot import Robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
@@ -86,7 +86,7 @@ def _predict_pictures(log: Log, robot: Robot, model: Model, folder: Path) -> Ans
             numbers += part.numbers.tolist()
             errors += part.grey_errors.tolist()
             status.update(f"drawing: {len(numbers)} frames")
-    write_text(folder / "frames.csv", predicted_frames_text(log, numbers))
+    write_text(folder / "frames.csv", frames_text(log, frames_of(log), numbers))
     error = float(np.mean(errors))
     told = f"{len(numbers)} frames: mean absolute difference on the floor {error:.1f} grey levels\n{folder}"
     return Answer({"frames": len(numbers), "output": str(folder), "grey_error": error}, Text(told))

@@ -14,7 +14,7 @@ from proxytune.driving.cameras import CameraFigures, GroundPlaneCamera, ground_p
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import Floor, draw_floor
 
-LOG = Path(__file__).resolve().parents[3] / "../shared/data/logs/gym_duckietown_frames"
+LOG = Path(__file__).resolve().parents[4] / "../shared/data/logs/gym_duckietown_frames"
 CAMERA = CameraFigures(
     columns=160,
     rows=120,

@@ -37,7 +37,7 @@ class Measured(NamedTuple):
     Attributes:
         times: When each was measured (N,) [s].
         poses: x [m], y [m], heading [rad, unwrapped] (N, 3).
-        rows: The sample of the regular grid that is nearest to each (N,).
+        rows: The sample of the regular grid that each is moved to (N,), the nearest free one.
     """
 
     times: Floats
@@ -58,7 +58,7 @@ class LogEpisode:
         wheels: Measured wheel speeds (rows, 2), left and right [rad/s], or None.
         issued: When each command was issued (M,) [s], held until the next; None where they go with the samples.
         measured: Poses as they were measured, where they have times of their own: `poses` has each moved to the
-            nearest sample along the motion round it, by half a sample at most. None where they lie on the grid.
+            nearest free sample along the motion round it, by a sample at most. None where they lie on the grid.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """Drives whose poses have times of their own: jittered, with gaps, at whatever rate.
 
-A replay goes on in regular steps. Each pose is therefore moved to the nearest step along the motion measured round it:
-by half a step at most, some milliseconds, over which that motion is as good as straight. The poses as they were
+A replay goes on in regular steps. Each pose is therefore moved to the nearest free step along the motion measured round
+it: by a step at most, some milliseconds, over which that motion is as good as straight. The poses as they were
 measured, and their times, are kept beside it.
 """
 
@@ -21,6 +21,9 @@ from proxytune.logs.rows import Rows
 STEPS_HZ = 60.0
 """The grid has about so many steps a second at least."""
 
+MISSED = 10
+"""The rate is counted over intervals in which no more poses than this are missing."""
+
 REACH_S = 0.1
 """The motion round a pose is taken from so long before it to so long after."""
 
@@ -34,7 +37,7 @@ class _Drive(NamedTuple):
 
 
 def usual_rate(samples: Rows) -> float:
-    """Measured poses a second, at the usual interval between them.
+    """Measured poses a second, drop-outs and gaps apart.
 
     Raises:
         LogError: If no drive has two poses.
@@ -44,7 +47,9 @@ def usual_rate(samples: Rows) -> float:
     between = np.diff(times)[np.diff(episode) == 0]
     if not len(between):
         raise LogError(f"{samples.path}: no drive has two measured poses; nothing can be learnt from it")
-    return 1.0 / float(np.median(between))
+    periods = np.rint(between / np.median(between))
+    near = (periods >= 1.0) & (periods <= MISSED)
+    return float(periods[near].sum() / between[near].sum())
 
 
 def episodes_at_own_times(
@@ -90,23 +95,23 @@ def _check_density(samples: Rows, usual: float) -> None:
 
 
 def _episode(name: str, drive: _Drive, commands: Floats, issued: Floats, rate_hz: float) -> LogEpisode:
-    length = int(np.rint((drive.times[-1] - drive.times[0]) * rate_hz)) + 1
+    steps = (drive.times - drive.times[0]) * rate_hz
+    known, rows = _free_steps(steps, np.flatnonzero(np.isfinite(drive.poses[:, 0])))
+    length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
     grid = drive.times[0] + np.arange(length) / rate_hz
-    nearest = np.rint((drive.times - grid[0]) * rate_hz).astype(np.int64)
-    kept = _one_a_step(drive, grid, nearest)
-    measured = Measured(drive.times[kept], drive.poses[kept], nearest[kept])
+    measured = Measured(drive.times[known], drive.poses[known], rows)
     poses = np.full((length, 3), np.nan)
-    poses[measured.rows] = moved(measured, grid[measured.rows])
-    return LogEpisode(name, grid, commands, poses, _held(drive, nearest, length), issued, measured)
+    poses[rows] = moved(measured, grid[rows])
+    return LogEpisode(name, grid, commands, poses, _held(drive, np.rint(steps), length), issued, measured)
 
 
-def _one_a_step(drive: _Drive, grid: Floats, nearest: Whole) -> Whole:
-    """Rows with a pose, of several at one step the one nearest to it."""
-    known = np.flatnonzero(np.isfinite(drive.poses[:, 0]))
-    off = np.abs(drive.times - grid[nearest])[known]
-    order = known[np.lexsort((off, nearest[known]))]
-    _, first = np.unique(nearest[order], return_index=True)
-    return np.asarray(order[first])
+def _free_steps(steps: Floats, known: Whole) -> tuple[Whole, Whole]:
+    """The nearest step to each known pose that none before it has, and which poses are not a step off by that."""
+    order = np.arange(len(known))
+    nearest = np.rint(steps[known]).astype(np.int64)
+    rows = np.maximum.accumulate(nearest - order) + order if len(known) else nearest
+    near = np.abs(rows - steps[known]) <= 1.0
+    return known[near], rows[near]
 
 
 def moved(measured: Measured, times: Floats) -> Floats:
@@ -126,12 +131,12 @@ def moved(measured: Measured, times: Floats) -> Floats:
     return np.asarray(out[np.maximum.accumulate(np.where(repeats, 0, here))])
 
 
-def _held(drive: _Drive, nearest: Whole, length: int) -> Floats | None:
+def _held(drive: _Drive, steps: Floats, length: int) -> Floats | None:
     """Measured wheel speeds at every step, the last measured one held."""
     if drive.wheels is None:
         return None
     known = np.flatnonzero(np.isfinite(drive.wheels).all(axis=1))
     if not len(known):
         return np.full((length, 2), np.nan)
-    newest = np.searchsorted(nearest[known], np.arange(length), side="right") - 1
+    newest = np.searchsorted(steps[known], np.arange(length), side="right") - 1
     return np.asarray(drive.wheels[known[np.maximum(newest, 0)]])

@@ -27,6 +27,9 @@ FOREIGN_TRUTH = {
 
 FIGURES = {"wheel_radius_m": RADIUS_M, "baseline_m": BASELINE_M, "full_speed_m_s": FULL_SPEED_M_S}
 
+BAGS = ("ros1", "sqlite3", "mcap")
+FORMS = (*BAGS, "csv", "tum")
+
 EPOCH_S = 1_700_000_000.0
 """Stamps count from 1970, as a bag's do."""
 
@@ -128,3 +131,31 @@ def write_csv(folder: Path, number: int, recording: Recording) -> None:
 
 def _nanoseconds(times: np.ndarray) -> np.ndarray:
     return np.rint(times * 1e6).astype(np.int64) * 1000
+
+
+def write_tum(folder: Path, number: int, recording: Recording) -> None:
+    """A trajectory, and its commands in a file of their own beside it."""
+    half = recording.poses[:, 2] / 2.0
+    zero = np.zeros(len(half))
+    columns = (recording.measured, *recording.poses[:, :2].T, zero, zero, zero, np.sin(half), np.cos(half))
+    np.savetxt(folder / f"run{number}.tum", np.stack(columns, axis=1), fmt=["%.6f", *["%.9f"] * 7])
+    commands = pd.DataFrame(recording.twists, columns=["v", "omega"])
+    commands.insert(0, "time", [f"{time:.6f}" for time in recording.issued])
+    commands.to_csv(folder / f"run{number}_cmd.csv", index=False)
+
+
+def write_form(home: Path, form: str, recordings: Sequence[Recording]) -> Path:
+    """The drives as one of FORMS, in a folder of that name."""
+    folder = home / form
+    folder.mkdir(parents=True)
+    for number, one in enumerate(recordings):
+        if form in BAGS:
+            from bags import write_bag
+
+            path = folder / (f"run{number}.bag" if form == "ros1" else f"run{number}")
+            write_bag(path, form, (one.issued, one.twists), (one.measured, one.poses))
+        elif form == "csv":
+            write_csv(folder, number, one)
+        else:
+            write_tum(folder, number, one)
+    return folder

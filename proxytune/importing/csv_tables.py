@@ -88,8 +88,8 @@ def _files(path: Path, wanted: Wanted) -> list[Path]:
     if not path.is_dir():
         return [path]
     tables = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
-    asked_for = {Path(wanted.commands), path / wanted.commands} if wanted.commands else set()
-    files = [file for file in tables if file not in asked_for and not is_named_as_commands(file)]
+    asked_for = {Path(wanted.commands).resolve(), (path / wanted.commands).resolve()} if wanted.commands else set()
+    files = [file for file in tables if file.resolve() not in asked_for and not is_named_as_commands(file)]
     if not files:
         raise LogError(f"{path}: has no CSV file with poses; give the folder or the file that they were written to")
     return files

@@ -62,18 +62,21 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
 
 
 def _check_wanted(table: Table, arrays: Arrays, wanted: Wanted) -> None:
-    """Refuse --commands with a name, and a column map of arrays of another length than the times."""
+    """Refuse --commands with a name, and arrays for commands and poses of another length than the times."""
     if wanted.commands not in ("", "none"):
         raise LogError(
             f"{table.path}: --commands {wanted.commands}: name arrays by column, as in --columns "
             f"left={wanted.commands}[0] right={wanted.commands}[1]"
         )
-    for field, entry in wanted.columns.items():
+    usual = {} if wanted.columns else {name: name for name in (*ACTIONS, *POSITIONS, *ANGLES)}
+    if "none" in (wanted.commands, wanted.kind):
+        usual = {name: name for name in usual if name not in ACTIONS}
+    for field, entry in {**usual, **wanted.columns}.items():
         array = next((name for name in (entry, *(entry.split(mark)[0] for mark in ":[")) if name in arrays), "")
         if array and not any(name == array or name.startswith(f"{array}[") for name in table.names):
             raise LogError(
-                f"{table.path}: column map: {field}={entry}: array '{array}' is {arrays[array].shape} of "
-                f"{arrays[array].dtype}, but there are {len(table.cells)} times; name numbers of that length"
+                f"{table.path}: {field}: array '{array}' is {arrays[array].shape} of {arrays[array].dtype}, "
+                f"but there are {len(table.cells)} times; give one number, or a short row of numbers, for each time"
             )
 
 

@@ -117,9 +117,11 @@ def test_values_that_fit_a_unit_pass(unit, values):
 
 @given(st.text(max_size=30), st.sampled_from(["time", "length", "angle", "number"]))
 def test_any_entry_is_split_or_refused_in_one_line(entry, quantity):
+    written, said = entry, "here: "
     try:
         name, unit = split_unit(entry, quantity, ["x"], "here")
+        written = f"{name}:{unit.name}" if unit else name
     except LogError as problem:
-        assert str(problem).startswith("here: ")
-    else:
-        assert entry == (f"{name}:{unit.name}" if unit else name)
+        said = str(problem)
+    assert written == entry
+    assert said.startswith("here: ")

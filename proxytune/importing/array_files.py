@@ -25,8 +25,9 @@ def load_arrays(path: Path) -> Arrays:
         LogError: If it is no such file, is damaged, or holds pickled objects.
     """
     try:
-        file = np.load(path, allow_pickle=False)
-        arrays = {name: np.asarray(file[name]) for name in getattr(file, "files", ())}
+        with path.open("rb") as stream:
+            file = np.load(stream, allow_pickle=False)
+            arrays = {name: np.asarray(file[name]) for name in getattr(file, "files", ())}
     except FileNotFoundError:
         raise LogError(f"{path}: no such file; check the path") from None
     except Exception as problem:  # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.

@@ -52,8 +52,8 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
     check_fields(wanted.columns, str(path))
     arrays = load_arrays(path)
     table = as_table(path, arrays, wanted.columns.get("time", ""))
-    _check_lengths(table, arrays, wanted)
-    gym, notes = _gym_duckietown(table, arrays, wanted)
+    _check_wanted(table, arrays, wanted)
+    table, gym, notes = _gym_duckietown(table, arrays, wanted)
     columns, kind = _columns(table, gym | dict(wanted.columns), wanted)
     frames = find_frames(path, arrays, wanted.frames, len(table.cells))
     drives = _drives(table, columns, kind, arrays[frames] if frames else None)
@@ -61,14 +61,22 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
     return Source("numpy arrays", tuple(drives), channels, (f"Columns: {described(columns)}.", *notes))
 
 
-def _check_lengths(table: Table, arrays: Arrays, wanted: Wanted) -> None:
-    """Refuse a column map that names an array of another length than the times."""
-    for field, entry in wanted.columns.items():
+def _check_wanted(table: Table, arrays: Arrays, wanted: Wanted) -> None:
+    """Refuse --commands with a name, and arrays for commands and poses of another length than the times."""
+    if wanted.commands not in ("", "none"):
+        raise LogError(
+            f"{table.path}: --commands {wanted.commands}: name arrays by column, as in --columns "
+            f"left={wanted.commands}[0] right={wanted.commands}[1]"
+        )
+    usual = {} if wanted.columns else {name: name for name in (*ACTIONS, *POSITIONS, *ANGLES)}
+    if "none" in (wanted.commands, wanted.kind):
+        usual = {name: name for name in usual if name not in ACTIONS}
+    for field, entry in {**usual, **wanted.columns}.items():
         array = next((name for name in (entry, *(entry.split(mark)[0] for mark in ":[")) if name in arrays), "")
         if array and not any(name == array or name.startswith(f"{array}[") for name in table.names):
             raise LogError(
-                f"{table.path}: column map: {field}={entry}: array '{array}' is {arrays[array].shape} of "
-                f"{arrays[array].dtype}, but there are {len(table.cells)} times; name numbers of that length"
+                f"{table.path}: {field}: array '{array}' is {arrays[array].shape} of {arrays[array].dtype}, "
+                f"but there are {len(table.cells)} times; give one number, or a short row of numbers, for each time"
             )
 
 
@@ -76,7 +84,7 @@ def _gym_duckietown(table: Table, arrays: Arrays, wanted: Wanted) -> tuple[Table
     """A table with gym-duckietown's y turned upwards, its columns by field, and what is to be said of it."""
     names = [next((name for name in usual if name in arrays), "") for usual in (ACTIONS, POSITIONS, ANGLES)]
     actions, positions, angles = names
-    if f"{positions}[2]" not in table.names or angles not in table.names:
+    if {"x", "y"} & set(wanted.columns) or not {f"{positions}[2]", angles} <= set(table.names):
         return table, {}, []
     height = arrays.get("map_height")
     top = float(height) if height is not None and height.ndim == 0 and height.dtype.kind in "iuf" else 0.0
@@ -93,7 +101,7 @@ def _gym_note(positions: str, y: str, measured: bool) -> str:
     origin = "bottom" if measured else "top"
     return (
         f"{positions} are in gym-duckietown's frame (x right, y up, z down the map): here x is {positions}[0], "
-        f"y is {y}, z is {positions}[1], so that the origin is the map's {origin} left corner; headings stay as they are."
+        f"y is {y}, z is {positions}[1], so that the origin is the map's {origin} left corner; headings stay"
     )
 
 

@@ -40,7 +40,9 @@ class CommandFile:
 
 def is_named_as_commands(path: Path) -> bool:
     """Whether a file's name says that it holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on."""
-    return path.suffix in SUFFIXES and any(path.stem == stem or path.stem.endswith(f"_{stem}") for stem in STEMS)
+    return path.suffix.lower() in SUFFIXES and any(
+        path.stem == stem or path.stem.endswith(f"_{stem}") for stem in STEMS
+    )
 
 
 def find_commands(path: Path, wanted: Wanted) -> Path | None:

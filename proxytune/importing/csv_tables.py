@@ -17,7 +17,7 @@ from proxytune.importing.columns import (
 )
 from proxytune.importing.command_files import find_commands, is_named_as_commands, read_commands, share_commands
 from proxytune.importing.fields import COMMAND_FIELDS, EXAMPLE, POSE
-from proxytune.importing.measures import commands_by_drive, poses_by_drive
+from proxytune.importing.measures import commands_by_drive, pose_fields, poses_by_drive
 from proxytune.importing.source import Channel, Commands, Drive, Source
 from proxytune.importing.tables import Table
 from proxytune.importing.text import first_rows, is_number, read_text_table
@@ -88,8 +88,8 @@ def _files(path: Path, wanted: Wanted) -> list[Path]:
     if not path.is_dir():
         return [path]
     tables = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
-    asked_for = {Path(wanted.commands), path / wanted.commands} if wanted.commands else set()
-    files = [file for file in tables if file not in asked_for and not is_named_as_commands(file)]
+    asked_for = {Path(wanted.commands).resolve(), (path / wanted.commands).resolve()} if wanted.commands else set()
+    files = [file for file in tables if file.resolve() not in asked_for and not is_named_as_commands(file)]
     if not files:
         raise LogError(f"{path}: has no CSV file with poses; give the folder or the file that they were written to")
     return files
@@ -125,6 +125,7 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
     if not own or (apart and not holds_commands(columns)):
         return {field: column for field, column in columns.items() if field not in COMMAND_FIELDS}, "none"
     if not holds_commands(columns):
+        pose_fields(table, columns)
         raise LogError(
             f"{table.path}: no column of commands found; its columns are: {', '.join(table.names)}; say which they are "
             f"({EXAMPLE}), name their file (--commands FILE), or leave them out (--commands none)"

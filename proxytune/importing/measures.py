@@ -57,13 +57,28 @@ def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Co
     return drives
 
 
+def pose_fields(table: Table, columns: Columns) -> list[str]:
+    """The fields of a pose that the table has, quaternions last.
+
+    Raises:
+        LogError: If it lacks some.
+    """
+    lacking = [field for field in ("time", "x", "y") if field not in columns]
+    if "heading" not in columns and not set(QUATERNION) <= set(columns):
+        lacking.append("heading (or qx, qy, qz, qw)")
+    if lacking:
+        raise missing(table, lacking)
+    turned = ("heading",) if "heading" in columns else QUATERNION
+    return [field for field in POSE if field in columns and field in (*PLACE, *turned)]
+
+
 def poses_by_drive(table: Table, columns: Columns) -> dict[str, Poses]:
     """The poses of each drive that a table names; of "" where it names none.
 
     Raises:
         LogError: If a column is missing, a cell is no number, part of a pose is empty, or a drive has no two poses.
     """
-    fields = _pose_fields(table, columns)
+    fields = pose_fields(table, columns)
     rows = _filled_rows(table, columns, fields)
     if not len(rows.times):
         raise LogError(f"{table.path}: has no row with a pose; give the file that the poses were written to")
@@ -81,17 +96,6 @@ def poses_by_drive(table: Table, columns: Columns) -> dict[str, Poses]:
         drives[name] = Poses(rows.times[mine], places[mine], headings[mine], tilts[mine])
         _check_clock(drives[name].times, f"{_where(table, name)}: poses")
     return drives
-
-
-def _pose_fields(table: Table, columns: Columns) -> list[str]:
-    """The fields of a pose that the table has, quaternions last."""
-    lacking = [field for field in ("time", "x", "y") if field not in columns]
-    if "heading" not in columns and not set(QUATERNION) <= set(columns):
-        lacking.append("heading (or qx, qy, qz, qw)")
-    if lacking:
-        raise missing(table, lacking)
-    turned = ("heading",) if "heading" in columns else QUATERNION
-    return [field for field in POSE if field in columns and field in (*PLACE, *turned)]
 
 
 def _filled_rows(table: Table, columns: Columns, fields: Sequence[str]) -> Labelled:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from proxytune.errors import LogError
 from proxytune.importing.source import Floats
 
-EMPTY = ("", "nan", "na", "n/a", "null", "none")
-"""What stands in a cell in which there is nothing, in small letters."""
+EMPTY = ("", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "none", "None")
+"""What stands in a cell in which there is nothing."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,8 @@ class Table:
 
     Attributes:
         path: The file.
-        cells: The columns by name, of texts or of numbers; the index is the number of each row in the file.
+        cells: The columns by name, of numbers, or of texts without blanks around them; the index is the number of each
+            row in the file.
         counted: What that number counts, "line" or "row".
     """
 
@@ -43,15 +44,16 @@ class Table:
         Raises:
             LogError: If one is empty.
         """
-        texts = self.cells[column].astype(str).str.strip()
-        empty = texts.str.lower().isin(EMPTY).to_numpy()
+        texts = self.cells[column].astype(str)
+        empty = texts.isin(EMPTY).to_numpy()
         if empty.any():
             raise self.error(int(np.argmax(empty)), column, "is empty; name the drive that the row belongs to")
         return texts.to_numpy(dtype=np.str_)
 
     def filled(self, column: str) -> int:
         """How many cells of a column are not empty."""
-        return int((~self.cells[column].astype(str).str.strip().str.lower().isin(EMPTY)).sum())
+        cells = self.cells[column]
+        return len(cells) - int((cells.isna() | cells.isin(EMPTY)).sum())
 
     def numbers(self, column: str) -> Floats:
         """A column as numbers (N,), NaN where a cell is empty; decimal commas are read as points.
@@ -60,16 +62,14 @@ class Table:
             LogError: If a cell holds something else.
         """
         cells = self.cells[column]
-        if pd.api.types.is_numeric_dtype(cells):
-            values = cells.to_numpy(dtype=np.float64)
-            wrong = np.isinf(values)
-        else:
-            texts = cells.str.strip()
-            values = pd.to_numeric(texts.str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64)
-            wrong = ~np.isfinite(values) & ~texts.str.lower().isin(EMPTY).to_numpy()
+        values = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64, copy=True)
+        if not pd.api.types.is_numeric_dtype(cells):
+            odd = np.flatnonzero(~np.isfinite(values))
+            values[odd] = pd.to_numeric(cells.iloc[odd].str.replace(",", "."), errors="coerce")
+        wrong = ~np.isfinite(values) & ~(cells.isna() | cells.isin(EMPTY)).to_numpy()
         if wrong.any():
             row = int(np.argmax(wrong))
             cell = str(cells.iloc[row])[:40]
             problem = f"must be a finite number, or empty where nothing was measured, got '{cell}'"
             raise self.error(row, column, problem)
-        return np.where(np.isfinite(values), values, np.nan)
+        return values

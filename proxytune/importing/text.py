@@ -111,7 +111,7 @@ def _take_header(path: Path, comments: Lines, lines: Lines) -> tuple[str, list[s
 
 
 def _names(path: Path, number: int, cells: list[str]) -> list[str]:
-    names = [cell.strip() or f"column {place}" for place, cell in enumerate(cells, start=1)]
+    names = [cell or f"column {place}" for place, cell in enumerate(cells, start=1)]
     repeated = [name for name, count in Counter(names).items() if count > 1]
     if repeated:
         raise LogError(f"{path}: line {number}: names the column '{repeated[0]}' twice; rename one of them")
@@ -127,6 +127,7 @@ def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
     if not separator:
         return line.split()
     try:
-        return next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True))
+        row = next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True))
+        return [cell.strip() for cell in row]
     except csv.Error as problem:
         raise LogError(f"{path}: line {number}: is not a row of a CSV table ({problem}); correct that line") from None

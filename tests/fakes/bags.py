@@ -1,5 +1,6 @@
 """Synthetic bags: the same drive as a ROS 1 file, or a ROS 2 folder of sqlite3 or mcap."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ POSE = "geometry_msgs/msg/PoseStamped"
 TWIST = "geometry_msgs/msg/Twist"
 
 
+@cache
 def typestore(storage):
     """The types of messages, with two that a distribution may lack."""
     store = typesys.get_typestore(getattr(typesys.Stores, "ROS1_NOETIC" if storage == "ros1" else "ROS2_HUMBLE"))
@@ -26,7 +28,7 @@ def typestore(storage):
     return store
 
 
-def _make(store, kind, fields):
+def make(store, kind, fields):
     """A message of a type out of a table of its fields; what is left out is zero."""
     values = {}
     for name, (node, what) in store.fielddefs[kind][1]:
@@ -39,12 +41,12 @@ def _make(store, kind, fields):
 
 def _value(store, node, what, given):
     if node.name == "NAME":
-        return _make(store, what, given or {})
+        return make(store, what, given or {})
     if node.name == "BASE":
         return given if given is not None else ("" if what[0] == "string" else 0)
     (inner, kind), length = what
     if inner.name == "NAME":
-        return [_make(store, kind, each) for each in given or ()]
+        return [make(store, kind, each) for each in given or ()]
     if kind[0] == "string":
         return list(given or ())
     return np.asarray(np.zeros(length) if given is None else given, dtype=kind[0])
@@ -95,7 +97,7 @@ def write_messages(path, storage, messages):
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
             if fields is None:
                 continue  # A topic without messages
-            message = _make(store, kind, fields)
+            message = make(store, kind, fields)
             raw = store.serialize_ros1(message, kind) if storage == "ros1" else store.serialize_cdr(message, kind)
             writer.write(connections[topic], nanoseconds(received_s), raw)
     return path

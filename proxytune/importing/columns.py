@@ -182,3 +182,12 @@ def _of_an_epoch(table: Table, column: Column) -> Column:
         return column
     unit = epoch_unit(table.numbers(column.name))
     return replace(column, unit=unit, known_by="by its size") if unit else column
+
+
+def summed(parts: Sequence[Sequence[Channel]]) -> tuple[Channel, ...]:
+    """Columns of several files, those of equal name and role as one."""
+    counts: dict[tuple[str, str], int] = {}
+    for channel in (channel for part in parts for channel in part):
+        key = channel.name, channel.role
+        counts[key] = counts.get(key, 0) + channel.count
+    return tuple(Channel(name, "column", count, role) for (name, role), count in counts.items())

@@ -1,6 +1,5 @@
 """CSV files: poses and commands in one table, or in two that are joined by time."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from proxytune.importing.columns import (
     described,
     holds_commands,
     named_in,
+    summed,
 )
 from proxytune.importing.command_files import find_commands, is_named_as_commands, read_commands, share_commands
 from proxytune.importing.fields import COMMAND_FIELDS, EXAMPLE, POSE
@@ -70,7 +70,11 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
     check_fields(wanted.columns, str(path))
     files = _files(path, wanted)
     recordings = [_read_recording(file, wanted, alone=len(files) == 1) for file in files]
-    drives, channels, notes = [], list(_summed(recordings)), [recording.note for recording in recordings]
+    drives, channels, notes = (
+        [],
+        list(summed([recording.channels for recording in recordings])),
+        [recording.note for recording in recordings],
+    )
     for apart in dict.fromkeys(recording.apart for recording in recordings):
         mine = [recording for recording in recordings if recording.apart == apart]
         group = [drive for recording in mine for drive in recording.drives]
@@ -133,13 +137,3 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
     kind = command_kind(columns, wanted.kind, table)
     unused = set(COMMAND_FIELDS) - set(COMMANDS[kind])
     return {field: column for field, column in columns.items() if field not in unused}, kind
-
-
-def _summed(recordings: Sequence[Recording]) -> list[Channel]:
-    """Columns of equal name and role as one."""
-    counts: dict[tuple[str, str], int] = {}
-    for recording in recordings:
-        for channel in recording.channels:
-            key = channel.name, channel.role
-            counts[key] = counts.get(key, 0) + channel.count
-    return [Channel(name, "column", count, role) for (name, role), count in counts.items()]

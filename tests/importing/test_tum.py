@@ -111,7 +111,8 @@ def test_trajectories_are_known_by_content(file, tmp_path):
     assert is_tum(file("", "empty.tum"))
     assert not is_tum(file("time,x\n1,2\n", "a.csv"))
     assert not is_tum(file("1 2 3\n", "b.txt"))
-    assert not is_tum(tmp_path)
+    assert is_tum(tmp_path), "a folder with such a file"
+    assert not is_tum(tmp_path.parent)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

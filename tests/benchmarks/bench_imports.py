@@ -90,10 +90,11 @@ def report(rows: Sequence[dict[str, Any]]) -> str:
     for offset in OFFSETS_S:
         own = [row for row in rows if row["offset_s"] == offset]
         named = [set(row["effects"]) - {"delay"} for row in own]
+        right = sum(row["verdict"] == "explained" for row in own)
         told = [row["told_offset_s"] for row in own if row["told_offset_s"]]
         lines.append(
             f"poses stamped {offset:+.2f} s: {len(own)} recordings; named {sum(n >= EXPECTED for n in named)}, nothing "
-            f"beside {sum(n <= EXPECTED for n in named)}, explained {sum(row['verdict'] == 'explained' for row in own)}; "
+            f"beside {sum(n <= EXPECTED for n in named)}, explained {right}; "
             f"offset told {len(told)}" + (f" ({min(told):.3f} to {max(told):.3f} s)" if told else "")
         )
     return "\n".join(lines)

@@ -162,7 +162,7 @@ def test_without_commands_only_if_asked_for(tmp_path):
         (OWN, {"columns": {"x": "state[5]"}}, "has no column 'state[5]'"),
         (OWN, {"columns": {"time": "clock"}}, "say it, as in --columns time=timestamps:s"),
         ({"short": TIMES[:5]}, {"columns": {"x": "short"}}, "array 'short' is (5,) of float64, but there are 60 times"),
-        ({}, {"commands": "actions"}, "--columns left=actions[0] right=actions[1]"),
+        ({}, {"commands": "actions"}, "--columns left=actions[0],right=actions[1]"),
         ({}, {"columns": {"speed": "v"}}, "unknown name 'speed'"),
     ],
 )

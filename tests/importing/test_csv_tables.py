@@ -141,7 +141,7 @@ def test_each_file_of_a_folder_is_a_drive(tmp_path, file):
     file(BOTH, "one.csv"), file(BOTH, "two.csv")
     source = read(tmp_path)
     assert [drive.name for drive in source.drives] == ["one", "two"]
-    assert source.form == "folder of 2 CSV files"
+    assert source.form == "folder of CSV files"
     assert len(source.notes) == 1
 
 

@@ -66,7 +66,7 @@ def _check_wanted(table: Table, arrays: Arrays, wanted: Wanted) -> None:
     if wanted.commands not in ("", "none"):
         raise LogError(
             f"{table.path}: --commands {wanted.commands}: name arrays by column, as in --columns "
-            f"left={wanted.commands}[0] right={wanted.commands}[1]"
+            f"left={wanted.commands}[0],right={wanted.commands}[1]"
         )
     usual = {} if wanted.columns else {name: name for name in (*ACTIONS, *POSITIONS, *ANGLES)}
     if "none" in (wanted.commands, wanted.kind):

@@ -84,7 +84,7 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
             channels += commands.channels
             notes.append(commands.note)
         drives += group
-    form = f"folder of {len(files)} CSV files" if path.is_dir() else "CSV table"
+    form = "folder of CSV files" if path.is_dir() else "CSV table"
     return Source(form, tuple(drives), tuple(channels), tuple(dict.fromkeys(notes)))
 
 

@@ -50,6 +50,12 @@ def test_static_transforms_on_both_sides_are_composed(tmp_path):
     assert np.unwrap(poses.headings) == pytest.approx(heading + np.pi / 2)
 
 
+def test_a_static_transform_published_again_replaces_the_first(tmp_path):
+    world = moving("map", "odom", [(7.0, 0.0, 0.0), (10.0, 0.0, 0.0)], TIMES[[0, 30]], "/tf_static")
+    poses = read(tmp_path, world, moving("odom", "base_link", circle())).drives[0].poses
+    assert poses.places[:, 0] == pytest.approx(10.0 + circle()[:, 0])
+
+
 def test_a_slower_transform_is_interpolated_within_what_it_covers(tmp_path):
     slow = TIMES[[5, 20, 40]] + 0.03
     drifting = [(0.1 * (time - TIMES[0]), 0.0, 0.0) for time in slow]
@@ -78,6 +84,7 @@ def test_a_tilted_camera_frame_has_a_tilt(tmp_path):
     poses = read(tmp_path, mount, moving("odom", "base_link", circle()), wanted=wanted).drives[0].poses
     assert poses.tilts == pytest.approx(np.full(50, 0.3))
     assert poses.places[:, 2] == pytest.approx(np.ones(50))
+    assert np.unwrap(poses.headings) == pytest.approx(circle()[:, 2])
 
 
 def test_map_goes_before_odom_and_namespaces_do_not_matter(tmp_path):

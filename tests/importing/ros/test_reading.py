@@ -116,6 +116,14 @@ def test_a_bag_without_definitions_is_read_by_those_of_humble(tmp_path):
     assert "does not define wheel_msgs/msg/WheelsCmdStamped" in source.channels[2].role
 
 
+def test_messages_that_only_the_metadata_know_are_missing(tmp_path):
+    bag = bags.write_bag(tmp_path / "run", "sqlite3", *DRIVE)
+    with sqlite3.connect(bag / "run.db3") as table:
+        table.execute("DELETE FROM messages WHERE topic_id = (SELECT id FROM topics WHERE name = '/pose')")
+    with pytest.raises(LogError, match="run: /pose: no messages; take another topic, or leave the bag out"):
+        read_bag(bag, Wanted())
+
+
 def test_several_publishers_of_a_topic_are_one_topic(tmp_path):
     """ROS 1 keeps a connection for each publisher."""
     store, path = bags.typestore("ros1"), tmp_path / "run.bag"

@@ -35,7 +35,7 @@ def test_a_single_transform_is_the_pose(tmp_path, storage):
     source = read(tmp_path, moving("odom", "base_link", circle()), storage=storage)
     assert source.drives[0].poses.places[:, :2] == pytest.approx(circle()[:, :2])
     assert source.drives[0].poses.times == pytest.approx(TIMES, abs=1e-6)
-    assert "Poses are odom>base_link, of the transforms odom>base_link." in source.notes
+    assert "Poses of base_link in odom are composed of odom>base_link." in source.notes
 
 
 def test_static_transforms_on_both_sides_are_composed(tmp_path):
@@ -50,12 +50,22 @@ def test_static_transforms_on_both_sides_are_composed(tmp_path):
     assert np.unwrap(poses.headings) == pytest.approx(heading + np.pi / 2)
 
 
+def test_a_static_transform_published_again_replaces_the_first(tmp_path):
+    world = moving("map", "odom", [(7.0, 0.0, 0.0), (10.0, 0.0, 0.0)], TIMES[[0, 30]], "/tf_static")
+    poses = read(tmp_path, world, moving("odom", "base_link", circle())).drives[0].poses
+    assert poses.places[:, 0] == pytest.approx(10.0 + circle()[:, 0])
+
+
 def test_a_slower_transform_is_interpolated_within_what_it_covers(tmp_path):
     slow = TIMES[[5, 20, 40]] + 0.03
     drifting = [(0.1 * (time - TIMES[0]), 0.0, 0.0) for time in slow]
     source = read(tmp_path, moving("map", "odom", drifting, slow), moving("odom", "base_link", circle()))
     poses = source.drives[0].poses
     assert poses.times == pytest.approx(TIMES[6:41], abs=1e-6)
+    assert any(
+        note.endswith("map>odom, odom>base_link; 15 outside of what all of them cover are left out.")
+        for note in source.notes
+    )
     assert poses.places[:, 0] == pytest.approx(circle()[6:41, 0] + 0.1 * (TIMES[6:41] - TIMES[0]), abs=1e-6)
 
 
@@ -78,17 +88,18 @@ def test_a_tilted_camera_frame_has_a_tilt(tmp_path):
     poses = read(tmp_path, mount, moving("odom", "base_link", circle()), wanted=wanted).drives[0].poses
     assert poses.tilts == pytest.approx(np.full(50, 0.3))
     assert poses.places[:, 2] == pytest.approx(np.ones(50))
+    assert np.unwrap(poses.headings) == pytest.approx(circle()[:, 2])
 
 
 def test_map_goes_before_odom_and_namespaces_do_not_matter(tmp_path):
     both = moving("map", "r1/odom", [(5.0, 0.0, 0.0)], TIMES[:1], "/tf_static")
     source = read(tmp_path, both, moving("r1/odom", "r1/base_link", circle()))
-    assert any(note.startswith("Poses are map>r1/base_link") for note in source.notes)
+    assert any(note.startswith("Poses of r1/base_link in map are") for note in source.notes)
 
 
 def test_a_transform_of_the_only_thing_that_moves_is_taken(tmp_path):
     source = read(tmp_path, moving("stage", "robot7", circle()))
-    assert any(note.startswith("Poses are stage>robot7") for note in source.notes)
+    assert any(note.startswith("Poses of robot7 in stage are") for note in source.notes)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +125,7 @@ def test_no_plain_pose_is_told_with_what_there_is(tmp_path, poses, words):
 
 def test_transforms_at_no_common_time_are_told(tmp_path):
     late = moving("map", "odom", circle()[:9], TIMES[:9] + 100)
-    with pytest.raises(LogError, match="between 'map' and 'base_link' share no time"):
+    with pytest.raises(LogError, match="the transforms of map>base_link share no time"):
         read(tmp_path, late, moving("odom", "base_link", circle()))
 
 
@@ -136,3 +147,9 @@ def test_a_bad_transform_is_told_by_name_and_number(tmp_path, row, words):
     rows = [*circle()[:2], row]
     with pytest.raises(LogError, match=f"transform odom>base_link: {words}"):
         read(tmp_path, moving("odom", "base_link", rows, TIMES[:3]))
+
+
+def test_a_bad_transform_elsewhere_does_no_harm(tmp_path):
+    wheel = moving("base_link", "wheel", [(np.nan, 0.0, 0.0)] * 3, TIMES[:3])
+    poses = read(tmp_path, wheel, moving("odom", "base_link", circle())).drives[0].poses
+    assert poses.places[:, :2] == pytest.approx(circle()[:, :2])

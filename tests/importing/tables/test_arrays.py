@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from proxytune.errors import LogError
-from proxytune.importing.arrays import is_arrays, read_arrays
-from proxytune.importing.csv_tables import read_csv_tables
+from proxytune.importing.tables.arrays import is_arrays, read_arrays
+from proxytune.importing.tables.csv_tables import read_csv_tables
 from proxytune.importing.wanted import Wanted
 
 FRAMES = np.arange(ROWS * 2 * 3 * 3, dtype=np.uint64).astype(np.uint8).reshape(ROWS, 2, 3, 3)

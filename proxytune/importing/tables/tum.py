@@ -4,12 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from proxytune.errors import LogError
-from proxytune.importing.columns import channels_of, check_fields, described, own_columns, summed
-from proxytune.importing.command_files import find_commands, read_commands, share_commands
-from proxytune.importing.fields import PLACE, QUATERNION
-from proxytune.importing.measures import poses_by_drive
 from proxytune.importing.source import Drive, Source
-from proxytune.importing.text import first_rows, is_number, read_text_table
+from proxytune.importing.tables.columns import channels_of, check_fields, described, own_columns, summed
+from proxytune.importing.tables.command_files import find_commands, read_commands, share_commands
+from proxytune.importing.tables.fields import PLACE, QUATERNION
+from proxytune.importing.tables.measures import poses_by_drive
+from proxytune.importing.tables.text import first_rows, is_number, read_text_table
 from proxytune.importing.wanted import Wanted
 
 COLUMNS = ("time", *PLACE, *QUATERNION)

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from proxytune.errors import LogError
-from proxytune.importing.fields import EXAMPLE, QUANTITIES, QUATERNION, USUAL
 from proxytune.importing.source import Channel, Floats
-from proxytune.importing.tables import Table
-from proxytune.importing.units import Unit, contradiction, epoch_unit, own_unit, split_ending, split_unit
+from proxytune.importing.tables.cells import Table
+from proxytune.importing.tables.fields import EXAMPLE, QUANTITIES, QUATERNION, USUAL
+from proxytune.importing.tables.units import Unit, contradiction, epoch_unit, own_unit, split_ending, split_unit
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
 

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from proxytune.errors import LogError
-from proxytune.importing.csv_tables import is_csv_tables, read_csv_tables
+from proxytune.importing.tables.csv_tables import is_csv_tables, read_csv_tables
 from proxytune.importing.wanted import Wanted
 
 POSES = "time,x,y,heading\n0,0,0,0\n0.1,0.1,0,0.1\n0.2,0.2,0,0.2\n"

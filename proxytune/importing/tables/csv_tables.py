@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from proxytune.errors import LogError
-from proxytune.importing.columns import (
+from proxytune.importing.source import Channel, Commands, Drive, Source
+from proxytune.importing.tables.cells import Table
+from proxytune.importing.tables.columns import (
     Columns,
     channels_of,
     check_fields,
@@ -15,12 +17,10 @@ from proxytune.importing.columns import (
     named_in,
     summed,
 )
-from proxytune.importing.command_files import find_commands, is_named_as_commands, read_commands, share_commands
-from proxytune.importing.fields import COMMAND_FIELDS, EXAMPLE, POSE
-from proxytune.importing.measures import commands_by_drive, pose_fields, poses_by_drive
-from proxytune.importing.source import Channel, Commands, Drive, Source
-from proxytune.importing.tables import Table
-from proxytune.importing.text import first_rows, is_number, read_text_table
+from proxytune.importing.tables.command_files import find_commands, is_named_as_commands, read_commands, share_commands
+from proxytune.importing.tables.fields import COMMAND_FIELDS, EXAMPLE, POSE
+from proxytune.importing.tables.measures import commands_by_drive, pose_fields, poses_by_drive
+from proxytune.importing.tables.text import first_rows, is_number, read_text_table
 from proxytune.importing.wanted import Wanted
 from proxytune.logs import COMMANDS
 

@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from proxytune.errors import LogError
-from proxytune.importing.csv_tables import read_csv_tables
-from proxytune.importing.tum import is_tum, read_tum
+from proxytune.importing.tables.csv_tables import read_csv_tables
+from proxytune.importing.tables.tum import is_tum, read_tum
 from proxytune.importing.wanted import Wanted
 
 LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"

@@ -73,3 +73,9 @@ def test_a_static_transform_published_again_replaces_the_first(tmp_path):
     world = moving("map", "odom", [(7.0, 0.0, 0.0), (10.0, 0.0, 0.0)], TIMES[[0, 30]], "/tf_static")
     poses = read(tmp_path, world, moving("odom", "base_link", circle())).drives[0].poses
     assert poses.places[:, 0] == pytest.approx(10.0 + circle()[:, 0])
+
+
+def test_a_pair_that_never_moves_is_not_taken(tmp_path):
+    dock = moving("map", "dock/base_link", [(1.0, 0.0, 0.0)], TIMES[:1], "/tf_static")
+    source = read(tmp_path, dock, moving("odom", "base_link", circle()))
+    assert any(note.startswith("Poses of base_link in odom are") for note in source.notes)

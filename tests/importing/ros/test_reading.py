@@ -86,13 +86,8 @@ def test_bags_of_a_folder_share_their_topics(tmp_path):
 
 
 def test_transforms_of_the_first_bag_are_those_of_all(tmp_path):
-    def moving(child):
-        for time, row in zip(TIMES, POSES, strict=True):
-            transforms = [bags.transform(time, "map", child, row)]
-            yield "/tf", "tf2_msgs/msg/TFMessage", time, {"transforms": transforms}
-
-    bags.write_messages(tmp_path / "one.bag", "ros1", moving("base_link"))
-    bags.write_messages(tmp_path / "two.bag", "ros1", moving("robot"))
+    for name, child in (("one.bag", "base_link"), ("two.bag", "robot")):
+        bags.write_messages(tmp_path / name, "ros1", bags.transform_messages("map", child, POSES, TIMES))
     with pytest.raises(LogError, match="two.bag: /tf: no transforms lead from 'map' to 'base_link'"):
         read_bag(tmp_path, Wanted(commands="none"))
 

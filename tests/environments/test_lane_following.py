@@ -6,19 +6,20 @@ import warnings
 import numpy as np
 import pytest
 
-gymnasium = pytest.importorskip("gymnasium")
+pytest.importorskip("gymnasium")
 
-import pybullet  # noqa: E402 - without gymnasium there is nothing to test
-from gymnasium.utils.env_checker import check_env  # noqa: E402
-from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv  # noqa: E402
+import gymnasium
+import pybullet
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
-from proxytune.domain import make_episode  # noqa: E402
-from proxytune.driving.agents import AGENTS  # noqa: E402
-from proxytune.driving.robot import read_robot  # noqa: E402
-from proxytune.driving.task import METRICS  # noqa: E402
-from proxytune.environments import LANE_FOLLOWING  # noqa: E402
-from proxytune.environments.lane_following import LaneFollowingEnv  # noqa: E402
-from proxytune.errors import EpisodeError, InputError, SettingsError  # noqa: E402
+from proxytune.domain import make_episode
+from proxytune.driving.agents import AGENTS
+from proxytune.driving.robot import read_robot
+from proxytune.driving.task import METRICS
+from proxytune.environments import LANE_FOLLOWING
+from proxytune.environments.lane_following import LaneFollowingEnv
+from proxytune.errors import EpisodeError, InputError, SettingsError
 
 STRAIGHT = np.array((1.0, 0.95))
 THETA = {"trim": 0.1, "delay": 0.06, "image_noise": 8.0, "delay_jitter": 0.05}
@@ -64,7 +65,7 @@ def test_gymnasiums_checker_finds_nothing_to_warn_of(plant):
 @pytest.mark.parametrize("agent", ["daredevil", "smooth"])
 @pytest.mark.parametrize(
     ("plant", "camera", "seconds"),
-    [("bullet", "ground_plane", 3.0), ("planar", "ground_plane", 3.0), ("planar", "renderer", 0.5)],
+    [("bullet", "ground_plane", 3.0), ("planar", "ground_plane", 3.0), ("planar", "renderer", 1.0)],
 )
 def test_an_agent_drives_in_the_environment_as_in_a_study_to_the_last_bit(agent, plant, camera, seconds):
     env = make(plant=plant, camera=camera, seconds=seconds, theta=THETA, start=4)

@@ -6,13 +6,13 @@ import pytest
 
 pytest.importorskip("gymnasium")
 
-import gymnasium  # noqa: E402 - without it there is nothing to test
+import gymnasium
 
-import proxytune  # noqa: E402
-from proxytune.driving.agents.loading import load_agent  # noqa: E402
-from proxytune.environments.policies import agent_of  # noqa: E402
-from proxytune.errors import ExtensionError  # noqa: E402
-from proxytune.testing import check_agent  # noqa: E402
+import proxytune
+from proxytune.driving.agents.loading import load_agent
+from proxytune.environments.policies import agent_of
+from proxytune.errors import ExtensionError
+from proxytune.testing import check_agent
 
 
 class Brightness:
@@ -37,6 +37,7 @@ target = "target.csv"
 metrics = ["distance:max", "survival_time:max"]
 agents = ["steady", "daredevil", "my_policy:agent"]
 starts = 2
+budget = 4
 
 [parameters]
 trim = [-0.3, 0.3]

@@ -227,6 +227,16 @@ def test_a_rendering_shows_the_picture_beside_the_map_with_the_way():
     assert make().render() is None
 
 
+def test_the_map_is_drawn_with_y_upwards(tmp_path):
+    tall = "size = [2.4, 2.4]\nstarts = [[1.2, 0.17, 0.0]]"  # the road fills the lower part
+    (tmp_path / "tall.toml").write_text(OVAL.replace("SIZE", tall))
+    env = make(folder=tmp_path, map="tall.toml", render_mode="rgb_array")
+    env.reset(seed=0)
+    white = (env.render()[:, 640:] > 150).all(axis=-1).any(axis=1)
+    assert not white[:120].any()
+    assert white[-30:].any()
+
+
 def test_the_robot_is_drawn_where_it_is():
     env = make(render_mode="rgb_array", start=1)
     x, y, _ = env.reset(seed=0)[1]["pose"]

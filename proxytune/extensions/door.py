@@ -2,6 +2,8 @@
 
 import importlib
 import inspect
+import sysconfig
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -12,6 +14,8 @@ from proxytune.extensions.beside import import_beside
 from proxytune.extensions.plugins import plugins
 from proxytune.settings import nearest
 
+NOT_USERS = (Path(__file__).resolve().parents[1], *map(Path, sorted(set(sysconfig.get_paths().values()))))
+"""Folders of code that is ours, Python's or installed."""
 NONE: Mapping[str, Any] = MappingProxyType({})
 Answer = TypeVar("Answer")
 
@@ -98,6 +102,19 @@ def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:
 def describe(problem: BaseException) -> str:
     """An exception in one line."""
     return f"{type(problem).__name__}: {' '.join(str(problem).split())}".rstrip(": ")
+
+
+def place_of(problem: BaseException | None) -> str:
+    """Where in code that is neither ours nor installed an exception arose, in brackets; empty if nowhere."""
+    frames = traceback.extract_tb(problem.__traceback__) if problem else []
+    own = [frame for frame in frames if _is_users(frame.filename)]
+    return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+
+
+def _is_users(file: str) -> bool:
+    """Whether a file of code is a user's own."""
+    path = Path(file).resolve()
+    return path.is_file() and not any(path.is_relative_to(folder) for folder in NOT_USERS)
 
 
 def _lacks(found: Any, needs: Iterable[str]) -> list[str]:

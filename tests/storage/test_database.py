@@ -72,6 +72,7 @@ def test_a_newer_format_is_refused(tmp_path):
 
 
 OLD_TRIALS = """
+ALTER TABLE episodes DROP COLUMN code;
 DROP TABLE trials;
 CREATE TABLE trials (
     number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
@@ -87,6 +88,7 @@ CONVERTED_TRIALS = [
     ("prpv", 2, 1, "failed", None, "{}", 3, "it fell", "[]", None, 0.0),
 ]
 TRIALS_OF_3 = f"""
+ALTER TABLE episodes DROP COLUMN code;
 DROP TABLE trials;
 {TRIALS_3}
 INSERT INTO instances VALUES (1, 'identity', '{{}}');

@@ -14,7 +14,10 @@ from proxytune.extensions.beside import import_beside
 from proxytune.extensions.plugins import plugins
 from proxytune.settings import nearest
 
-NOT_USERS = (Path(__file__).resolve().parents[1], *map(Path, sorted(set(sysconfig.get_paths().values()))))
+NOT_USERS = (
+    Path(__file__).resolve().parents[1],
+    *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
+)
 """Folders of code that is ours, Python's or installed."""
 NONE: Mapping[str, Any] = MappingProxyType({})
 Answer = TypeVar("Answer")
@@ -86,7 +89,7 @@ def ask(what: str, question: Callable[[], Answer], where: str = "") -> Answer:
     except ProxytuneError:
         raise
     except Exception as problem:
-        raise ExtensionError(f"{what} raised {describe(problem)}{where}; correct it") from problem
+        raise ExtensionError(f"{what} raised {describe(problem)}{place_of(problem)}{where}; correct it") from problem
 
 
 def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:
@@ -141,7 +144,8 @@ def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleT
         if isinstance(problem, ModuleNotFoundError) and f"{module}.".startswith(f"{problem.name}."):
             where = "installed" if beside is None else f"in {beside.absolute()} or installed"
             raise ExtensionError(f"{kind} '{name}': no module '{problem.name}' {where}; check the name") from None
-        raise ExtensionError(f"{kind} '{name}': importing {module} raised {describe(problem)}; correct it") from problem
+        described = f"{describe(problem)}{place_of(problem)}"
+        raise ExtensionError(f"{kind} '{name}': importing {module} raised {described}; correct it") from problem
 
 
 def _plugin(name: str, kind: str, installed: Mapping[str, Any], shipped: Mapping[str, Any]) -> Any:

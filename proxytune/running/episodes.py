@@ -72,20 +72,21 @@ def _libraries(modules: int) -> ThreadpoolController:
 
 def _checked(family: DomainFamily, episode: Episode, result: Any, needed: Collection[str]) -> dict[str, float]:
     """The result as plain numbers, one per metric of the family; what is not needed may be missing."""
-    if not isinstance(result, Mapping):
+    if not hasattr(result, "keys"):
         raise EpisodeError(f"run of the domain family must give metrics by name, got {type(result).__name__}")
     metrics = {}
     for name in family.metrics:
-        value = result.get(name)
-        if _is_finite(value):
-            metrics[name] = float(value)
+        value = _number(result[name]) if name in result else math.nan
+        if math.isfinite(value):
+            metrics[name] = value
         elif name in (needed or family.metrics):
             raise EpisodeError(f"agent '{episode.agent}': the domain family gave no finite '{name}'")
     return metrics
 
 
-def _is_finite(value: Any) -> bool:
+def _number(value: Any) -> float:
+    """A value as a number; NaN if it is none."""
     try:
-        return math.isfinite(value)
-    except (TypeError, OverflowError):
-        return False
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan

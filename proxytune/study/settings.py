@@ -1,7 +1,7 @@
 """What study.toml says, read strictly."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,7 @@ class StudySettings:
         truth: A model.toml of what made the target, where that is known.
         objective: The measure that is made small or large: "prpv", "ppv", "plv", or one's own.
         metrics: How agents are compared.
-        agents: Names of the agents, at least two.
+        agents: Names of the agents, at least two, as tables and figures have them.
         starts: How many of the family's starting conditions, the first ones, each agent drives from.
         budget: How many trials.
         initial: How many of them come from the quasi-random design.
@@ -67,6 +67,7 @@ class StudySettings:
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
         teaching: How a proxy's worth as a teacher is measured, if it is.
+        aliases: What is loaded for an agent whose name in tables is another.
     """
 
     path: Path
@@ -93,6 +94,12 @@ class StudySettings:
     space: Space
     domain: Section
     teaching: TeachingSettings | None = None
+    aliases: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def loaded_agents(self) -> tuple[str, ...]:
+        """What is loaded for each agent."""
+        return tuple(self.aliases.get(agent, agent) for agent in self.agents)
 
     @property
     def folder(self) -> Path:
@@ -140,6 +147,7 @@ def read_study_settings(path: Path) -> StudySettings:
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
+        aliases=_aliases(read),
     )
 
 
@@ -162,10 +170,18 @@ def _metrics(read: Section) -> tuple[Metric, ...]:
 
 
 def _agents(read: Section) -> tuple[str, ...]:
-    agents = read.texts("agents")
+    agents = tuple(_aliases(read)) or read.texts("agents")
     if len(agents) < 2:
         raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
     return agents
+
+
+def _aliases(read: Section) -> dict[str, str]:
+    """The table [agents], where it is one: name in tables to what is loaded."""
+    if not isinstance(read.values.get("agents"), dict):
+        return {}
+    table = read.section("agents")
+    return {name: table.text(name) for name in table.values}
 
 
 def _stop(rules: Section) -> StopRules:
@@ -197,6 +213,7 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "objective": settings.objective,
         "metrics": [str(metric) for metric in settings.metrics],
         "agents": list(settings.agents),
+        "aliases": dict(settings.aliases),
         "starts": settings.starts,
         "budget": settings.budget,
         "initial": settings.initial,

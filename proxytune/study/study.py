@@ -18,6 +18,7 @@ from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.objective import PRPV, Objective, objective_of
+from proxytune.study.own_code import code_of
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
 from proxytune.study.weights import unnoticed
 from proxytune.usefulness.repeats import start_of, starts_of
@@ -41,6 +42,7 @@ class Study:
         cautions: What of study.toml or of the target's table is left out, in one line each.
         objective: The measure that its trials make small or large.
         engine: What proposes its trials after the design.
+        code: A digest of what the user's own code means; failures of other code are not remembered.
     """
 
     settings: StudySettings
@@ -51,6 +53,7 @@ class Study:
     cautions: tuple[str, ...] = ()
     objective: Objective = PRPV
     engine: Engine = gaussian_process.ENGINE
+    code: str = ""
 
 
 def open_study(path: Path) -> Study:
@@ -66,7 +69,8 @@ def open_study(path: Path) -> Study:
     left_out = (f"the target has no scores of {', '.join(absent)}: left out",) if absent else ()
     cautions = (*left_out, *unnoticed(settings.folder))
     target, objective = read_target(known, family), objective_of(settings)
-    return Study(known, family, target, family.identity, _truth(settings), cautions, objective, _engine(settings))
+    truth, engine, code = _truth(settings), _engine(settings), code_of(settings)
+    return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
 
 
 def _engine(settings: StudySettings) -> Engine:
@@ -168,6 +172,7 @@ def facts(study: Study) -> dict[str, Any]:
         "seed": settings.seed,
         **said,
         "cut_off": settings.cut_off,
+        **{f"agents.{name}": settings.aliases[name] for name in settings.agents if name in settings.aliases},
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
         "identity": study.identity,
@@ -181,7 +186,7 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
     # Another engine may learn from another part of it, and from the pre-flight.
     implied = {"target"} if {"agents", "metrics", "engine", "starts"} & set(keys) else set()
     implied |= {"preflight"} if "engine" in keys else set()
-    told = any(key == "family" or key.startswith("domain.") for key in keys)
+    told = any(key == "family" or key.startswith(("domain.", "agents.")) for key in keys)
     named = [key for key in keys if key not in implied | {"identity", "versions"}]
     both = "versions" in before and "versions" in after and not told
     versions = version_changes(before["versions"], after["versions"]) if both else []

@@ -32,7 +32,7 @@ BAD = {
     ),
     "a factory with a bug": (
         {"family": '"wobbly:broken_factory"'},
-        "raised KeyError: 'robot'; correct it",
+        "raised KeyError: 'robot' (wobbly.py, line 114); correct it",
     ),
     "something else": ({"family": '"wobbly:not_a_family"'}, "made no domain family: it lacks identity, metrics"),
     "a missing model": ({"proxy": '"nowhere.toml"'}, "proxy: no such file: "),

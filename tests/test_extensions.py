@@ -103,7 +103,7 @@ MISTAKES = {
     "an import that raises": ("bad:x", "agent 'bad:x': importing bad raised ZeroDivisionError: division by zero"),
     "an import that leaves": (
         "leaves:x",
-        "agent 'leaves:x': importing leaves raised SystemExit: 3 .leaves.py, line 2.; correct it",
+        "importing leaves raised SystemExit: 3 (leaves.py, line 2); correct it",
     ),
     "a missing neighbour": ("needy:x", "importing needy raised ModuleNotFoundError: No module named 'not_there'"),
     "bad syntax": ("odd:x", "agent 'odd:x': importing odd raised SyntaxError"),

@@ -18,7 +18,7 @@ FORMAT = 1
 LEARNING = "plv"
 """The objective that is not a measure of scores but of learning."""
 KEYS = (
-    "format", "name", "family", "proxy", "target", "truth", "objective", "metrics", "agents",
+    "format", "name", "family", "proxy", "target", "target_columns", "truth", "objective", "metrics", "agents",
     "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
     "cut_off", "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
@@ -47,7 +47,7 @@ class StudySettings:
         name: What the study is called.
         family: Where the domain family comes from, as "module:factory".
         proxy: A model.toml whose effects the proxy has, if any.
-        target: The score table of the target.
+        target: The score table of the target; of several files the first.
         truth: A model.toml of what made the target, where that is known.
         objective: The measure that is made small or large: "prpv", "ppv", "plv", or one's own.
         metrics: How agents are compared.
@@ -68,6 +68,8 @@ class StudySettings:
         domain: The table that the family's factory reads.
         teaching: How a proxy's worth as a teacher is measured, if it is.
         aliases: What is loaded for an agent whose name in tables is another.
+        more_targets: The other files of the target's score table.
+        target_columns: What columns are called in the target's files where that is another name.
     """
 
     path: Path
@@ -95,6 +97,13 @@ class StudySettings:
     domain: Section
     teaching: TeachingSettings | None = None
     aliases: Mapping[str, str] = field(default_factory=dict)
+    more_targets: tuple[Path, ...] = ()
+    target_columns: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def targets(self) -> tuple[Path, ...]:
+        """The files that hold the target's scores."""
+        return (self.target, *self.more_targets)
 
     @property
     def loaded_agents(self) -> tuple[str, ...]:
@@ -127,7 +136,7 @@ def read_study_settings(path: Path) -> StudySettings:
         name=read.text("name", path.absolute().parent.name),
         family=read.text("family", DEFAULT_FAMILY),
         proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
-        target=path.parent / read.text("target"),
+        target=path.parent / _targets(read)[0],
         truth=path.parent / read.text("truth") if "truth" in read.values else None,
         objective=read.text("objective", "prpv"),
         metrics=_metrics(read),
@@ -148,6 +157,8 @@ def read_study_settings(path: Path) -> StudySettings:
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
         aliases=_aliases(read),
+        more_targets=tuple(path.parent / name for name in _targets(read)[1:]),
+        target_columns=_texts(read.section("target_columns")),
     )
 
 
@@ -176,11 +187,19 @@ def _agents(read: Section) -> tuple[str, ...]:
     return agents
 
 
+def _targets(read: Section) -> tuple[str, ...]:
+    """The file of the target's scores, or several."""
+    if not isinstance(read.values.get("target"), list):
+        return (read.text("target"),)
+    return read.texts("target") or (read.text("target"),)
+
+
 def _aliases(read: Section) -> dict[str, str]:
     """The table [agents], where it is one: name in tables to what is loaded."""
-    if not isinstance(read.values.get("agents"), dict):
-        return {}
-    table = read.section("agents")
+    return _texts(read.section("agents")) if isinstance(read.values.get("agents"), dict) else {}
+
+
+def _texts(table: Section) -> dict[str, str]:
     return {name: table.text(name) for name in table.values}
 
 

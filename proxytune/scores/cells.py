@@ -75,6 +75,16 @@ def read_cells(path: Path, metrics: Sequence[str], columns: Columns | None = Non
     return Cells(path, lines[0][1], header, rows, _decimal(path, rows, metrics) if separator != "," else ".")
 
 
+def column_names(path: Path) -> list[str]:
+    """The columns of a file, as its first line names them.
+
+    Raises:
+        ScoresError: If it cannot be read.
+    """
+    text = _text(path)
+    return _lines(path, text, _separator(text))[0][1]
+
+
 def _text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8-sig")

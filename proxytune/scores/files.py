@@ -126,4 +126,5 @@ def _duplicate(row: Mapping[str, str], before: str) -> str:
     where = f" in domain '{row['domain']}'{before}" if "domain" in row else before
     if "episode" in row:
         return f"agent '{row['agent']}' has episode '{row['episode']}' twice{where}; number the episodes"
-    return f"agent '{row['agent']}' is there twice{where}; add a column 'episode'"
+    remedy = "add a column 'episode', or give its name: --columns episode=NAME"
+    return f"agent '{row['agent']}' is there twice{where}; {remedy}"

@@ -29,9 +29,7 @@ def test_a_target_in_several_files_is_the_one_that_it_would_be_in_one(make_study
 def test_an_episode_in_two_files_is_refused_with_both(make_study, rows):
     folder = make_study(target='["monday.csv", "tuesday.csv"]')
     write(folder, monday=[HEAD, *rows], tuesday=[HEAD, rows[0]])
-    with pytest.raises(
-        InputError, match=r"tuesday.csv: line 2: agent 'agent0' has episode '0' twice, once in .*monday"
-    ):
+    with pytest.raises(InputError, match=r"tuesday.csv: line 2: agent 'agent0' has episode '0' twice, once in .*mon"):
         open_study(folder)
 
 
@@ -39,9 +37,8 @@ def test_columns_have_the_target_s_own_names(make_study, rows):
     whole = open_study(make_study())
     columns = '{ agent = "policy", episode = "trial", distance = "dist_m" }'
     folder = make_study(target='"real.csv"', target_columns=columns)
-    write(
-        folder, real=["policy;trial;dist_m;survival_time", *(row.replace(",", ";").replace(".", ",") for row in rows)]
-    )
+    european = [row.replace(",", ";").replace(".", ",") for row in rows]
+    write(folder, real=["policy;trial;dist_m;survival_time", *european])
     assert facts(open_study(folder)) == facts(whole)
     make_study(target='"real.csv"', target_columns='{ agent = "polcy" }')
     with pytest.raises(InputError, match="no column 'agent'; columns found: policy, trial, dist_m, survival_time"):

@@ -275,9 +275,8 @@ def test_several_files_of_different_domains_make_no_table(own):
 
 
 def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
-    rows = [
-        f"{agent},{episode},{int(episode < wins)}" for agent, wins in zip("ABCD", (2, 2, 5, 8)) for episode in range(9)
-    ]
+    wins = {"A": 2, "B": 2, "C": 5, "D": 8}
+    rows = [f"{agent},{episode},{int(episode < wins[agent])}" for agent in wins for episode in range(9)]
     Path("rates.csv").write_text("\n".join(["agent,episode,success", *rows]) + "\n")
     words = ("--proxy", "rates.csv", "--target", "rates.csv", "--metric", "success:max")
     rate = document(*words)["success_rates"]["success"]["C"]["target"]
@@ -289,12 +288,8 @@ def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
 
 def test_with_three_agents_no_proxy_is_called_perfect(tables):
     """Chance alone ranks three agents rightly in one case of six."""
-    again = [
-        f"{agent},{episode}/{repeat},{10 * number}"
-        for number, agent in enumerate("ABC")
-        for episode in range(5)
-        for repeat in (0, 1)
-    ]
+    labels = [f"{episode}/{repeat}" for episode in range(5) for repeat in (0, 1)]
+    again = [f"{agent},{label},{ord(agent)}" for agent in "ABC" for label in labels]
     Path("three.csv").write_text("\n".join(["agent,episode,distance", *again]) + "\n")
     found = document("--proxy", "three.csv", "--target", "three.csv", "--metric", "distance:max")
     assert (found["prpv"], found["noise_floor_kind"], found["at_noise_floor"]) == (0, "same starts", False)

@@ -3,10 +3,14 @@
 import sqlite3
 
 import pytest
+from stopping import Stopping
 
 from proxytune.api.studies import run_study
-from proxytune.errors import EpisodeError, RunError
+from proxytune.errors import RunError
 from proxytune.storage.store import Store
+from proxytune.study.stages.retrying import retry_failed
+from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
 
 FAMILY = """
 from wobbly import Wobbly, wobbly
@@ -88,13 +92,15 @@ def test_failures_of_the_same_code_are_remembered_until_all_are_to_be_retried(ed
     assert run_study(folder).spent.episodes == 0
 
 
-def test_a_retry_that_is_stopped_half_way_goes_on_to_the_same_trials(edited):
+@pytest.mark.parametrize("episodes", [1, 3])
+def test_a_retry_that_is_stopped_within_a_trial_or_just_before_it_is_kept_goes_on_to_the_same_trials(edited, episodes):
     with pytest.raises(RunError, match="all trials failed"):
         run_study(edited(AGENT3))
-    late = "if episode.agent == 'agent3' and episode.start == 2: raise KeyError('other')"
-    with pytest.raises(EpisodeError):
-        run_study(edited(late, on_failure='"stop"'))
-    report = run_study(edited("pass"))
+    folder = edited("pass")
+    with Store.open(folder) as store, pytest.raises(KeyboardInterrupt):
+        retry_failed(StudyRun(open_study(folder), store, Stopping(episodes)))
+    report = run_study(folder)
+    assert report.spent.episodes == 5 * 3 - episodes
     assert [trial.state for trial in report.result.trials] == ["finished"] * 5
     assert {trial.failed_episodes for trial in report.result.trials} == {0}
 

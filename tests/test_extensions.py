@@ -101,10 +101,7 @@ MISTAKES = {
     "no module": ("gone:x", r"agent 'gone:x': no module 'gone' in .*study or installed; check the name"),
     "no attribute": ("mine:Mime", "agent 'mine:Mime': mine has no 'Mime'; did you mean 'Mine'?"),
     "an import that raises": ("bad:x", "agent 'bad:x': importing bad raised ZeroDivisionError: division by zero"),
-    "an import that leaves": (
-        "leaves:x",
-        "importing leaves raised SystemExit: 3 (leaves.py, line 2); correct it",
-    ),
+    "an import that leaves": ("leaves:x", r"importing leaves raised SystemExit: 3 \(leaves.py, line 2\); correct it"),
     "a missing neighbour": ("needy:x", "importing needy raised ModuleNotFoundError: No module named 'not_there'"),
     "bad syntax": ("odd:x", "agent 'odd:x': importing odd raised SyntaxError"),
     "no members": ("mine:Mine", "agent 'mine:Mine' lacks act, end; add what every agent must have"),

@@ -101,7 +101,7 @@ MISTAKES = {
     "no module": ("gone:x", r"agent 'gone:x': no module 'gone' in .*study or installed; check the name"),
     "no attribute": ("mine:Mime", "agent 'mine:Mime': mine has no 'Mime'; did you mean 'Mine'?"),
     "an import that raises": ("bad:x", "agent 'bad:x': importing bad raised ZeroDivisionError: division by zero"),
-    "an import that leaves": ("leaves:x", "agent 'leaves:x': importing leaves raised SystemExit: 3; correct it"),
+    "an import that leaves": ("leaves:x", r"importing leaves raised SystemExit: 3 \(leaves.py, line 2\); correct it"),
     "a missing neighbour": ("needy:x", "importing needy raised ModuleNotFoundError: No module named 'not_there'"),
     "bad syntax": ("odd:x", "agent 'odd:x': importing odd raised SyntaxError"),
     "no members": ("mine:Mine", "agent 'mine:Mine' lacks act, end; add what every agent must have"),
@@ -133,7 +133,10 @@ def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is
     folder = write("study", mine=mine + made)
     for name in ("mine:Mine", "mine:ready", "mine:factory"):
         assert make(name, kind="agent", beside=folder, needs=("size",)).size == 1
-    with pytest.raises(ExtensionError, match="agent 'mine:broken' raised ZeroDivisionError: division by zero; correct"):
+    with pytest.raises(
+        ExtensionError,
+        match=r"'mine:broken' raised ZeroDivisionError: division by zero \(mine.py, line 12\); correct",
+    ):
         make("mine:broken", kind="agent", beside=folder, needs=("size",))
 
 

@@ -30,7 +30,7 @@ from proxytune.study.result import Best, StudyResult, result_of
 from proxytune.study.run import as_stored, check_facts
 from proxytune.study.run import run_study as run_trials
 from proxytune.study.settings import LEARNING, StudySettings
-from proxytune.study.stages import confirmation, preflight
+from proxytune.study.stages import confirmation, preflight, retrying
 from proxytune.study.study import Study, open_study
 from proxytune.study.study_run import StudyRun
 
@@ -115,7 +115,7 @@ class StudyReport:
         return ReportFiles(paths, report)
 
 
-def run_study(path: str | Path, *, progress: bool = False) -> StudyReport:
+def run_study(path: str | Path, *, progress: bool = False, retry_failed: bool = False) -> StudyReport:
     """Run a study, or resume it where it was left; a finished one is summed up again without simulating.
 
     It may be interrupted at any moment, Ctrl-C or worse: every finished episode is kept, and the next call goes on to
@@ -124,6 +124,7 @@ def run_study(path: str | Path, *, progress: bool = False) -> StudyReport:
     Args:
         path: The study's folder, or its study.toml.
         progress: Whether to show a bar with the time left, where standard error is a terminal.
+        retry_failed: Whether to drive every failed episode again; those whose code has changed are in any case.
 
     Raises:
         InputError: If anything in the study cannot be used, with file, key and remedy.
@@ -134,11 +135,14 @@ def run_study(path: str | Path, *, progress: bool = False) -> StudyReport:
         remedy = f"run it with: python -m proxytune study {study.settings.folder}"
         raise study.settings.error("objective", f"run_study has no search for '{LEARNING}'; {remedy}")
     watching = Bars(most_episodes(study.settings)) if progress else nullcontext(Silent())
-    return run_opened(study, watching, lambda line: warnings.warn(line, stacklevel=5))
+    return run_opened(study, watching, lambda line: warnings.warn(line, stacklevel=5), retry_failed)
 
 
 def run_opened(
-    study: Study, watching: AbstractContextManager[Watcher], warn: Callable[[str], None] = lambda line: None
+    study: Study,
+    watching: AbstractContextManager[Watcher],
+    warn: Callable[[str], None] = lambda line: None,
+    retry_failed: bool = False,
 ) -> StudyReport:
     """Search by predictivity from wherever it was left: pre-flight, trials, confirmation.
 
@@ -146,9 +150,12 @@ def run_opened(
         study: The study.
         watching: Gives what hears of every episode.
         warn: Hears, before the first trial, of another search than before and of parameters without effect.
+        retry_failed: Whether to drive every failed episode again, not only those whose code has changed.
     """
     settings = study.settings
     with locked(settings.folder), Store.open(settings.folder) as store:
+        if retry_failed:
+            store.forget_failures()
         with watching as watcher:
             under_way = StudyRun(study, store, watcher)
             _prepare(under_way, warn)
@@ -182,6 +189,7 @@ def most_episodes(settings: StudySettings) -> int:
 def _prepare(under_way: StudyRun, warn: Callable[[str], None]) -> None:
     """Run the pre-flight and warn at once of parameters without effect, so that the user can stop the study."""
     check_facts(under_way)
+    retrying.retry_failed(under_way)
     if line := note_search(under_way.study, under_way.store):
         warn(line)
     learnt = preflight.run_preflight(under_way)

@@ -17,7 +17,7 @@ from proxytune.errors import InputError
 from proxytune.logs import Frames, Log
 from proxytune.report.writing import write_picture, write_text
 from proxytune.settings import Section
-from proxytune.study.family import load_family
+from proxytune.study.family import bare_family
 from proxytune.study.settings import read_study_settings
 
 MOST_FRAMES = 1_000_000
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     settings = read_study_settings(arguments.path)
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
-    family = load_family(settings, arguments.model)
+    family = bare_family(settings, arguments.model)
     if not isinstance(family, LaneFollowing):
         raise InputError(f"{settings.folder}: only the lane-following family can be recorded; give another study")
     drives = film(family, arguments.frames, arguments.seed) if arguments.frames else ()

@@ -2,17 +2,21 @@
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from rich.console import Group
+from rich.text import Text
+
+from proxytune.cli.score_tables import read_sides
 from proxytune.cli.terminal.answer import Answer
 from proxytune.errors import InputError
 from proxytune.report.scores.document import document_of, document_of_ranking
 from proxytune.report.scores.figures import flipped_pairs, scatter
 from proxytune.report.scores.table import measures, ranking
 from proxytune.report.writing import save
-from proxytune.scores import Metric, ScoreTable, read_domains, read_scores
-from proxytune.usefulness import Assessment, assess, select_proxy
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness import Assessment, assess, in_common, select_proxy
 
 FEWEST_RESAMPLES = 100
 
@@ -26,7 +30,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="CSV[:DOMAIN]",
         help="scores in the proxy; repeat it, or give a file with several domains, to rank proxies",
     )
-    parser.add_argument("--target", required=True, metavar="CSV[:DOMAIN]", help="scores on the target")
+    parser.add_argument(
+        "--target",
+        action="append",
+        required=True,
+        metavar="CSV[:DOMAIN]",
+        help="scores on the target; repeat it for a table in several files",
+    )
+    parser.add_argument(
+        "--columns",
+        default="",
+        metavar="NAME=COLUMN,...",
+        help="what columns are called in the files, as in agent=policy,episode=trial",
+    )
+    parser.add_argument("--common", action="store_true", help="leave out agents that one side has alone [refuse them]")
     parser.add_argument(
         "--metric",
         action="append",
@@ -54,8 +71,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     if arguments.resamples < FEWEST_RESAMPLES or arguments.seed < 0:
         raise InputError(f"--resamples must be at least {FEWEST_RESAMPLES} and --seed at least 0")
     metrics = [Metric.parse(text) for text in arguments.metric]
-    target_name, target = _read_target(arguments.target, metrics)
-    proxies = _read_proxies(arguments.proxy, arguments.target, metrics)
+    (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])
+    (target, proxies), left_out = _common(target, proxies) if arguments.common else ((target, proxies), ())
     if arguments.unpaired:
         target = target.unpaired()
         proxies = {name: table.unpaired() for name, table in proxies.items()}
@@ -66,47 +83,23 @@ def run(arguments: argparse.Namespace) -> Answer:
         for name, proxy in proxies.items()
     }
     figures = _draw(assessments, arguments.output) if arguments.output else []
-    head = {"target": target_name, "figures": figures}
+    head = {"target": target_name, "figures": figures, "left_out": list(left_out)}
+    said = [Text(f"note: {line}") for line in left_out]
     if len(assessments) == 1:
         name, assessment = next(iter(assessments.items()))
         table = measures(assessment, proxy=name, target=target_name)
-        return Answer({"proxy": name, **head, **document_of(assessment)}, table)
+        return Answer({"proxy": name, **head, **document_of(assessment)}, Group(table, *said))
     selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
-    return Answer(
-        head | document_of_ranking(assessments, selection), ranking(assessments, selection, target=target_name)
-    )
+    ranked = ranking(assessments, selection, target=target_name)
+    return Answer(head | document_of_ranking(assessments, selection), Group(ranked, *said))
 
 
-def split_source(source: str) -> tuple[Path, str | None]:
-    """Split FILE or FILE:DOMAIN into its parts."""
-    path, colon, domain = source.rpartition(":")
-    if not colon or Path(source).exists() or not path:
-        return Path(source), None
-    return Path(path), domain
-
-
-def _read_target(source: str, metrics: Sequence[Metric]) -> tuple[str, ScoreTable]:
-    path, domain = split_source(source)
-    return domain or path.stem, read_scores(path, [metric.name for metric in metrics], domain)
-
-
-def _read_proxies(sources: Sequence[str], target: str, metrics: Sequence[Metric]) -> dict[str, ScoreTable]:
-    """Every proxy by name: its domain, or its file's name, or what was typed where those are not unique."""
-    names = [metric.name for metric in metrics]
-    target_path, target_domain = split_source(target)
-    proxies: dict[str, ScoreTable] = {}
-    for source in sources:
-        path, domain = split_source(source)
-        tables = {domain: read_scores(path, names, domain)} if domain else read_domains(path, names)
-        if not domain and len(tables) > 1 and path == target_path and target_domain:
-            tables.pop(target_domain, None)
-        for label, table in tables.items():
-            name = label or path.stem
-            name = name if name not in proxies else f"{path}:{label}" if label else str(path)
-            if name in proxies:
-                raise InputError(f"--proxy {source}: is given twice; give each proxy once")
-            proxies[name] = table
-    return proxies
+def _common(
+    target: ScoreTable, proxies: Mapping[str, ScoreTable]
+) -> tuple[tuple[ScoreTable, dict[str, ScoreTable]], tuple[str, ...]]:
+    """All tables with the agents that all have, and a line on each table that has others."""
+    kept, lines = in_common({"the target": target, **{f"the proxy {name}": one for name, one in proxies.items()}})
+    return (kept.pop("the target"), dict(zip(proxies, kept.values(), strict=True))), lines
 
 
 def _weights(texts: Sequence[str]) -> dict[str, float] | None:

@@ -26,16 +26,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         help="a study's folder, or where to copy one that comes with proxytune",
     )
+    parser.add_argument(
+        "--retry-failed",
+        action="store_true",
+        help="drive every episode again that has failed [those whose code has changed since]",
+    )
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Run what is left of a study; a finished one is summed up again without simulating."""
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
-    study = open_study(folder)
+    study, again = open_study(folder), arguments.retry_failed
     if study.settings.objective == LEARNING:
-        return search_by_plv(study, folder, lambda: _search(study).result.knowledge.as_good[1])
-    report = _search(study)
+        return search_by_plv(study, folder, lambda: _search(study, again).result.knowledge.as_good[1])
+    report = _search(study, again)
     figures, page = report.write(folder)
     costs = _costs(report.result, report.spent, time.perf_counter() - begun)
     document = {**report.document(), **costs, "figures": [str(path) for path in figures], "report": str(page)}
@@ -43,8 +48,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     return Answer(document, study_table(report.result, _say_costs(costs), files))
 
 
-def _search(study: Study) -> StudyReport:
-    return run_opened(study, Bars(most_episodes(study.settings)), _warn)
+def _search(study: Study, retry_failed: bool) -> StudyReport:
+    return run_opened(study, Bars(most_episodes(study.settings)), _warn, retry_failed)
 
 
 def _warn(line: str) -> None:

@@ -2,6 +2,8 @@
 
 import importlib
 import inspect
+import sysconfig
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -12,6 +14,11 @@ from proxytune.extensions.beside import import_beside
 from proxytune.extensions.plugins import plugins
 from proxytune.settings import nearest
 
+NOT_USERS = (
+    Path(__file__).resolve().parents[1],
+    *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
+)
+"""Folders of code that is ours, Python's or installed."""
 NONE: Mapping[str, Any] = MappingProxyType({})
 Answer = TypeVar("Answer")
 
@@ -82,7 +89,7 @@ def ask(what: str, question: Callable[[], Answer], where: str = "") -> Answer:
     except ProxytuneError:
         raise
     except Exception as problem:
-        raise ExtensionError(f"{what} raised {describe(problem)}{where}; correct it") from problem
+        raise ExtensionError(f"{what} raised {describe(problem)}{place_of(problem)}{where}; correct it") from problem
 
 
 def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:
@@ -98,6 +105,19 @@ def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:
 def describe(problem: BaseException) -> str:
     """An exception in one line."""
     return f"{type(problem).__name__}: {' '.join(str(problem).split())}".rstrip(": ")
+
+
+def place_of(problem: BaseException | None) -> str:
+    """Where in code that is neither ours nor installed an exception arose, in brackets; empty if nowhere."""
+    frames = traceback.extract_tb(problem.__traceback__) if problem else []
+    own = [frame for frame in frames if _is_users(frame.filename)]
+    return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+
+
+def _is_users(file: str) -> bool:
+    """Whether a file of code is a user's own."""
+    path = Path(file).resolve()
+    return path.is_file() and not any(path.is_relative_to(folder) for folder in NOT_USERS)
 
 
 def _lacks(found: Any, needs: Iterable[str]) -> list[str]:
@@ -124,7 +144,8 @@ def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleT
         if isinstance(problem, ModuleNotFoundError) and f"{module}.".startswith(f"{problem.name}."):
             where = "installed" if beside is None else f"in {beside.absolute()} or installed"
             raise ExtensionError(f"{kind} '{name}': no module '{problem.name}' {where}; check the name") from None
-        raise ExtensionError(f"{kind} '{name}': importing {module} raised {describe(problem)}; correct it") from problem
+        described = f"{describe(problem)}{place_of(problem)}"
+        raise ExtensionError(f"{kind} '{name}': importing {module} raised {described}; correct it") from problem
 
 
 def _plugin(name: str, kind: str, installed: Mapping[str, Any], shipped: Mapping[str, Any]) -> Any:

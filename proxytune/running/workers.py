@@ -17,6 +17,7 @@ from typing import Any, TypeVar, cast
 from joblib import Parallel, delayed
 
 from proxytune.errors import RunError
+from proxytune.extensions import describe, place_of
 from proxytune.extensions.beside import folders, open_folders
 
 WATCH_S = 0.5
@@ -59,10 +60,19 @@ def _here(work: Callable[[Piece], Result], pieces: Iterable[Piece]) -> Generator
 
 
 def _spread(work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int) -> Generator[Result, None, None]:
-    recipe = _Recipe(pickle.dumps(work), tuple(sys.path), folders(), os.getpid())
+    recipe = _Recipe(_pickled(work), tuple(sys.path), folders(), os.getpid())
     # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
     parallel = Parallel(n_jobs=jobs, batch_size=1, pre_dispatch=jobs + 1, return_as="generator_unordered")
     return cast("Generator[Result, None, None]", parallel(delayed(_do_pickled)(recipe, piece) for piece in pieces))
+
+
+def _pickled(work: Callable[[Piece], Result]) -> bytes:
+    try:
+        return pickle.dumps(work)
+    except Exception as problem:
+        remedy = "make it of classes and functions that a module has by name, without open files, or set jobs = 1"
+        line = f"what is to be run cannot be sent to other processes ({describe(problem)}){place_of(problem)}"
+        raise RunError(f"{line}; {remedy}") from problem
 
 
 @dataclass(frozen=True)
@@ -102,7 +112,11 @@ def _end_with(parent: int) -> None:
 def _unpickled(recipe: _Recipe) -> Callable[[Any], Any]:
     sys.path.extend(folder for folder in recipe.path if folder not in sys.path)
     open_folders(recipe.own)
-    return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
+    try:
+        return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
+    except Exception as problem:
+        line = f"another process cannot load what is to be run: {describe(problem)}{place_of(problem)}"
+        raise RunError(f"{line}; what it needs must be there when its modules are imported, or set jobs = 1") from None
 
 
 def _name_dead_processes(results: Iterator[Result]) -> Iterator[Result]:

@@ -3,30 +3,38 @@
 import contextlib
 import csv
 import io
-import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from proxytune.errors import ScoresError
-from proxytune.scores.table import LARGEST, ScoreTable
+from proxytune.scores.cells import LABELS, Cells, Columns, read_cells
+from proxytune.scores.table import ScoreTable
 from proxytune.settings import nearest
 
-LABELS = ("agent", "episode", "domain")
+Files = str | Path | Sequence[str | Path]
+"""A file, or several that make one table."""
+Scored = dict[tuple[str, str | int], dict[str, float]]
 
 
-def read_scores(path: str | Path, metrics: Iterable[str], domain: str | None = None) -> ScoreTable:
-    """Read the scores of one domain from a CSV file.
+def read_scores(
+    path: Files, metrics: Iterable[str], domain: str | None = None, columns: Columns | None = None
+) -> ScoreTable:
+    """Read the scores of one domain from a CSV file, or from several that make one table.
+
+    Columns are separated by commas, semicolons or tabs; with the latter two, decimals may be written with a comma.
 
     Args:
-        path: CSV with the columns agent, episode (not needed for one row per agent), domain (optional) and metrics.
+        path: CSV with the columns agent, episode (not needed for one row per agent), domain (optional) and metrics; or
+            several such files.
         metrics: The columns to read; others are ignored.
-        domain: Which domain, where the file has several.
+        domain: Which domain, where there are several.
+        columns: What columns are called in the file where that is another name, as in {"agent": "policy"}.
 
     Raises:
         ScoresError: If the file is not such a table, naming line and column.
     """
-    tables = read_domains(Path(path), metrics)
+    tables, path = read_domains(path, metrics, columns), " and ".join(map(str, _files(path)))
     if domain is None:
         if len(tables) > 1:
             example = next(iter(tables))
@@ -39,25 +47,56 @@ def read_scores(path: str | Path, metrics: Iterable[str], domain: str | None = N
     return tables[domain]
 
 
-def read_domains(path: Path, metrics: Iterable[str]) -> dict[str, ScoreTable]:
-    """Read every domain of a CSV file, in the order of the file; without a domain column the only one is "".
+def read_domains(path: Files, metrics: Iterable[str], columns: Columns | None = None) -> dict[str, ScoreTable]:
+    """Read every domain of a CSV file or of several, in their order; without a domain column the only one is "".
 
     Raises:
         ScoresError: As in read_scores.
     """
     names = tuple(metrics)
-    domains: dict[str, dict[tuple[str, str | int], dict[str, float]]] = {}
-    for line, row in _rows(path, names):
-        domain, agent, episode = row.get("domain", ""), row["agent"], row.get("episode", "")
-        for label in [label for label in LABELS if label in row and not row[label]]:
-            raise ScoresError(f"{path}: line {line}, column '{label}': is empty; fill it in")
-        scored = domains.setdefault(domain, {})
-        if (agent, episode) in scored:
-            raise ScoresError(f"{path}: line {line}: {_duplicate(row)}")
-        scored[agent, episode] = {name: _number(path, line, name, row[name]) for name in names}
-    if not domains:
-        raise ScoresError(f"{path}: has no rows; add one per agent and episode")
+    files = [read_cells(file, names, columns) for file in _files(path)]
+    _check_alike(files)
+    _check_columns(files, columns or {})
+    domains: dict[str, Scored] = {}
+    origin: dict[tuple[str, str, str], Path] = {}
+    for cells in files:
+        if not cells.rows:
+            raise ScoresError(f"{cells.path}: has no rows; add one per agent and episode")
+        for line, row in cells.rows:
+            _check_labels(cells, line, row)
+            domain, agent, episode = row.get("domain", ""), row["agent"], row.get("episode", "")
+            before = origin.setdefault((domain, agent, episode), cells.path)
+            scored = domains.setdefault(domain, {})
+            if (agent, episode) in scored:
+                where = f", once in {before}" if before != cells.path else ""
+                raise ScoresError(f"{cells.path}: line {line}: {_duplicate(row, where)}")
+            scored[agent, episode] = {name: cells.number(line, name, row[name]) for name in names}
     return {domain: ScoreTable.from_episodes(scored) for domain, scored in domains.items()}
+
+
+def _files(path: Files) -> list[Path]:
+    """The files, be it one or several."""
+    return [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
+
+
+def _check_alike(files: Sequence[Cells]) -> None:
+    """Refuse files of which one numbers its episodes, or names domains, and another does not."""
+    for label, cells in [(label, cells) for label in LABELS for cells in files]:
+        other = next((one for one in files if label in one.header), None)
+        if other and label not in cells.header:
+            raise ScoresError(f"{cells.path}: has no column '{label}', which {other.path} has; add it")
+
+
+def _check_columns(files: Sequence[Cells], columns: Columns) -> None:
+    """Refuse a column map of which a name is in no file."""
+    for name, theirs in columns.items():
+        if not any(theirs in cells.named for cells in files):
+            raise ScoresError(f"{files[0].path}: no column '{theirs}' for '{name}'; {nearest(theirs, files[0].named)}")
+
+
+def _check_labels(cells: Cells, line: int, row: Mapping[str, str]) -> None:
+    for label in [label for label in LABELS if label in row and not row[label]]:
+        raise ScoresError(f"{cells.path}: line {line}, column '{label}': is empty; fill it in")
 
 
 def write_scores(table: ScoreTable, path: Path) -> None:
@@ -83,54 +122,9 @@ def write_scores(table: ScoreTable, path: Path) -> None:
         raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None
 
 
-def _rows(path: Path, metrics: Sequence[str]) -> list[tuple[int, dict[str, str]]]:
-    """The file's rows by column name, each with its line number."""
-    try:
-        reader = csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"), newline=""), strict=True)
-        lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if cells]
-    except FileNotFoundError:
-        raise ScoresError(f"{path}: no such file; check the path") from None
-    except OSError as problem:
-        raise ScoresError(f"{path}: cannot be read ({problem.strerror})") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise ScoresError(f"{path}: is not a CSV file; save it as comma-separated text (UTF-8)") from None
-    if not lines:
-        raise ScoresError(f"{path}: is empty; its first line must name the columns, agent and metrics among them")
-    header = lines[0][1]
-    _check_header(path, header, metrics)
-    for line, cells in lines[1:]:
-        if len(cells) != len(header):
-            raise ScoresError(
-                f"{path}: line {line}: has {len(cells)} cells, but the first line names {len(header)} columns"
-            )
-    return [(line, dict(zip(header, cells, strict=True))) for line, cells in lines[1:]]
-
-
-def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> None:
-    if "agent" not in header:
-        remedy = "rename the one that names the agents" if len(header) > 1 else "separate columns by commas"
-        raise ScoresError(f"{path}: no column 'agent'; columns found: {', '.join(header)[:60]}; {remedy}")
-    for name in metrics:
-        if name not in header:
-            others = [column for column in header if column not in LABELS]
-            raise ScoresError(f"{path}: no column '{name}'; {nearest(name, others)}")
-    for name in (*LABELS, *metrics):
-        if header.count(name) > 1:
-            raise ScoresError(f"{path}: the first line names the column '{name}' twice; rename one")
-
-
-def _number(path: Path, line: int, column: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not abs(value) < LARGEST:
-        raise ScoresError(f"{path}: line {line}, column '{column}': must be a finite number, got {cell!r}")
-    return value
-
-
-def _duplicate(row: Mapping[str, str]) -> str:
-    where = f" in domain '{row['domain']}'" if "domain" in row else ""
+def _duplicate(row: Mapping[str, str], before: str) -> str:
+    where = f" in domain '{row['domain']}'{before}" if "domain" in row else before
     if "episode" in row:
         return f"agent '{row['agent']}' has episode '{row['episode']}' twice{where}; number the episodes"
-    return f"agent '{row['agent']}' is there twice{where}; add a column 'episode'"
+    remedy = "add a column 'episode', or give its name: --columns episode=NAME"
+    return f"agent '{row['agent']}' is there twice{where}; {remedy}"

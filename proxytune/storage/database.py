@@ -15,6 +15,7 @@ The tables, for plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_versi
     episodes   instance, agent, start, seed       what determines an episode: the key, so none is ever run twice
                metrics (JSON) or failure          what it scored, or why it failed
                seconds                            how long it took
+               code                               of a failure: digest of the user's code that failed; NULL if not known
     sweeps     number, parameter, base (JSON), points (JSON), identity     the curves asked for, the last one last
                target_model                       the target's model.toml as it was; empty without POD
                replays                            identity of the instances whose episodes are POD's replays, or empty
@@ -27,7 +28,7 @@ Earlier formats are still read, from a converted copy in memory, and become the 
 Format 1 had neither `target_model`
 nor `replays`; its sweeps are drawn again without POD until they are asked for once more, which simulates nothing anew.
 Up to format 2 no trial was cut off. Up to format 3 the objective of every trial was PRPV, and its measures were two
-columns.
+columns. Up to format 4 nothing was known of the code of a failure.
 """
 
 import json
@@ -38,7 +39,7 @@ from pathlib import Path
 
 from proxytune.errors import StoreError
 
-FORMAT = 4
+FORMAT = 5
 APPLICATION = 0x70747564  # "ptud"
 PATIENCE_S = 30.0
 
@@ -68,7 +69,7 @@ CREATE TABLE instances (
 {TRIALS}
 CREATE TABLE episodes (
     instance INTEGER NOT NULL REFERENCES instances (id), agent TEXT NOT NULL, start INTEGER NOT NULL,
-    seed INTEGER NOT NULL, metrics TEXT, failure TEXT, seconds REAL NOT NULL,
+    seed INTEGER NOT NULL, metrics TEXT, failure TEXT, seconds REAL NOT NULL, code TEXT,
     PRIMARY KEY (instance, agent, start, seed), CHECK ((metrics IS NULL) <> (failure IS NULL))) WITHOUT ROWID;
 {SWEEPS}
 PRAGMA application_id = {APPLICATION};
@@ -98,7 +99,8 @@ INSERT INTO trials
         failed_episodes, failure, decided, bound, 0.0 FROM trials_3;
 DROP TABLE trials_3;
 """
-STEPS = (FROM_1, FROM_2, FROM_3)
+FROM_4 = "ALTER TABLE episodes ADD COLUMN code TEXT;"
+STEPS = (FROM_1, FROM_2, FROM_3, FROM_4)
 """From each format to the next."""
 
 

@@ -1,9 +1,11 @@
 """The rows of study.db as values."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
+from proxytune.domain import Episode, Outcome
 from proxytune.space import Theta
 
 State = Literal["open", "finished", "failed", "cut"]
@@ -72,3 +74,23 @@ class SweepRecord:
     points: tuple[float, ...]
     target_model: str = ""
     replays: str = ""
+
+
+def trial_of(number: int, theta: str, *rest: Any) -> TrialRecord:
+    """A trial from its row, in the order of its attributes."""
+    state, score, measures, failed, failure, decided, bound, seconds = rest
+    counted = (json.loads(measures), failed, failure, tuple(json.loads(decided)), bound, seconds)
+    return TrialRecord(number, json.loads(theta), state, score, *counted)
+
+
+def episode_of(theta: str, agent: str, start: int, seed: int) -> Episode:
+    """An episode from the columns that determine it."""
+    return Episode(tuple(json.loads(theta).items()), agent, start, seed)
+
+
+def outcome_of(theta: str, agent: str, start: int, seed: int, *rest: Any) -> Outcome:
+    """An episode's outcome from its row."""
+    metrics, failure, seconds = rest
+    return Outcome(
+        episode_of(theta, agent, start, seed), json.loads(metrics) if metrics else None, failure or "", seconds
+    )

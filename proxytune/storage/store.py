@@ -11,7 +11,7 @@ from proxytune.domain import Episode, Outcome
 from proxytune.errors import InputError
 from proxytune.space import Theta
 from proxytune.storage.database import connect, disconnect, sqlite_errors_as_store_errors
-from proxytune.storage.records import SweepRecord, TrialRecord
+from proxytune.storage.records import SweepRecord, TrialRecord, episode_of, outcome_of, trial_of
 
 FILE_NAME = "study.db"
 OF_EARLIER = "instance IN (SELECT id FROM instances WHERE identity = :earlier)"
@@ -35,20 +35,6 @@ RENAMING = (
 def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
     """θ in the one form in which it is stored: sorted by name, every digit kept."""
     return json.dumps({name: float(value) for name, value in sorted(dict(theta).items())}, allow_nan=False)
-
-
-def _trial(number: int, theta: str, *rest: Any) -> TrialRecord:
-    """A trial from its row, in the order of its attributes."""
-    state, score, measures, failed, failure, decided, bound, seconds = rest
-    counted = (json.loads(measures), failed, failure, tuple(json.loads(decided)), bound, seconds)
-    return TrialRecord(number, json.loads(theta), state, score, *counted)
-
-
-def _outcome(theta: str, agent: str, start: int, seed: int, *rest: Any) -> Outcome:
-    """An episode's outcome from its row."""
-    metrics, failure, seconds = rest
-    episode = Episode(tuple(json.loads(theta).items()), agent, start, seed)
-    return Outcome(episode, json.loads(metrics) if metrics else None, failure or "", seconds)
 
 
 class Store:
@@ -130,7 +116,7 @@ class Store:
                 " FROM trials JOIN instances ON instances.id = trials.instance WHERE objective = ? ORDER BY number",
                 (objective,),
             )
-            self._trials[objective] = {row[0]: _trial(*row) for row in rows}
+            self._trials[objective] = {row[0]: trial_of(*row) for row in rows}
         return [trial for _, trial in sorted(self._trials[objective].items())]
 
     def searches(self) -> list[str]:
@@ -151,8 +137,8 @@ class Store:
         if objective in self._trials:
             self._trials[objective] |= {trial.number: trial for trial in trials}
 
-    def save_outcome(self, identity: str, outcome: Outcome) -> None:
-        """Write an episode, over an earlier failure of the same."""
+    def save_outcome(self, identity: str, outcome: Outcome, code: str | None = None) -> None:
+        """Write an episode, over an earlier failure of the same; of a failure, the code that failed too."""
         episode = outcome.episode
         theta = theta_json(episode.theta)
         metrics = None if outcome.metrics is None else json.dumps(dict(outcome.metrics), allow_nan=False)
@@ -160,7 +146,8 @@ class Store:
         with self._transaction() as connection:
             instance = self._instance(connection, identity, theta)
             row = (instance, episode.agent, episode.start, episode.seed, metrics, failure, outcome.seconds)
-            connection.execute("INSERT OR REPLACE INTO episodes VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+            failed = None if failure is None else code
+            connection.execute("INSERT OR REPLACE INTO episodes VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (*row, failed))
         self._remember(identity, theta, outcome)
 
     def outcomes(self, identity: str, theta: Theta) -> Mapping[Episode, Outcome]:
@@ -172,9 +159,23 @@ class Store:
                 " FROM episodes JOIN instances ON instances.id = episodes.instance WHERE identity = ? AND theta = ?",
                 key,
             )
-            outcomes = [_outcome(*row) for row in rows]
+            outcomes = [outcome_of(*row) for row in rows]
             self._outcomes[key] = {outcome.episode: outcome for outcome in outcomes}
         return self._outcomes[key]
+
+    def failed_in_other_code(self, identity: str, code: str) -> set[Episode]:
+        """The episodes that failed in other code than this; those of which the code is not known are left out."""
+        rows = self._all(
+            "SELECT theta, agent, start, seed FROM episodes JOIN instances ON instances.id = episodes.instance"
+            " WHERE identity = ? AND failure IS NOT NULL AND code <> ?",
+            (identity, code),
+        )
+        return {episode_of(*row) for row in rows}
+
+    def forget_failures(self) -> None:
+        """Make every failure one of other code, so that it is tried again."""
+        with self._transaction() as connection:
+            connection.execute("UPDATE episodes SET code = '' WHERE failure IS NOT NULL")
 
     def seconds(self) -> dict[tuple[str, int], float]:
         """How long the episodes of each agent and start took on average."""

@@ -1,11 +1,11 @@
 """Scoring one domain instance: all agents from all starts, compared with the target."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from proxytune.domain import Episode, Outcome, instance_of
+from proxytune.domain import DomainFamily, Episode, Outcome, instance_of
 from proxytune.scores import Array, ScoreTable
 from proxytune.seeds import episode_seed
 from proxytune.space import Theta
@@ -47,6 +47,17 @@ def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
     """The episodes that score a domain instance: every agent from every start."""
     instance, seeds = instance_of(theta), [episode_seed(seed, start) for start in range(settings.starts)]
     return [Episode(instance, agent, start, own) for agent in settings.agents for start, own in enumerate(seeds)]
+
+
+def needed_metrics(settings: StudySettings, family: DomainFamily) -> list[str]:
+    """The metrics of a family that agents are compared by: an episode without one of them has failed."""
+    return [metric.name for metric in settings.metrics if metric.name in family.metrics]
+
+
+def with_metrics_needed(outcome: Outcome, needed: Sequence[str]) -> Outcome:
+    """The outcome; a failure where it lacks a metric that agents are compared by, as when these are others now."""
+    lacks = [name for name in needed if outcome.metrics is not None and name not in outcome.metrics]
+    return replace(outcome, metrics=None, failure=f"it has no finite '{lacks[0]}'") if lacks else outcome
 
 
 @dataclass(frozen=True)
@@ -97,13 +108,15 @@ def disagreement_of(study: Study, proxy: ScoreTable, agents: Sequence[str]) -> A
 
 
 def table(outcomes: Sequence[Outcome]) -> ScoreTable:
-    """The scores of the episodes that worked, labelled by their start."""
-    scored: dict[tuple[str, str | int], Mapping[str, float]] = {
-        (outcome.episode.agent, outcome.episode.start): outcome.metrics
-        for outcome in outcomes
-        if outcome.metrics is not None
-    }
-    return ScoreTable.from_episodes(scored)
+    """The scores of the episodes that worked, labelled by their start, in the metrics that all of them have."""
+    worked = {(one.episode.agent, str(one.episode.start)): one.metrics for one in outcomes if one.metrics is not None}
+    return ScoreTable.from_episodes(in_common(worked))
+
+
+def in_common(scored: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[tuple[str, str | int], dict[str, float]]:
+    """Scores by agent and episode, in the metrics that every one of them has."""
+    whole = [name for name in next(iter(scored.values()), {}) if all(name in scores for scores in scored.values())]
+    return {key: {name: scores[name] for name in whole} for key, scores in scored.items()}
 
 
 def failure_of(outcome: Outcome) -> str:

@@ -5,14 +5,15 @@ import inspect
 from collections.abc import Callable, Mapping
 from numbers import Integral
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from proxytune.domain import DomainFamily
 from proxytune.errors import ExtensionError, InputError, ProxytuneError
-from proxytune.extensions import describe, load
+from proxytune.extensions import ask, describe, load, place_of
 from proxytune.settings import nearest
 from proxytune.space import Parameter
 from proxytune.study.settings import StudySettings
+from proxytune.study.user_family import UserFamily, has_member
 
 MEMBERS: Mapping[str, tuple[type, str]] = {
     "identity": (str, "text"),
@@ -27,12 +28,25 @@ Value = TypeVar("Value")
 
 
 def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
-    """Call the factory that the study names, with its [domain] table and a model.
+    """Call the factory that the study names, with its [domain] table and a model; agents have the study's names.
 
-    A module in the study's folder comes before an installed one.
+    A module in the study's folder comes before an installed one. A user's family is asked through a guard: what any of
+    its members raises is an ExtensionError of one line.
 
     Raises:
         InputError: If there is no such factory, or what it makes is no domain family or cannot do what is asked.
+    """
+    family = bare_family(settings, model)
+    if type(family).__module__.startswith("proxytune.") and not settings.aliases:
+        return family
+    return cast(DomainFamily, UserFamily(family, settings.family, tuple(settings.aliases.items())))
+
+
+def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:
+    """The family itself, without a guard, and with agents by the names that it loads.
+
+    Raises:
+        InputError: As load_family.
     """
     if model is not None and not model.is_file():
         raise settings.error("proxy", f"no such file: {model}; check the path")
@@ -40,9 +54,23 @@ def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
         factory = load(settings.family, kind="family", beside=settings.folder, needs=("__call__",))
     except InputError as problem:
         raise settings.error("family", str(problem)) from None
+    _check_signature(settings, factory, model)
     family = _asked(settings, settings.family, lambda: factory(settings.domain, model=model))
     _check(settings, family)
     return family  # type: ignore[no-any-return]
+
+
+def _check_signature(settings: StudySettings, factory: Any, model: Path | None) -> None:
+    """Refuse a factory that cannot be called as a study calls it."""
+    try:
+        inspect.signature(factory).bind(settings.domain, model=model)
+    except TypeError as problem:
+        name = settings.family.rpartition(":")[2]
+        remedy = f"write it as: def {name}(domain, *, model)"
+        raise settings.error("family", f"{settings.family} cannot be called ({problem}); {remedy}") from None
+    except ValueError:
+        # What is written in C may have no signature.
+        return
 
 
 def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Value:
@@ -52,7 +80,7 @@ def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Valu
     except ProxytuneError:
         raise
     except Exception as problem:
-        raise settings.error("family", f"{what} raised {describe(problem)}; correct it") from problem
+        raise settings.error("family", f"{what} raised {describe(problem)}{place_of(problem)}; correct it") from problem
 
 
 def _check(settings: StudySettings, family: DomainFamily) -> None:
@@ -71,7 +99,7 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
 
 
 def _check_members(settings: StudySettings, family: Any) -> None:
-    lacks = [member for member in (*MEMBERS, *METHODS) if not _has(family, member)]
+    lacks = [member for member in (*MEMBERS, *METHODS) if not has_member(family, member)]
     if lacks:
         raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
     for member, (kind, word) in MEMBERS.items():
@@ -81,17 +109,13 @@ def _check_members(settings: StudySettings, family: Any) -> None:
             raise settings.error("family", f"{member} of {settings.family} must be {word}, got {name}")
 
 
-def _has(family: Any, member: str) -> bool:
-    """Whether there is such a member, be it a property that raises."""
-    missing = object()
-    return inspect.getattr_static(family, member, missing) is not missing or hasattr(family, member)
-
-
 def _check_agent(settings: StudySettings, family: DomainFamily, agent: str) -> None:
+    name = settings.aliases.get(agent, agent)
+    key = f"agents.{agent}" if settings.aliases else "agents"
     try:
-        _asked(settings, f"check_agent('{agent}') of {settings.family}", lambda: family.check_agent(agent))
+        ask(f"check_agent('{name}') of {settings.family}", lambda: family.check_agent(name))
     except InputError as problem:
-        raise settings.error("agents", str(problem)) from None
+        raise settings.error(key, str(problem)) from None
 
 
 def check_bounds(

@@ -8,7 +8,7 @@ from proxytune.running.episodes import running
 from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
-from proxytune.study.evaluation import failure_of, longest_first, plan
+from proxytune.study.evaluation import failure_of, in_common, longest_first, needed_metrics, plan
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings
 
@@ -16,9 +16,9 @@ from proxytune.study.settings import StudySettings
 def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
     """Score the study's agents over its starts in the domain that a model describes.
 
-    Every metric of the family is kept. Rows are in the order of the study's agents and starts, whatever the number of
-    jobs: the same model, settings and seed give the same table. Of several repeats, each has placement noise of its
-    own, and episodes are labelled START/REPEAT; the first repeat is what a single one would be.
+    Every metric of the family is kept that all episodes have. Rows are in the order of the study's agents and starts,
+    whatever the number of jobs: the same model, settings and seed give the same table. Of several repeats, each has
+    placement noise of its own, and episodes are labelled START/REPEAT; the first repeat is what a single one would be.
 
     Raises:
         InputError: If the settings, the model or the family cannot be used.
@@ -28,13 +28,15 @@ def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, r
     labels = _labelled(settings, seed, repeats)
     watcher.begin(f"measuring {model.name}", 0)
     metrics = {}
-    with running(family, longest_first(list(labels), {}), settings.jobs) as outcomes:
+    needed = needed_metrics(settings, family)
+    with running(family, longest_first(list(labels), {}), settings.jobs, needed=needed) as outcomes:
         for outcome in outcomes:
             if outcome.metrics is None:
                 raise EpisodeError(failure_of(outcome))
             metrics[outcome.episode] = outcome.metrics
             watcher.episode()
-    return ScoreTable.from_episodes({(episode.agent, label): metrics[episode] for episode, label in labels.items()})
+    scored = {(episode.agent, label): metrics[episode] for episode, label in labels.items()}
+    return ScoreTable.from_episodes(in_common(scored))
 
 
 def _labelled(settings: StudySettings, seed: int, repeats: int) -> dict[Episode, str]:

@@ -18,9 +18,10 @@ def score_trials(space: Space, done: Iterable[TrialRecord]) -> list[Trial]:
 
 
 def outputs_of(study: Study, outcomes: Collection[Outcome]) -> Values | None:
-    """Every agent's mean metrics, in the order of the target's table, NaN for an agent that no episode tells of.
+    """Every agent's mean metrics, in the order of the target's table, NaN where no episode tells of one.
 
-    None where no episode tells of any. Where an agent failed from some starts, its mean is over the others.
+    None where no episode tells of any. Where an agent failed from some starts, its mean is over the others; where some
+    episodes lack a metric, that mean is over the others too.
     """
     means = _means(study, outcomes)
     return None if np.isnan(means).all() else tuple(means.ravel().tolist())
@@ -29,12 +30,13 @@ def outputs_of(study: Study, outcomes: Collection[Outcome]) -> Values | None:
 def _means(study: Study, outcomes: Collection[Outcome]) -> Array:
     names = study.target.metrics
     rows = {agent: row for row, agent in enumerate(study.target.agents)}
-    sums, counts = np.zeros(study.target.means.shape), np.zeros((len(rows), 1))
+    sums, counts = np.zeros(study.target.means.shape), np.zeros(study.target.means.shape)
     # In the order of the starts, so that a sum has the same last bit whatever came in first.
     for outcome in sorted(outcomes, key=lambda one: one.episode.start):
         if outcome.metrics is not None:
-            sums[rows[outcome.episode.agent]] += [outcome.metrics[name] for name in names]
-            counts[rows[outcome.episode.agent]] += 1.0
+            row, known = rows[outcome.episode.agent], [name in outcome.metrics for name in names]
+            sums[row] += [outcome.metrics.get(name, 0.0) for name in names]
+            counts[row] += known
     return np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan)
 
 

@@ -11,8 +11,9 @@ from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import record
 from proxytune.study.stages.cutting import by_other_metrics
 from proxytune.study.stages.stopping import stopped
-from proxytune.study.study import Study, read_target
+from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
+from proxytune.study.target import read_target
 
 
 def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:

@@ -13,6 +13,7 @@ from proxytune.study.evaluation import Evaluation
 from proxytune.study.provenance import CODE, SEARCH, adopt, differ
 from proxytune.study.settings import LEARNING
 from proxytune.study.stages.cutting import Cut, reference, run_or_cut
+from proxytune.study.stages.failing import check_some_work
 from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study, changes, facts
 from proxytune.study.study_run import StudyRun
@@ -30,7 +31,8 @@ def run_study(run: StudyRun, proposer: Proposer) -> None:
     Raises:
         SettingsError: If what the finished trials depend on has changed.
         EpisodeError: If an episode fails and the study is to stop then.
-        RunError: If the machine fails, or no trial of the initial design has a score.
+        RunError: If the machine fails, every episode of the first trial fails alike, or no trial of the initial
+            design has a score.
         StoreError: If the database cannot be written.
     """
     check_facts(run)
@@ -68,7 +70,9 @@ class StudyTrials:
         what = _name_trials(trials, self._run.settings.budget)
         against = reference(self._run, self._done[: batch.start])
         if against is None:
-            self._run.outcomes([episode for trial in trials for episode in self._run.episodes_of(trial)], what)
+            outcomes = self._run.outcomes([one for trial in trials for one in self._run.episodes_of(trial)], what)
+            if not self._done:
+                check_some_work(outcomes.values(), what)
             cuts: list[Cut | None] = [None] * len(trials)
         else:
             cuts = run_or_cut(self._run, trials, against, what)

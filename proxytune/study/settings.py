@@ -1,7 +1,7 @@
 """What study.toml says, read strictly."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ FORMAT = 1
 LEARNING = "plv"
 """The objective that is not a measure of scores but of learning."""
 KEYS = (
-    "format", "name", "family", "proxy", "target", "truth", "objective", "metrics", "agents",
+    "format", "name", "family", "proxy", "target", "target_columns", "truth", "objective", "metrics", "agents",
     "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
     "cut_off", "stop", "parameters", "domain", "teaching",
 )  # fmt: skip
@@ -47,11 +47,11 @@ class StudySettings:
         name: What the study is called.
         family: Where the domain family comes from, as "module:factory".
         proxy: A model.toml whose effects the proxy has, if any.
-        target: The score table of the target.
+        target: The score table of the target; of several files the first.
         truth: A model.toml of what made the target, where that is known.
         objective: The measure that is made small or large: "prpv", "ppv", "plv", or one's own.
         metrics: How agents are compared.
-        agents: Names of the agents, at least two.
+        agents: Names of the agents, at least two, as tables and figures have them.
         starts: How many of the family's starting conditions, the first ones, each agent drives from.
         budget: How many trials.
         initial: How many of them come from the quasi-random design.
@@ -67,6 +67,9 @@ class StudySettings:
         space: The search box, its parameters sorted by name.
         domain: The table that the family's factory reads.
         teaching: How a proxy's worth as a teacher is measured, if it is.
+        aliases: What is loaded for an agent whose name in tables is another.
+        more_targets: The other files of the target's score table.
+        target_columns: What columns are called in the target's files where that is another name.
     """
 
     path: Path
@@ -93,6 +96,19 @@ class StudySettings:
     space: Space
     domain: Section
     teaching: TeachingSettings | None = None
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    more_targets: tuple[Path, ...] = ()
+    target_columns: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def targets(self) -> tuple[Path, ...]:
+        """The files that hold the target's scores."""
+        return (self.target, *self.more_targets)
+
+    @property
+    def loaded_agents(self) -> tuple[str, ...]:
+        """What is loaded for each agent."""
+        return tuple(self.aliases.get(agent, agent) for agent in self.agents)
 
     @property
     def folder(self) -> Path:
@@ -120,7 +136,7 @@ def read_study_settings(path: Path) -> StudySettings:
         name=read.text("name", path.absolute().parent.name),
         family=read.text("family", DEFAULT_FAMILY),
         proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
-        target=path.parent / read.text("target"),
+        target=path.parent / _targets(read)[0],
         truth=path.parent / read.text("truth") if "truth" in read.values else None,
         objective=read.text("objective", "prpv"),
         metrics=_metrics(read),
@@ -140,6 +156,9 @@ def read_study_settings(path: Path) -> StudySettings:
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
+        aliases=_aliases(read),
+        more_targets=tuple(path.parent / name for name in _targets(read)[1:]),
+        target_columns=_texts(read.section("target_columns")),
     )
 
 
@@ -162,10 +181,26 @@ def _metrics(read: Section) -> tuple[Metric, ...]:
 
 
 def _agents(read: Section) -> tuple[str, ...]:
-    agents = read.texts("agents")
+    agents = tuple(_aliases(read)) or read.texts("agents")
     if len(agents) < 2:
         raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
     return agents
+
+
+def _targets(read: Section) -> tuple[str, ...]:
+    """The file of the target's scores, or several."""
+    if not isinstance(read.values.get("target"), list):
+        return (read.text("target"),)
+    return read.texts("target") or (read.text("target"),)
+
+
+def _aliases(read: Section) -> dict[str, str]:
+    """The table [agents], where it is one: name in tables to what is loaded."""
+    return _texts(read.section("agents")) if isinstance(read.values.get("agents"), dict) else {}
+
+
+def _texts(table: Section) -> dict[str, str]:
+    return {name: table.text(name) for name in table.values}
 
 
 def _stop(rules: Section) -> StopRules:
@@ -197,6 +232,7 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "objective": settings.objective,
         "metrics": [str(metric) for metric in settings.metrics],
         "agents": list(settings.agents),
+        "aliases": dict(settings.aliases),
         "starts": settings.starts,
         "budget": settings.budget,
         "initial": settings.initial,

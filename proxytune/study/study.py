@@ -2,15 +2,15 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from proxytune.domain import DomainFamily
 from proxytune.effects import Catalogue, read_model
-from proxytune.errors import InputError, ScoresError
-from proxytune.scores import ScoreTable, read_scores
+from proxytune.errors import InputError
+from proxytune.scores import ScoreTable
 from proxytune.search.engines import gaussian_process
 from proxytune.search.engines.engine import Engine
 from proxytune.search.engines.registry import STUDY_ENGINES, engine_of, why_not_engine
@@ -18,9 +18,10 @@ from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.objective import PRPV, Objective, objective_of
+from proxytune.study.own_code import code_of
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
+from proxytune.study.target import read_target, with_scores
 from proxytune.study.weights import unnoticed
-from proxytune.usefulness.repeats import start_of, starts_of
 from proxytune.versions import version_changes
 
 UNSAID = {"batch": 1, "engine": "gp"}
@@ -41,6 +42,7 @@ class Study:
         cautions: What of study.toml or of the target's table is left out, in one line each.
         objective: The measure that its trials make small or large.
         engine: What proposes its trials after the design.
+        code: A digest of what the user's own code means; failures of other code are not remembered.
     """
 
     settings: StudySettings
@@ -51,6 +53,7 @@ class Study:
     cautions: tuple[str, ...] = ()
     objective: Objective = PRPV
     engine: Engine = gaussian_process.ENGINE
+    code: str = ""
 
 
 def open_study(path: Path) -> Study:
@@ -61,12 +64,11 @@ def open_study(path: Path) -> Study:
     """
     settings = read_study_settings(path)
     family = load_family(settings, settings.proxy)
-    known = _with_scores(settings)
-    absent = [agent for agent in settings.agents if agent not in known.agents]
-    left_out = (f"the target has no scores of {', '.join(absent)}: left out",) if absent else ()
+    known, left_out = with_scores(settings)
     cautions = (*left_out, *unnoticed(settings.folder))
     target, objective = read_target(known, family), objective_of(settings)
-    return Study(known, family, target, family.identity, _truth(settings), cautions, objective, _engine(settings))
+    truth, engine, code = _truth(settings), _engine(settings), code_of(settings)
+    return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
 
 
 def _engine(settings: StudySettings) -> Engine:
@@ -87,21 +89,6 @@ def _engine(settings: StudySettings) -> Engine:
     return engine
 
 
-def _with_scores(settings: StudySettings) -> StudySettings:
-    """The study of those agents that the target has scores of.
-
-    Raises:
-        InputError: If fewer than two are left.
-    """
-    scored = read_scores(settings.target, [metric.name for metric in settings.metrics]).agents
-    there = tuple(agent for agent in settings.agents if agent in scored)
-    missing = tuple(agent for agent in settings.agents if agent not in scored)
-    if len(there) < 2:
-        hint = nearest(missing[0], scored) if len(missing) == 1 else "add them, or take them out of the study"
-        raise InputError(f"{settings.target}: has no scores of {', '.join(missing)}; {hint}")
-    return replace(settings, agents=there)
-
-
 def _truth(settings: StudySettings) -> Theta | None:
     if settings.truth is None:
         return None
@@ -109,34 +96,6 @@ def _truth(settings: StudySettings) -> Theta | None:
         raise settings.error("truth", f"no such file: {settings.truth}; check the path, or remove it")
     known = read_model(settings.truth, Catalogue(settings.folder.resolve())).theta
     return {name: known[name] for name in settings.space.names if name in known}
-
-
-def read_target(settings: StudySettings, family: DomainFamily) -> ScoreTable:
-    """The target's scores of the study's agents, from the study's own starts where it has all of these.
-
-    Raises:
-        InputError: If the table lacks a metric, or has a value that is not finite.
-    """
-    compared = [metric.name for metric in settings.metrics]
-    table = read_scores(settings.target, [*compared, *_others(settings, family, compared)])
-    chosen = table.arrange(agents=settings.agents)
-    driven = [label for column, label in enumerate(chosen.episodes) if chosen.driven[:, column].any()]
-    wanted = {str(start) for start in range(settings.starts)}
-    own = [label for label in driven if start_of(label) in wanted]
-    return chosen.arrange(agents=settings.agents, episodes=own if set(starts_of(own)) == wanted else driven)
-
-
-def _others(settings: StudySettings, family: DomainFamily, compared: Sequence[str]) -> list[str]:
-    """The metrics beside those compared that the table has in full: what a search can learn from at no cost."""
-    return [name for name in family.metrics if name not in compared and _in_full(settings.target, name)]
-
-
-def _in_full(path: Path, metric: str) -> bool:
-    try:
-        read_scores(path, [metric])
-    except ScoresError:
-        return False
-    return True
 
 
 def facts(study: Study) -> dict[str, Any]:
@@ -168,6 +127,7 @@ def facts(study: Study) -> dict[str, Any]:
         "seed": settings.seed,
         **said,
         "cut_off": settings.cut_off,
+        **{f"agents.{name}": settings.aliases[name] for name in settings.agents if name in settings.aliases},
         **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
         **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
         "identity": study.identity,
@@ -181,7 +141,7 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
     # Another engine may learn from another part of it, and from the pre-flight.
     implied = {"target"} if {"agents", "metrics", "engine", "starts"} & set(keys) else set()
     implied |= {"preflight"} if "engine" in keys else set()
-    told = any(key == "family" or key.startswith("domain.") for key in keys)
+    told = any(key == "family" or key.startswith(("domain.", "agents.")) for key in keys)
     named = [key for key in keys if key not in implied | {"identity", "versions"}]
     both = "versions" in before and "versions" in after and not told
     versions = version_changes(before["versions"], after["versions"]) if both else []

@@ -1,6 +1,7 @@
 """A study under way: what it needs of its domain family is simulated once, kept in the store, and remembered."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 
 from proxytune.domain import Episode, Instance, Outcome, instance_of
 from proxytune.errors import EpisodeError, RunError
@@ -10,7 +11,16 @@ from proxytune.search.proposer import Trial
 from proxytune.space import Theta
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
-from proxytune.study.evaluation import Evaluation, Spent, failure_of, longest_first, plan, score
+from proxytune.study.evaluation import (
+    Evaluation,
+    Spent,
+    failure_of,
+    longest_first,
+    needed_metrics,
+    plan,
+    score,
+    with_metrics_needed,
+)
 from proxytune.study.outputs import outputs_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
@@ -61,25 +71,34 @@ class StudyRun:
         known: dict[Episode, Outcome] = {}
         for theta in dict.fromkeys(episode.theta for episode in planned):
             known |= self.store.outcomes(self.study.identity, dict(theta))
-        return {episode: known[episode] for episode in planned if episode in known}
+        needed = needed_metrics(self.settings, self.study.family)
+        return {e: with_metrics_needed(known[e], needed) for e in planned if e in known}
 
     def outcomes(self, planned: Sequence[Episode], what: str, enough: Enough | None = None) -> dict[Episode, Outcome]:
         """What becomes of episodes; those not simulated yet are simulated now.
 
-        A failed episode counts as known where failures do not stop the study; where they do, it is tried again, since
-        something is expected to have been mended. Where it is asked whether what is known of a domain instance is
-        enough, agents begin in their order, each in all instances, and none more begins in an instance after a yes.
+        A failed episode counts as known where failures do not stop the study and the code that failed is still the
+        same; else it is tried again, since something is expected to have been corrected. Where it is asked whether what
+        is known of a domain instance is enough, agents begin in their order, each in all instances, and none more
+        begins in an instance after a yes.
 
         Raises:
             EpisodeError: If an episode fails and the study is to stop then.
         """
-        again = self.settings.stop_on_failure
-        known = {e: outcome for e, outcome in self.known(planned).items() if not (again and outcome.failure)}
+        known = {e: one for e, one in self.known(planned).items() if not (one.failure and self._is_tried_again(e))}
         missing = [episode for episode in planned if episode not in known]
         self.watcher.begin(what, len(planned) - len(missing))
         if missing:
             self._simulate(planned, missing, known, enough)
         return {episode: known[episode] for episode in planned if episode in known}
+
+    @cached_property
+    def corrected(self) -> set[Episode]:
+        """The episodes that failed in code that has changed since, and have not been tried again."""
+        return self.store.failed_in_other_code(self.study.identity, self.study.code)
+
+    def _is_tried_again(self, failed: Episode) -> bool:
+        return self.settings.stop_on_failure or failed in self.corrected
 
     def _simulate(
         self,
@@ -91,7 +110,8 @@ class StudyRun:
         """Simulate what is missing, and add it to what is known."""
         ended = {theta for theta in {episode.theta for episode in planned} if enough and enough(theta, known)}
         order = self._order(planned, missing, by_agent=enough is not None)
-        with running(self.study.family, order, self.settings.jobs, lambda episode: episode.theta in ended) as outcomes:
+        family, needed = self.study.family, needed_metrics(self.settings, self.study.family)
+        with running(family, order, self.settings.jobs, lambda one: one.theta in ended, needed) as outcomes:
             for outcome in outcomes:
                 self._keep(outcome)
                 known[outcome.episode] = outcome
@@ -106,7 +126,8 @@ class StudyRun:
         return sorted(order, key=lambda episode: place[episode.agent]) if by_agent else order
 
     def _keep(self, outcome: Outcome) -> None:
-        self.store.save_outcome(self.study.identity, outcome)
+        self.store.save_outcome(self.study.identity, outcome, self.study.code)
+        self.corrected.discard(outcome.episode)
         self.watcher.episode()
         self.spent += Spent(1, outcome.seconds)
         if self.settings.stop_on_failure and outcome.failure:

@@ -3,7 +3,7 @@
 from proxytune.usefulness.assessment import Assessment, assess
 from proxytune.usefulness.catalogue import MEASURES, PODS
 from proxytune.usefulness.chance import Chance, chance
-from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.comparison import Comparison, compare, in_common
 from proxytune.usefulness.correlation import Correlation, kendall_tau, srcc
 from proxytune.usefulness.intervals import Intervals
 from proxytune.usefulness.measure import Measure, Measured
@@ -12,6 +12,7 @@ from proxytune.usefulness.noise import FloorKind, NoiseFloor, floor_of_repeats, 
 from proxytune.usefulness.pod import Pod, pod_of_images, pod_of_poses
 from proxytune.usefulness.ppv import Ppv, ppv
 from proxytune.usefulness.prpv import FlippedPair, Prpv, prpv
+from proxytune.usefulness.rates import Rate, SuccessRates
 from proxytune.usefulness.resampling import PrpvInterval, bootstrap_prpv
 from proxytune.usefulness.selection import Difference, Selection, select_proxy
 
@@ -34,12 +35,15 @@ __all__ = [
     "Ppv",
     "Prpv",
     "PrpvInterval",
+    "Rate",
     "Selection",
+    "SuccessRates",
     "assess",
     "bootstrap_prpv",
     "chance",
     "compare",
     "floor_of_repeats",
+    "in_common",
     "kendall_tau",
     "mmrv",
     "noise_floor",

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.chance import Chance, chance
@@ -12,6 +13,7 @@ from proxytune.usefulness.mmrv import Mmrv, mmrv
 from proxytune.usefulness.noise import NoiseFloor, noise_floor
 from proxytune.usefulness.ppv import Ppv, ppv
 from proxytune.usefulness.prpv import Prpv, prpv
+from proxytune.usefulness.rates import SuccessRates, success_rates
 from proxytune.usefulness.resampling import PrpvInterval, bootstrap_prpv
 
 FEW_EPISODES = 5
@@ -70,6 +72,11 @@ class Assessment:
             return None
         return self.prpv.value <= floor.high and not self.chance.explains
 
+    @cached_property
+    def success_rates(self) -> tuple[SuccessRates, ...]:
+        """The metrics of zeros and ones, with each agent's rate."""
+        return success_rates(self.inputs)
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What is undefined or uncertain, in one line each."""
@@ -78,6 +85,7 @@ class Assessment:
             lines.append(f"no interval: {self.prpv_interval.reason}")
         if self.noise_floor.reason:
             lines.append(f"no noise floor: {self.noise_floor.reason}")
+        lines += [rates.note for rates in self.success_rates if rates.note]
         return (*lines, *_caution(self))
 
 

@@ -1,6 +1,6 @@
 """The two sides of every usefulness measure, checked and put in the same order."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from proxytune.errors import ScoresError
@@ -83,4 +83,31 @@ def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric])
 def _check_agents(present: ScoreTable, where: str, absent: ScoreTable, other: str) -> None:
     missing = [name for name in present.agents if name not in absent.agents]
     if missing:
-        raise ScoresError(f"{other} lacks scores of {', '.join(missing)}, which {where} has; add or remove them")
+        remedy = "add or remove them, or compare the others alone (score --common)"
+        raise ScoresError(f"{other} lacks scores of {', '.join(missing)}, which {where} has; {remedy}")
+
+
+def in_common(tables: Mapping[str, ScoreTable]) -> tuple[dict[str, ScoreTable], tuple[str, ...]]:
+    """The tables with only those agents that all have, in each its own order, and who is left out, in a line each.
+
+    Raises:
+        ScoresError: If they have fewer than two in common.
+    """
+    shared = set.intersection(*(set(table.agents) for table in tables.values()))
+    lines = [
+        f"left out, since not all sides have them: {', '.join(sorted(beyond))} of {name}"
+        for name, table in tables.items()
+        if (beyond := set(table.agents) - shared)
+    ]
+    if len(shared) < 2:
+        sides = "; ".join(f"{name} has {', '.join(table.agents)}" for name, table in tables.items())
+        raise ScoresError(f"comparing takes at least two agents in common; {sides}")
+    kept = {name: _only(table, shared) for name, table in tables.items()}
+    return kept, tuple(lines)
+
+
+def _only(table: ScoreTable, agents: Collection[str]) -> ScoreTable:
+    """The table of these agents and of the episodes that they drove."""
+    rest = table.arrange(agents=[agent for agent in table.agents if agent in agents])
+    driven = [label for column, label in enumerate(rest.episodes) if rest.driven[:, column].any()]
+    return rest.arrange(agents=rest.agents, episodes=driven)

@@ -73,7 +73,11 @@ def test_a_family_that_keeps_no_poses_gives_scores_alone(make_study):
     ("fault", "words"),
     [
         ("raises", "agent 'agent1' failed from start 2: agent 'agent1' raised ValueError at 1.20 s: it lost its way"),
-        ("crashes", "agent 'agent1' failed from start 2: the domain family raised ZeroDivisionError: division by zero"),
+        (
+            "crashes",
+            "agent 'agent1' failed from start 2: the domain family raised ZeroDivisionError: division by zero "
+            "(wobbly.py, line 75)",
+        ),
         ("nan", "agent 'agent1' failed from start 2: agent 'agent1': the domain family gave no finite 'distance'"),
     ],
 )

@@ -222,3 +222,76 @@ def test_the_pilots_real_duckiebot_is_scored_from_its_episodes():
     }  # fmt: skip
     assert all(one["prpv_interval"][0] <= one["prpv"] <= one["prpv_interval"][1] for one in found["proxies"])
     assert any("only 2 episodes per agent" in note for note in found["proxies"][0]["notes"])
+
+
+@pytest.fixture
+def own(tables):
+    """A target in two files, with semicolons, decimal commas, names of its own and an agent of its own."""
+    rows = [line.replace(",", ";").replace(".", ",") for line in REAL.splitlines()[1:]]
+    head = "policy;trial;dist_m;time"
+    Path("monday.csv").write_text("\n".join([head, *rows[:6]]) + "\n")
+    Path("tuesday.csv").write_text("\n".join([head, *rows[6:]]) + "\n")
+    Path("people.csv").write_text("policy;trial;dist_m;time\nhuman;1;9;1\n")
+
+
+COLUMNS = ("--columns", "agent=policy,episode=trial,distance=dist_m")
+OWN = ("--proxy", "sim.csv", "--target", "monday.csv", "--target", "tuesday.csv")
+
+
+def test_a_target_as_people_keep_it_gives_the_figures_of_a_tidy_one(own):
+    found = document(*OWN, *COLUMNS, *METRIC)
+    assert found.pop("target") == "monday, tuesday"
+    tidy = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC)
+    assert tidy.pop("target") == "real"
+    assert found == tidy
+    assert found["left_out"] == []
+
+
+def test_agents_of_one_side_are_refused_by_name_or_left_out_and_said(own):
+    words = (*OWN, "--target", "people.csv", *COLUMNS, *METRIC)
+    with pytest.raises(ScoresError, match=r"the proxy lacks scores of human, .* \(score --common\)"):
+        run(*words)
+    assert document(*words, "--common")["left_out"] == ["left out, since not all sides have them: human of the target"]
+    assert document(*words, "--common")["prpv"] == document(*OWN, *COLUMNS, *METRIC)["prpv"]
+    assert "note: left out, since not all sides have them: human of the target" in shown(*words, "--common")
+
+
+@pytest.mark.parametrize(
+    ("columns", "complaint"),
+    [
+        ("agent=polcy", "--columns agent=polcy: no table has a column 'polcy'; did you mean 'policy'"),
+        ("agent", "--columns agent: write NAME=COLUMN,..., as in agent=policy"),
+        ("agent=", "write NAME=COLUMN"),
+    ],
+)
+def test_a_column_map_that_cannot_be_is_one_line(own, columns, complaint):
+    with pytest.raises(InputError, match=complaint):
+        run(*OWN, "--columns", columns, *METRIC)
+
+
+def test_several_files_of_different_domains_make_no_table(own):
+    with pytest.raises(InputError, match="several files make one table; give all of them one domain, or none"):
+        run("--proxy", "sim.csv", "--target", "both.csv:real", "--target", "real.csv", *METRIC)
+
+
+def test_success_rates_stand_in_table_and_document_and_ties_are_told(tables):
+    wins = {"A": 2, "B": 2, "C": 5, "D": 8}
+    rows = [f"{agent},{episode},{int(episode < wins[agent])}" for agent in wins for episode in range(9)]
+    Path("rates.csv").write_text("\n".join(["agent,episode,success", *rows]) + "\n")
+    words = ("--proxy", "rates.csv", "--target", "rates.csv", "--metric", "success:max")
+    rate = document(*words)["success_rates"]["success"]["C"]["target"]
+    assert (rate["value"], rate["episodes"]) == (pytest.approx(5 / 9), 9)
+    assert rate["low"] < 5 / 9 < rate["high"]
+    assert "C      0.56 (0.27 to 0.81)         9  0.56 (0.27 to 0.81)         9" in shown(*words)
+    assert "1 of 6 pairs of agents tie in the proxy, 1 on the target" in shown(*words)
+
+
+def test_with_three_agents_no_proxy_is_called_perfect(tables):
+    """Chance alone ranks three agents rightly in one case of six."""
+    labels = [f"{episode}/{repeat}" for episode in range(5) for repeat in (0, 1)]
+    again = [f"{agent},{label},{ord(agent)}" for agent in "ABC" for label in labels]
+    Path("three.csv").write_text("\n".join(["agent,episode,distance", *again]) + "\n")
+    found = document("--proxy", "three.csv", "--target", "three.csv", "--metric", "distance:max")
+    assert (found["prpv"], found["noise_floor_kind"], found["at_noise_floor"]) == (0, "same starts", False)
+    assert any(note.startswith("PRPV is no better than chance") for note in found["notes"])
+    assert not any("no difference between proxy and target" in note for note in found["notes"])

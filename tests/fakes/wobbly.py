@@ -117,3 +117,13 @@ def broken_factory(section: Section, *, model: Path | None) -> Wobbly:
 def not_a_family(section: Section, *, model: Path | None) -> dict[str, str]:
     """A factory of something else."""
     return {}
+
+
+def domain_alone(section: Section) -> Wobbly:
+    """A factory that a study cannot call: it knows of no model."""
+    return wobbly(section, model=None)
+
+
+def nothing_at_all() -> Wobbly:
+    """A factory that takes nothing."""
+    return Wobbly()

@@ -42,6 +42,7 @@ def test_the_document_has_the_promised_keys_and_is_plain_json(result):
     assert {"index", "theta", "prpv", "ppv", "failed_episodes"} <= set(document["trials"][0])
     assert document["target"] == {
         "path": str(result.study.settings.target),
+        "files": [str(result.study.settings.target)],
         "agents": 6,
         "episodes_per_agent": [3, 3],
     }

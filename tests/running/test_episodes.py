@@ -5,7 +5,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from wobbly import Wobbly
 
 from proxytune.domain import make_episode
-from proxytune.errors import RunError
+from proxytune.errors import EpisodeError, RunError
 from proxytune.running.episodes import run_episode, running
 
 EPISODES = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for a in range(3) for s in range(3)]
@@ -46,7 +46,7 @@ def test_each_episode_runs_on_one_thread():
 
 FAULTS = {
     "raises": "agent 'agent0' raised ValueError at 1.20 s: it lost its way",
-    "crashes": "the domain family raised ZeroDivisionError: division by zero",
+    "crashes": "the domain family raised ZeroDivisionError: division by zero (wobbly.py, line 75)",
     "nan": "agent 'agent0': the domain family gave no finite 'distance'",
 }
 
@@ -63,7 +63,7 @@ class Strange(Wobbly):
         return {"distance": 1.0} if episode.start else None
 
 
-@pytest.mark.parametrize(("start", "expected"), [(1, "gave no finite 'survival_time'"), (0, "TypeError")])
+@pytest.mark.parametrize(("start", "expected"), [(1, "gave no finite 'survival_time'"), (0, "by name, got NoneType")])
 def test_a_family_that_answers_something_else_fails_the_episode(start, expected):
     assert expected in run_episode(Strange(), EPISODES[start]).failure
 
@@ -107,3 +107,45 @@ def test_whether_an_episode_is_left_out_is_asked_when_it_is_about_to_begin(jobs,
 
 def test_no_episode_at_all_is_fine():
     assert run_all(Wobbly(), 2, []) == {}
+
+
+@pytest.mark.parametrize("value", [float("nan"), None, "far", float("inf")])
+def test_a_metric_that_is_not_needed_may_be_missing_or_no_number(value):
+    class Partly(Wobbly):
+        def run(self, episode):
+            return {**super().run(episode), "distance": value}
+
+    outcome = run_episode(Partly(), EPISODES[0], needed=["survival_time"])
+    assert outcome.metrics is not None
+    assert list(outcome.metrics) == ["survival_time"]
+    for needed in (["distance"], []):
+        assert "gave no finite 'distance'" in run_episode(Partly(), EPISODES[0], needed).failure
+
+
+class Unloadable(Wobbly):
+    def __setstate__(self, state):
+        raise ModuleNotFoundError("No module named 'my_simulator'")
+
+
+def test_a_family_that_cannot_go_to_another_process_is_one_line():
+    class Local(Wobbly):
+        pass
+
+    with pytest.raises(RunError, match=r"cannot be sent to other processes \(.*Local.*or set jobs = 1"):
+        run_all(Local(), 2)
+    assert len(run_all(Local(), 1)) == len(EPISODES)
+    with pytest.raises(RunError, match=r"another process cannot load .*No module named 'my_simulator' \(test_ep"):
+        run_all(Unloadable(), 2)
+
+
+def test_where_an_agent_s_exception_arose_is_told_with_the_failure():
+    class Wrapped(Wobbly):
+        def run(self, episode):
+            try:
+                return {}["mass"]
+            except KeyError as problem:
+                raise EpisodeError("agent 'agent0' raised KeyError at 1.20 s: 'mass'") from problem
+
+    assert run_episode(Wrapped(), EPISODES[0]).failure.startswith(
+        "agent 'agent0' raised KeyError at 1.20 s: 'mass' (test_episodes.py, line "
+    )

@@ -49,7 +49,16 @@ def test_domains_are_read_apart(csv):
         ("\n\n", "is empty"),
         ("agent,distance\n", "has no rows"),
         ("robot,distance\nA,1\n", "no column 'agent'"),
-        ("agent;distance\nA;1\n", "no column 'agent'"),
+        (
+            "policy,trial,distance\nA,1,2\n",
+            "columns found: policy, trial, distance; rename the one that names the agents",
+        ),
+        ("policy,trial,distance\nA,1,2\n", "or give its name: --columns agent=policy (in study.toml: target_columns)"),
+        ("agent;distance\nA;1,234.5\n", "'1,234.5' has a comma, but line 2 has '1,234.5'"),
+        (
+            "agent;distance\nA;1,5\nB;1.5\n",
+            "line 2, column 'distance': '1,5' has a comma, but line 3 has '1.5'; write all",
+        ),
         ("agent,distanc\nA,1\n", "no column 'distance'; did you mean 'distanc'?"),
         ("agent,distance,distance\nA,1,2\n", "column 'distance' twice"),
         ("agent,distance\nA,1\nB,nan\n", "line 3, column 'distance': must be a finite number, got 'nan'"),
@@ -110,3 +119,41 @@ def test_a_table_that_cannot_be_written_leaves_nothing_behind(csv, tmp_path):
     with pytest.raises(ScoresError, match="cannot be written"):
         write_scores(table, tmp_path / "folder")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "scores.csv"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "policy;trial;dist_m\nA;1;1,5\nA;2;2,5\nB;1;3\n",
+        "policy\ttrial\tdist_m\nA\t1\t1,5\nA\t2\t2,5\nB\t1\t3\n",
+        "policy\ttrial\tdist_m\nA\t1\t1.5\nA\t2\t2.5\nB\t1\t3\n",
+        "agent,trial,distance,dist_m\nA,1,9,1.5\nA,2,9,2.5\nB,1,9,3\n",
+    ],
+    ids=["semicolons", "tabs and commas", "tabs and points", "some names of its own, and one name taken"],
+)
+def test_separators_decimals_and_names_of_columns_are_the_user_s(csv, text):
+    columns = {"agent": "policy" if "policy" in text else "agent", "episode": "trial", "distance": "dist_m"}
+    table = read_scores(csv(text), ["distance"], columns=columns)
+    assert (table.agents, table.episodes, table.metrics) == (("A", "B"), ("1", "2"), ("distance",))
+    assert table.means[:, 0].tolist() == [2.0, 3.0]
+
+
+def test_a_name_in_a_column_map_that_no_file_has_is_refused(csv):
+    with pytest.raises(ScoresError, match="no column 'trail' for 'episode'; did you mean 'trial'"):
+        read_scores(csv("agent,trial,distance\nA,1,2\n"), ["distance"], columns={"episode": "trail"})
+
+
+def test_several_files_make_one_table(csv):
+    whole = read_scores(csv(GOOD), ["distance"])
+    parts = [
+        csv("agent,episode,distance\nA,1,1.5\n", "one.csv"),
+        csv("agent;episode;distance\nA;2;2,5\nB;1;3\n", "two.csv"),
+    ]
+    table = read_scores(parts, ["distance"])
+    assert (table.agents, table.episodes, table.means.tolist()) == (whole.agents, whole.episodes, whole.means.tolist())
+    with pytest.raises(
+        ScoresError, match=r"two.csv: line 2: agent 'A' has episode '1' twice, once in .*one.csv; number"
+    ):
+        read_scores([parts[0], csv("agent,episode,distance\nA,1,2\n", "two.csv")], ["distance"])
+    with pytest.raises(ScoresError, match=r"two.csv: has no column 'episode', which .*one.csv has; add it"):
+        read_scores([parts[0], csv("agent,distance\nB,2\n", "two.csv")], ["distance"])

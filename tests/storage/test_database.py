@@ -72,6 +72,7 @@ def test_a_newer_format_is_refused(tmp_path):
 
 
 OLD_TRIALS = """
+ALTER TABLE episodes DROP COLUMN code;
 DROP TABLE trials;
 CREATE TABLE trials (
     number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
@@ -87,6 +88,7 @@ CONVERTED_TRIALS = [
     ("prpv", 2, 1, "failed", None, "{}", 3, "it fell", "[]", None, 0.0),
 ]
 TRIALS_OF_3 = f"""
+ALTER TABLE episodes DROP COLUMN code;
 DROP TABLE trials;
 {TRIALS_3}
 INSERT INTO instances VALUES (1, 'identity', '{{}}');
@@ -288,3 +290,18 @@ def test_a_folder_is_refused(tmp_path):
     (tmp_path / "study.db").mkdir()
     with pytest.raises(StoreError, match=r"study\.db: is a folder, not a study's database; move it away"):
         connect(tmp_path / "study.db", writable=True)
+
+
+def test_format_4_knew_nothing_of_the_code_of_failures(tmp_path):
+    path = made(tmp_path / "study.db")
+    with sqlite3.connect(path) as plain:
+        plain.executescript(
+            "ALTER TABLE episodes DROP COLUMN code; PRAGMA user_version = 4;"
+            " INSERT INTO instances VALUES (1, 'i', '{}');"
+            " INSERT INTO episodes VALUES (1, 'a', 0, 1, NULL, 'it fell', 0.5), (1, 'a', 1, 1, '{}', NULL, 0.5);"
+        )
+    disconnect(connect(path, writable=True))
+    with sqlite3.connect(path) as plain:
+        assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
+        rows = plain.execute("SELECT start, failure, code FROM episodes ORDER BY start").fetchall()
+    assert rows == [(0, "it fell", None), (1, None, None)]

@@ -208,7 +208,7 @@ def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_s
 
 def test_where_failures_stop_the_study_they_stop_it_here(finished):
     broken = opened(finished, stop_on_failure=True)
-    broken = replace(broken, family=replace(broken.family, faults=("agent3:1:raises",)))
+    broken = replace(broken, family=replace(broken.family.family, faults=("agent3:1:raises",)))
     with Store.open(finished) as store, pytest.raises(EpisodeError, match="agent 'agent3'"):
         study_run = StudyRun(broken, store)
         run_confirmation(study_run)

@@ -32,8 +32,14 @@ BAD = {
     ),
     "a factory with a bug": (
         {"family": '"wobbly:broken_factory"'},
-        "raised KeyError: 'robot'; correct it",
+        "raised KeyError: 'robot' (wobbly.py, line 114); correct it",
     ),
+    "a factory without a model": (
+        {"family": '"wobbly:domain_alone"'},
+        "family: wobbly:domain_alone cannot be called (got an unexpected keyword argument 'model'); "
+        "write it as: def domain_alone(domain, *, model)",
+    ),
+    "a factory of nothing": ({"family": '"wobbly:nothing_at_all"'}, "cannot be called (too many positional arguments)"),
     "something else": ({"family": '"wobbly:not_a_family"'}, "made no domain family: it lacks identity, metrics"),
     "a missing model": ({"proxy": '"nowhere.toml"'}, "proxy: no such file: "),
     "an unknown parameter": (

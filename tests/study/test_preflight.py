@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from stopping import Stopping
 
-from proxytune.errors import EpisodeError
+from proxytune.errors import EpisodeError, RunError
 from proxytune.search.engines.registry import make_proposer
 from proxytune.space import Interval
 from proxytune.storage.store import Store
@@ -134,9 +134,15 @@ def test_failed_episodes_are_left_out_of_the_comparison(make_study):
 
 def test_where_every_agent_fails_everywhere_it_says_so_once_and_of_what(make_study):
     faults = ", ".join(f'"agent{number}:*:raises"' for number in range(6))
+    with pytest.raises(RunError, match="^agent 'agent0' raised ValueError.*; every agent fails so, in all 72 episodes"):
+        run(make_study(preflight="true", domain={"faults": f"[{faults}]"}))
+
+
+def test_where_agents_fail_of_different_things_it_goes_on_and_says_so_once(make_study):
+    faults = ", ".join(f'"agent{number}:*:{"raises" if number else "crashes"}"' for number in range(6))
     _, found = run(make_study(preflight="true", domain={"faults": f"[{faults}]"}))
     (warning,) = found.warnings
-    assert warning.startswith("pre-flight: every agent fails everywhere, first with: agent 'agent0'")
+    assert warning.startswith("pre-flight: every agent fails everywhere, first with: the domain family raised Zero")
     assert warning.endswith("; correct it")
     assert all(not movement.pairs and "cannot be tested" in movement.warning for movement in found.movements)
 

@@ -4,7 +4,7 @@ import pytest
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import compare
+from proxytune.usefulness import compare, in_common
 
 M = [Metric("m")]
 
@@ -43,3 +43,16 @@ def test_agents_that_do_not_match_are_named(proxy, target, complaint):
 def test_no_metric_a_metric_twice_or_an_unknown_one_is_refused(metrics):
     with pytest.raises(ScoresError):
         compare(proxy=table("AB"), target=table("AB"), metrics=metrics)
+
+
+def test_agents_that_all_sides_have_are_kept_and_the_others_named():
+    human = ScoreTable.from_episodes({(a, "day" if a == "H" else 1): {"m": 1.0} for a in "BHA"})
+    kept, lines = in_common({"the target": human, "the proxy sim": table("ABC")})
+    assert (kept["the target"].agents, kept["the proxy sim"].agents) == (("B", "A"), ("A", "B"))
+    assert kept["the target"].episodes == ("1",), "an episode that nobody is left of is none"
+    assert lines == (
+        "left out, since not all sides have them: H of the target",
+        "left out, since not all sides have them: C of the proxy sim",
+    )
+    with pytest.raises(ScoresError, match="at least two agents in common; one has A, B; other has C, D"):
+        in_common({"one": table("AB"), "other": table("CD")})

@@ -30,6 +30,13 @@ def document_of(assessment: Assessment) -> dict[str, Any]:
         **values,
         "intervals": _intervals(found) if assessment.intervals else None,
         "pairs": [{"better": pair.better, "worse": pair.worse, "flip": pair.flip} for pair in assessment.prpv.pairs],
+        "success_rates": {
+            rates.metric: {
+                agent: {"proxy": vars(rates.proxy[agent]), "target": vars(rates.target[agent])}
+                for agent in assessment.inputs.agents
+            }
+            for rates in assessment.success_rates
+        },
         "agents": list(assessment.inputs.agents),
         "metrics": [str(metric) for metric in assessment.inputs.metrics],
         "episodes": _episodes(assessment),

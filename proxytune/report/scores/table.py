@@ -7,7 +7,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.usefulness import MEASURES, Assessment, Measure, Selection
+from proxytune.usefulness import MEASURES, Assessment, Measure, Selection, SuccessRates
 from proxytune.usefulness.catalogue import PRPV
 
 Row = tuple[str, str, str, str, str]
@@ -22,7 +22,21 @@ def measures(assessment: Assessment, *, proxy: str, target: str) -> Group:
     beside = [row for measure in BESIDE_PRPV for row in _rows(measure, assessment)]
     for row in (*_prpv_rows(assessment), *beside):
         table.add_row(*map(escape, row))
-    return Group(table, *_notes({proxy: assessment}))
+    return Group(table, *map(_rates, assessment.success_rates), *_notes({proxy: assessment}))
+
+
+def _rates(rates: SuccessRates) -> Table:
+    """The success rate of each agent on both sides."""
+    table = _table(f"{rates.metric}: success rates with their own 95 % intervals (Wilson)")
+    for column in ("agent", "in the proxy", "episodes", "on the target", "episodes"):
+        table.add_column(column, justify="left" if column == "agent" else "right")
+    for agent, target in rates.target.items():
+        sides = [
+            (f"{one.value:.2f} ({one.low:.2f} to {one.high:.2f})", str(one.episodes))
+            for one in (rates.proxy[agent], target)
+        ]
+        table.add_row(escape(agent), *sides[0], *sides[1])
+    return table
 
 
 def ranking(assessments: Mapping[str, Assessment], selection: Selection, *, target: str) -> Group:

@@ -125,4 +125,6 @@ def _cut(trial: TrialRecord) -> dict[str, Any] | None:
 def _target(result: StudyResult) -> dict[str, Any]:
     target = result.study.target
     counts = [int(target.counts.min()), int(target.counts.max())]
-    return {"path": str(result.study.settings.target), "agents": len(target.agents), "episodes_per_agent": counts}
+    settings = result.study.settings
+    files = {"path": str(settings.target), "files": [str(path) for path in settings.targets]}
+    return {**files, "agents": len(target.agents), "episodes_per_agent": counts}

@@ -109,7 +109,7 @@ def _settings(result: StudyResult) -> list[tuple[str, str]]:
     return [
         ("domain family", settings.family),
         ("proxy", settings.proxy.name if settings.proxy else "the family's nominal model"),
-        ("target", settings.target.name),
+        ("target", ", ".join(path.name for path in settings.targets)),
         ("metrics", ", ".join(str(metric) for metric in settings.metrics)),
         ("agents", ", ".join(settings.agents)),
         ("starts", str(settings.starts)),

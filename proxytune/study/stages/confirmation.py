@@ -18,7 +18,7 @@ from proxytune.scores import ScoreTable
 from proxytune.search.knowledge.knowledge import Knowledge
 from proxytune.seeds import fresh_seed
 from proxytune.storage.records import TrialRecord
-from proxytune.study.evaluation import plan, score, table
+from proxytune.study.evaluation import in_common, plan, score, table
 from proxytune.study.knowledge import knowledge_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.stages.stopping import stopped
@@ -151,15 +151,15 @@ def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]
 
     The noise floor is what the domain's own trial scores against them.
     """
-    scored: dict[tuple[str, str | int], Mapping[str, float]] = {}
+    scored: dict[tuple[str, str], Mapping[str, float]] = {}
     for repetition, outcomes in enumerate(runs):
         for one in outcomes:
-            label = f"{one.episode.start}/{repetition}" if len(runs) > 1 else one.episode.start
+            label = f"{one.episode.start}/{repetition}" if len(runs) > 1 else str(one.episode.start)
             if one.metrics is not None:
                 scored[one.episode.agent, label] = one.metrics
     if {agent for agent, _ in scored} != set(study.settings.agents):
         return None
-    proxy, metrics = ScoreTable.from_episodes(scored), study.settings.metrics
+    proxy, metrics = ScoreTable.from_episodes(in_common(scored)), study.settings.metrics
     floor = floor_of_repeats(domain=table(own), again=proxy, metrics=metrics)
     return assess(proxy=proxy, target=study.target, metrics=metrics, floor=floor)
 

@@ -6,6 +6,7 @@ Without shared starts, or without a pre-flight, there is the spread between epis
 differ more than placements.
 """
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,5 +77,8 @@ def _shrunk(squares: Array) -> Array:
     """
     counts = np.sum(~np.isnan(squares), axis=0)
     sums = np.nansum(squares, axis=0)
-    middle = np.nanmedian(np.where(counts > 0, sums / np.maximum(1, counts), np.nan), axis=0)
+    with warnings.catch_warnings():
+        # Of a metric that no pair has, nothing is known.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        middle = np.nanmedian(np.where(counts > 0, sums / np.maximum(1, counts), np.nan), axis=0)
     return np.asarray((sums + PRIOR_PAIRS * middle) / (counts + PRIOR_PAIRS))

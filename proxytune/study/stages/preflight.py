@@ -22,6 +22,7 @@ from proxytune.domain import Episode, Outcome, make_episode
 from proxytune.seeds import preflight_noise_seed, preflight_seed
 from proxytune.space import Interval, Theta
 from proxytune.study.settings import StudySettings
+from proxytune.study.stages.failing import check_some_work
 from proxytune.study.stages.movement import LOOKS, Movement, judge
 from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
@@ -70,6 +71,7 @@ def run_preflight(run: StudyRun) -> Preflight | None:
 
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
+        RunError: If every episode fails alike.
     """
     return None if run.finished_trials() else _preflight(run, partial(_simulate, run))
 
@@ -82,7 +84,9 @@ def preflight_of(run: StudyRun) -> Preflight | None:
 def _simulate(run: StudyRun, look: int, added: Sequence[Episode]) -> None:
     what = f"pre-flight {look + 1} of {LOOKS}"
     run.watcher.begin(what, _most(run.settings, look) - len(added))
-    run.outcomes(added, what)
+    outcomes = run.outcomes(added, what)
+    if look == 0:
+        check_some_work(outcomes.values(), "the pre-flight")
 
 
 def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]) -> Preflight | None:
@@ -127,7 +131,7 @@ def placement_pairs(run: StudyRun) -> Array:
             for side, episode in enumerate(both):
                 metrics = known[episode].metrics if episode in known else None
                 if metrics is not None:
-                    found[row, side, column] = [metrics[name] for name in names]
+                    found[row, side, column] = [metrics.get(name, np.nan) for name in names]
     return found[~np.isnan(found).all(axis=(1, 2, 3))]
 
 

@@ -1,0 +1,110 @@
+"""A family asked through a guard, and agents by other names in tables than those that are loaded."""
+
+import sqlite3
+
+import pytest
+from wobbly import Wobbly
+
+from proxytune.api.driving import drive
+from proxytune.api.studies import run_study
+from proxytune.cli.main import main
+from proxytune.domain import make_episode
+from proxytune.errors import ExtensionError, InputError, SettingsError
+from proxytune.study.study import facts, open_study
+from proxytune.study.user_family import UserFamily
+
+ALIASES = (("good", "agent0"), ("bad", "agent1"))
+TABLE = "{ " + ", ".join(f'a{number} = "agent{number}"' for number in range(6)) + " }"
+
+
+class Faulty(Wobbly):
+    versions = property(lambda self: 1 / 0)
+    earlier_identities = property(lambda self: self.gone)
+    identity = property(lambda self: self.theta.gone)
+
+    def check_agent(self, name):
+        raise OSError("no weights")
+
+
+@pytest.mark.parametrize("member", ["versions", "earlier_identities", "identity"])
+def test_what_a_member_raises_whenever_it_is_asked_is_one_line_with_its_name_and_place(member):
+    family = UserFamily(Faulty(), "sim:make")
+    expected = rf"{member} of sim:make raised .*Error: .*\(test_user_family.py, line \d+\); correct it"
+    with pytest.raises(ExtensionError, match=expected):
+        getattr(family, member)
+
+
+def test_what_the_check_of_an_agent_raises_is_one_line():
+    with pytest.raises(
+        ExtensionError, match=r"check_agent\('agent0'\) of sim:make raised OSError: no weights .*correct"
+    ):
+        UserFamily(Faulty(), "sim:make", ALIASES).check_agent("good")
+
+
+def test_a_member_that_is_not_there_is_not_there():
+    family = UserFamily(Wobbly(), "sim:make")
+    assert not hasattr(family, "versions")
+    assert family.earlier_identities == ()
+    assert (family.identity, family.starts) == (Wobbly().identity, 5)
+
+
+def test_an_alias_drives_as_what_it_stands_for_and_other_agents_behind_it_are_another_family():
+    family = UserFamily(Wobbly(), "sim:make", ALIASES)
+    episode = make_episode({}, agent="good", start=0, seed=1)
+    assert family.run(episode) == Wobbly().run(make_episode({}, agent="agent0", start=0, seed=1))
+    assert len({family.identity, Wobbly().identity, UserFamily(Wobbly(), "sim:make", ALIASES[:1]).identity}) == 3
+
+
+@pytest.fixture
+def aliased(make_study):
+    """A study whose target calls its agents a0, a1, …"""
+
+    def make(table=TABLE, **changes):
+        target = make_study("plain") / "target.csv"
+        folder = make_study("aliased", agents=table, **changes)
+        (folder / "target.csv").write_text(target.read_text().replace("agent", "a").replace("a,", "agent,", 1))
+        return folder
+
+    return make
+
+
+def test_a_study_with_aliases_is_the_study_without_but_for_the_names(aliased, make_study):
+    folder = aliased()
+    named, plain = run_study(folder), run_study(make_study("plain"))
+    assert [trial.score for trial in named.result.trials] == [trial.score for trial in plain.result.trials]
+    assert named.best.assessment.inputs.agents == tuple(f"a{number}" for number in range(6))
+    with sqlite3.connect(folder / "study.db") as db:
+        assert {agent for (agent,) in db.execute("SELECT agent FROM episodes")} == {f"a{number}" for number in range(6)}
+    assert named.document()["settings"]["aliases"]["a3"] == "agent3"
+
+
+def test_another_agent_behind_an_alias_is_another_study(aliased):
+    folder = aliased(budget="5")
+    run_study(folder)
+    changed = aliased(TABLE.replace('a5 = "agent5"', 'a5 = "agent0"'), budget="5")
+    with pytest.raises(SettingsError, match=r'changed since the first trial: agents.a5 \(was "agent5"\); put it back'):
+        run_study(changed)
+
+
+def test_facts_of_a_study_without_aliases_are_what_they_were(make_study):
+    known = facts(open_study(make_study()))
+    assert known["agents"] == [f"agent{number}" for number in range(6)]
+    assert not any(key.startswith("agents.") for key in known)
+
+
+def test_an_unknown_agent_behind_an_alias_is_told_with_its_key(aliased):
+    with pytest.raises(InputError, match=r"study.toml: agents.a5: no agent 'agnet5'; did you mean 'agent5'"):
+        open_study(aliased(TABLE.replace('"agent5"', '"agnet5"')))
+    with pytest.raises(InputError, match=r"agents.a5: must be text in quotes, got 5"):
+        open_study(aliased(TABLE.replace('"agent5"', "5")))
+
+
+def test_measuring_and_driving_know_the_aliases(aliased, tmp_path, capsys):
+    folder = aliased()
+    (tmp_path / "model.toml").write_text("trim = 0.1\n")
+    assert (
+        main(["measure", str(folder), "--model", str(tmp_path / "model.toml"), "--output", str(tmp_path / "t.csv")])
+        == 0
+    )
+    assert (tmp_path / "t.csv").read_text().splitlines()[1].startswith("a0,0,")
+    assert drive(folder, "a3").scores == drive(folder, "agent3").scores

@@ -100,9 +100,7 @@ def _read_body(root: ET.Element, path: Path) -> Body:
     if len(pair) != 2 or pair[0].centre[1] <= pair[1].centre[1]:
         found = ", ".join(wheel.joint for wheel in across) or "none"
         remedy = f"call the two driven joints {' and '.join(AXLES)}"
-        raise SettingsError(
-            f"{path}: two continuous joints across the robot are to be its axles, found {found}; {remedy}"
-        )
+        raise SettingsError(f"{path}: the axles must be two continuous joints, left and right; found {found}; {remedy}")
     masses = (float(mass.get("value", 0.0)) for mass in root.findall("link/inertial/mass"))
     camera = next((name for name in _links(root) if "camera" in name and "optical" not in name), None)
     return Body(pair[0], pair[1], sum(masses), link_pose(root, camera) if camera else None)
@@ -119,6 +117,13 @@ def link_pose(root: ET.Element, link: str) -> NDArray[np.float64]:
         if child is not None and parent is not None and child.get("link") == link:
             return link_pose(root, parent.get("link", "")) @ origin_of(joint)
     return np.eye(4)
+
+
+def add_little_mass(link: ET.Element) -> None:
+    """Give a link without mass a gram: PyBullet would give it a kilogram."""
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "mass", value="0.001")
+    ET.SubElement(inertial, "inertia", ixx="1e-7", ixy="0", ixz="0", iyy="1e-7", iyz="0", izz="1e-7")
 
 
 def origin_of(element: ET.Element) -> NDArray[np.float64]:
@@ -144,9 +149,8 @@ def check_body(robot: Robot) -> None:
     body = read_body(parse_urdf(path), path)
     for wheel, name in zip((body.left, body.right), AXLES, strict=True):
         if wheel.joint != name or wheel.axis[1] < 0.0:
-            raise SettingsError(
-                f"{path.name}: joint '{wheel.joint}' must be called {name}, its axis to the left (0 1 0)"
-            )
+            said = f"joint '{wheel.joint}' must be called {name}"
+            raise SettingsError(f"{path.name}: {said}, and its axis must point to the left (0 1 0)")
     for figure, value in _figures(body):
         if abs(value - robot.figures[figure]) > AGREES * robot.figures[figure]:
             said = f"has the {figure} {value:g} m, robot.toml says {robot.figures[figure]:g} m"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.body import AXLES, Body, origin_of, parse_urdf, read_body
+from proxytune.driving.body import AXLES, Body, add_little_mass, origin_of, parse_urdf, read_body
 from proxytune.errors import InputError
 from proxytune.skeletons.robot import Known, check_figures, completed, robot_text, then
 from proxytune.skeletons.skeleton import Skeleton
@@ -68,7 +68,18 @@ def _origin(body: Body, radius: float) -> NDArray[np.float64]:
 
 
 def _conform(root: ET.Element, body: Body, radius: float) -> Iterator[str]:
-    """Name the axles, let them point to the left, and move the origin; says what was changed."""
+    """Make the URDF what the bullet plant drives; says what was changed."""
+    yield from _name_axles(root, body)
+    shift = _origin(body, radius)
+    if np.abs(shift).max() > 1e-9:
+        _move(root, shift)
+        yield f"the origin is now the middle of the axle, on the floor: moved by {_text(shift)} m"
+    yield from _complete_links(root)
+    yield "if an episode ends at once, the root link touches the floor: make its casters links of their own"
+
+
+def _name_axles(root: ET.Element, body: Body) -> Iterator[str]:
+    """Call the axles as the plant does, and let them point to the left."""
     for wheel, name in zip((body.left, body.right), AXLES, strict=True):
         joint = next(one for one in root.iter("joint") if one.get("name") == wheel.joint)
         joint.set("name", name)
@@ -77,16 +88,20 @@ def _conform(root: ET.Element, body: Body, radius: float) -> Iterator[str]:
             axis.set("xyz", _text(-float(value) for value in axis.get("xyz", "1 0 0").split()))
         if wheel.joint != name:
             yield f"joint {wheel.joint} is now called {name}"
-    shift = _origin(body, radius)
-    if np.abs(shift).max() > 1e-9:
-        _move(root, shift)
-        yield f"the origin is now the middle of the axle, on the floor: moved by {_text(shift)} m"
+
+
+def _complete_links(root: ET.Element) -> Iterator[str]:
+    """Take out what nothing draws, and give every link a mass."""
     left_out = [_drop_meshes(link) for link in root.iter("link")]
     if any(left_out):
         yield f"{sum(left_out)} meshes of its looks are left out: nothing draws them"
+    without = [link for link in root.iter("link") if link.find("inertial") is None]
+    for link in without:
+        add_little_mass(link)
+    if without:
+        yield f"links without mass have 1 g now: {', '.join(link.get('name', '') for link in without)}"
     if root.find("link/collision/geometry/mesh") is not None:
         yield "EDIT: write boxes, cylinders or spheres for the meshes under <collision>: they are not found here"
-    yield "if an episode ends at once, the root link touches the floor: make its casters links of their own"
 
 
 def _drop_meshes(link: ET.Element) -> int:

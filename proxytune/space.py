@@ -39,6 +39,10 @@ class Parameter:
         """The neutral value for a robot with these nominal figures."""
         return nominal[self.neutral] if isinstance(self.neutral, str) else self.neutral
 
+    def clipped(self, value: float) -> float:
+        """The nearest value within the bounds."""
+        return min(max(value, self.low), self.high)
+
 
 @dataclass(frozen=True)
 class Interval:

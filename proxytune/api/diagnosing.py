@@ -1,7 +1,8 @@
 """A diagnosis from Python: what a model lacks of a log, of motion and camera."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.diagnosis.result import Diagnosis
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.logs import Log, read_log
+from proxytune.importing.opening import open_log
+from proxytune.logs import Log
 from proxytune.report.diagnosis.camera.document import noise_floor
 from proxytune.report.diagnosis.whole import model_file, whole_document, whole_figures, whole_headline, whole_notes
 from proxytune.report.writing import save, write_text
@@ -129,7 +131,7 @@ def diagnose(
     Motion is diagnosed where the log has commands, the camera where it has frames.
 
     Args:
-        log: A log, or its folder.
+        log: A log, its folder, or a bag, CSV or trajectory that says all there is to know (`import` has options).
         test: Another log to test motion on; a part of the drives if not given.
         robot: Name of the robot, instead of the one that the log names.
         declared: Effects tuned in any case, on motion and camera, as in ["trim", "camera_pitch"]; those of θ that the
@@ -142,16 +144,21 @@ def diagnose(
     """
     if seed < 0:
         raise InputError(f"seed must be at least 0, got {seed}")
-    drives, others = _read(log), None if test is None else _read(test)
-    try:
-        vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))
-        return DiagnosisReport(diagnose_log(drives, vehicle, declared, test=others, seed=seed))
-    except InputError as problem:
-        raise type(problem)(_in_python(str(problem))) from None
+    with _opened(log) as drives, nullcontext() if test is None else _opened(test) as others:
+        try:
+            vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))
+            return DiagnosisReport(diagnose_log(drives, vehicle, declared, test=others, seed=seed))
+        except InputError as problem:
+            raise type(problem)(_in_python(str(problem))) from None
 
 
-def _read(log: Log | str | Path) -> Log:
-    return log if isinstance(log, Log) else read_log(log)
+@contextmanager
+def _opened(log: Log | str | Path) -> Iterator[Log]:
+    if isinstance(log, Log):
+        yield log
+    else:
+        with open_log(Path(log)) as (opened, _):
+            yield opened
 
 
 def _in_python(problem: str) -> str:

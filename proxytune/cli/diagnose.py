@@ -1,6 +1,8 @@
 """`diagnose`: find the effect that the model lacks, from a log of measured drives and frames."""
 
 import argparse
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 from rich.console import Group
@@ -8,12 +10,14 @@ from rich.text import Text
 
 from proxytune.api.diagnosing import DiagnosisReport
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
 from proxytune.cli.terminal.steps import Steps
 from proxytune.diagnosis.log_diagnosis import diagnose_log
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.logs import Log, read_log
+from proxytune.importing.opening import open_log
+from proxytune.logs import Log
 from proxytune.report.diagnosis.whole import whole_tables_and_notes
 
 MOTION = {
@@ -48,7 +52,7 @@ MOTION_SHARE = 0.8
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the log, what is declared and where the findings go."""
     parser.add_argument(
-        "log", type=Path, metavar="LOG", help="a log's folder: log.toml, samples.csv, and frames if there are"
+        "log", type=Path, metavar="LOG", help="a log's folder (log.toml, samples.csv), or a bag, CSV or trajectory"
     )
     parser.add_argument(
         "--declared",
@@ -65,23 +69,34 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--test", type=Path, metavar="LOG", help="another log to test motion on [part of LOG]")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the null distributions [1]")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the findings [diagnosis_LOG]")
+    configure_source(parser)
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Diagnose, and write diagnosis.json, model.toml and the figures."""
     if arguments.seed < 0:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
-    log = read_log(arguments.log)
+    with ExitStack() as stack:
+        log, imported = stack.enter_context(open_log(arguments.log, wanted_of(arguments), facts_of(arguments)))
+        test = None
+        if arguments.test:
+            test, _ = stack.enter_context(open_log(arguments.test, wanted_of(arguments), facts_of(arguments)))
+        return _diagnosed(arguments, log, test, imported)
+
+
+def _diagnosed(arguments: argparse.Namespace, log: Log, test: Log | None, imported: Sequence[str]) -> Answer:
     robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), _names(arguments.effects)))
     declared = None if arguments.declared is None else _names(arguments.declared)
-    test = read_log(arguments.test) if arguments.test else None
     with Steps(_shares(log)) as step:
         found = diagnose_log(log, robot, declared, test=test, seed=arguments.seed, report=step)
-        folder = arguments.output or Path(f"diagnosis_{arguments.log.resolve().name}")
+        here = arguments.log.resolve()
+        folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
         step("drawing")
         report = DiagnosisReport(found)
         files = [str(path) for path in report.write(folder)]
-    return Answer(report.document() | {"files": files}, Group(whole_tables_and_notes(found), Text("\n".join(files))))
+    lines = [*(f"{arguments.log.name}: {note}" for note in imported), *files]
+    document = report.document() | {"files": files} | ({"imported": list(imported)} if imported else {})
+    return Answer(document, Group(whole_tables_and_notes(found), Text("\n".join(lines))))
 
 
 def _shares(log: Log) -> dict[str, float]:

@@ -9,21 +9,24 @@ from rich.console import Console
 from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
 from proxytune.diagnosis.horizon.prediction import agreement, predict
 from proxytune.diagnosis.measured.vehicle import robot_of
-from proxytune.diagnosis.predicted_pictures import predict_pictures, predicted_frames_text
-from proxytune.diagnosis.recording import PICTURES
+from proxytune.diagnosis.predicted_pictures import frames_of, predict_pictures
+from proxytune.diagnosis.recording import PICTURES, frames_text
 from proxytune.driving.robot import Robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
-from proxytune.logs import Log, read_log
+from proxytune.importing.opening import open_log
+from proxytune.logs import GEOMETRY, Log
 from proxytune.report.writing import write_picture, write_text
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the model, the log and the windows."""
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model.toml")
-    parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder")
+    parser.add_argument("log", type=Path, metavar="LOG", help="a log's folder, or a bag, CSV or trajectory")
+    parser.add_argument("--robot", metavar="NAME", help="the robot of a bag or table [the model's]")
     parser.add_argument("--horizon", type=float, default=2.0, metavar="S", help="length of the windows [2 s]")
     parser.add_argument("--frames", action="store_true", help="predict what the camera sees instead of poses")
     parser.add_argument(
@@ -33,6 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         help="the CSV of predicted poses to write; with --frames the folder for frames.csv and pictures",
     )
+    configure_source(parser)
 
 
 def run(arguments: argparse.Namespace) -> Answer:
@@ -40,7 +44,19 @@ def run(arguments: argparse.Namespace) -> Answer:
     catalogue = Catalogue(Path.cwd())
     if not (np.isfinite(arguments.horizon) and arguments.horizon > 0.0):
         raise InputError(f"--horizon must be a positive number of seconds, got {arguments.horizon}")
-    model, log = read_model(arguments.model, catalogue), read_log(arguments.log)
+    model, facts = read_model(arguments.model, catalogue), facts_of(arguments)
+    named = replace(facts, robot=facts.robot or model.robot, figures=facts.figures or _stated(model))
+    with open_log(arguments.log, wanted_of(arguments), named) as (log, _):
+        return _predicted(model, log, arguments, catalogue)
+
+
+def _stated(model: Model) -> dict[str, float]:
+    """The figures of a robot without a folder, as a log.toml names them."""
+    keys = {figure: key for key, figure in GEOMETRY.items()}
+    return {keys[name]: value for name, value in (model.geometry or {}).items() if name in keys}
+
+
+def _predicted(model: Model, log: Log, arguments: argparse.Namespace, catalogue: Catalogue) -> Answer:
     if arguments.frames:
         return _predict_pictures(log, _robot(model, log, catalogue), model, arguments.output)
     if log.command == "none":
@@ -86,7 +102,7 @@ def _predict_pictures(log: Log, robot: Robot, model: Model, folder: Path) -> Ans
             numbers += part.numbers.tolist()
             errors += part.grey_errors.tolist()
             status.update(f"drawing: {len(numbers)} frames")
-    write_text(folder / "frames.csv", predicted_frames_text(log, numbers))
+    write_text(folder / "frames.csv", frames_text(log, frames_of(log), numbers))
     error = float(np.mean(errors))
     told = f"{len(numbers)} frames: mean absolute difference on the floor {error:.1f} grey levels\n{folder}"
     return Answer({"frames": len(numbers), "output": str(folder), "grey_error": error}, Text(told))

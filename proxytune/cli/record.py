@@ -94,7 +94,7 @@ def _write(log: Log, folder: Path, source: str) -> None:
     """Its tables, then log.toml: without that a folder is no log."""
     write_text(folder / "samples.csv", samples_text(log))
     if log.frames:
-        write_text(folder / "frames.csv", frames_text(log, log.frames))
+        write_text(folder / "frames.csv", frames_text(log, log.frames, range(len(log.frames.paths)), "%.6f"))
     write_text(folder / "log.toml", log_text(log, source))
 
 

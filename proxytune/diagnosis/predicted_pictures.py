@@ -1,13 +1,13 @@
 """What a model's camera would have seen on a log's drives, and how far that is from what was seen."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.diagnose import camera_effects
+from proxytune.diagnosis.camera.error.comparing import grey_differences
 from proxytune.diagnosis.camera.gathering import read_road
 from proxytune.diagnosis.camera.measured.edges import Edges
 from proxytune.diagnosis.camera.measured.tracks import track_frames
@@ -56,7 +56,7 @@ def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[Predicted
         LogError: If the log has no frames, or no frame has a pose; while drawing, if a picture cannot be read.
         SettingsError: If the robot has no camera, or the map cannot be read.
     """
-    frames = _frames_of(log)
+    frames = frames_of(log)
     robot.camera_figures()
     sight = set(camera_effects(robot.catalogue))
     own = {name: value for name, value in {**robot.theta, **theta}.items() if effect_of(name) in sight}
@@ -64,7 +64,12 @@ def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[Predicted
     return _draw(frames, views, numbers, own)
 
 
-def _frames_of(log: Log) -> Frames:
+def frames_of(log: Log) -> Frames:
+    """The log's frames.
+
+    Raises:
+        LogError: If it has none.
+    """
     if log.frames is None:
         raise LogError(f"{log.name}: has no frames to predict; add [camera] to log.toml, or leave --frames out")
     return log.frames
@@ -89,20 +94,5 @@ def _draw(frames: Frames, views: Views, numbers: NDArray[np.intp], theta: Theta)
         chosen = np.arange(first, min(first + AT_ONCE, len(numbers)))
         drawn = draw_pictures(views, state, on_pictures, chosen)
         measured = read_pictures(frames, numbers[chosen].tolist()).astype(np.float32)
-        levels = 1.0 if frames.fixed_exposure else _levels(measured[:, floor], drawn[:, floor])
-        apart = np.abs(measured[:, floor] - np.clip(drawn[:, floor] * levels, 0.0, 255.0)).mean(axis=(1, 2))
+        apart = grey_differences(measured, drawn, floor, fixed_exposure=frames.fixed_exposure).mean(axis=(1, 2))
         yield PredictedPictures(numbers[chosen], np.rint(drawn).astype(np.uint8), apart.astype(float))
-
-
-def _levels(measured: NDArray[np.float32], drawn: NDArray[np.float32]) -> NDArray[np.float32]:
-    """How much brighter each frame was exposed than drawn (n, 1, 1), of pixels (n, pixels, 3)."""
-    ratios = measured.mean(axis=2) / np.maximum(drawn.mean(axis=2), 1.0)
-    return np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)
-
-
-def predicted_frames_text(log: Log, numbers: Sequence[int]) -> str:
-    """A frames.csv for predicted pictures, numbered as the log's frames come, from 0."""
-    frames = _frames_of(log)
-    names = [log.episodes[drive].name for drive in frames.drives[list(numbers)]]
-    table = pd.DataFrame({"frame": numbers, "episode": names, "time": frames.times[list(numbers)]})
-    return table.to_csv(index=False, lineterminator="\n")

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -63,10 +64,6 @@ def _drive(family: LaneFollowing, duties: Floats, random: np.random.Generator, n
     instance = family.instance({})
     with family.plant_at(instance.robot, start) as plant:
         poses = follow(instance, plant, start, duties, number)
-    return _tracked(poses, random)
-
-
-def _tracked(poses: Floats, random: np.random.Generator) -> Floats:
     return tracked(poses, random)
 
 
@@ -96,8 +93,9 @@ def samples_text(log: Log) -> str:
     return pd.concat(tables)[["episode", *columns]].to_csv(index=False, float_format="%.4f", lineterminator="\n")
 
 
-def frames_text(log: Log, frames: Frames) -> str:
-    """A frames.csv for a log's pictures, numbered from 0."""
-    names = [log.episodes[drive].name for drive in frames.drives]
-    table = pd.DataFrame({"frame": range(len(names)), "episode": names, "time": frames.times})
-    return table.to_csv(index=False, float_format="%.6f", lineterminator="\n")
+def frames_text(log: Log, frames: Frames, numbers: Sequence[int], float_format: str | None = None) -> str:
+    """A frames.csv for pictures of these of a log's frames, numbered as they come, from 0."""
+    chosen = list(numbers)
+    names = [log.episodes[drive].name for drive in frames.drives[chosen]]
+    table = pd.DataFrame({"frame": chosen, "episode": names, "time": frames.times[chosen]})
+    return table.to_csv(index=False, float_format=float_format, lineterminator="\n")

@@ -141,12 +141,14 @@ def read_frames(
 
 def _per_row(samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]) -> Instants:
     """One picture at each row that has a pose."""
-    places, _ = places_on_grid(samples, rate_hz)
     measured = np.flatnonzero(np.isfinite(samples.values["x"]))
     if not len(measured):
         raise LogError(f"{samples.path}: no row has a pose; frames need the poses from which they were taken")
-    times = np.concatenate([episode.times for episode in episodes])
-    return Instants(measured, samples.episode[measured], times[places[measured]])
+    times = samples.values["time"][measured]
+    if rate_hz:
+        places, _ = places_on_grid(samples, rate_hz)
+        times = np.concatenate([episode.times for episode in episodes])[places[measured]]
+    return Instants(measured, samples.episode[measured], times)
 
 
 def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) -> Instants:
@@ -172,7 +174,8 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
 
 def _span(episode: LogEpisode) -> tuple[float, float]:
     """Times of the first and the last measured pose [s], NaN where there is none."""
-    times = episode.times[np.isfinite(episode.poses[:, 0])]
+    on_grid = episode.times[np.isfinite(episode.poses[:, 0])]
+    times = on_grid if episode.measured is None else episode.measured.times
     return (float(times[0]), float(times[-1])) if len(times) else (np.nan, np.nan)
 
 

@@ -47,7 +47,7 @@ def _check_grid(samples: Rows, elapsed: Floats, rate_hz: float) -> None:
         row = int(np.argmax(off))
         problem = (
             f"{samples.values['time'][row]:.12g} s lies off the grid of {rate_hz:g} Hz from the episode's first row; "
-            f"resample to steps of {1.0 / rate_hz:g} s or correct rate_hz"
+            "correct rate_hz, or leave it out of log.toml: poses then keep times of their own"
         )
         raise samples.error(row, "time", problem)
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,20 @@ GEOMETRY: Mapping[str, str] = MappingProxyType(
 """What log.toml may say of a robot, and what a robot.toml calls it."""
 
 
+class Measured(NamedTuple):
+    """Poses at times of their own, N of them, as they were measured.
+
+    Attributes:
+        times: When each was measured (N,) [s].
+        poses: x [m], y [m], heading [rad, unwrapped] (N, 3).
+        rows: The sample of the regular grid that each is moved to (N,), the nearest free one.
+    """
+
+    times: Floats
+    poses: Floats
+    rows: Whole
+
+
 @dataclass(frozen=True)
 class LogEpisode:
     """One drive: poses on a regular grid of times, commands on the same or at times of their own.
@@ -42,6 +57,8 @@ class LogEpisode:
         poses: Measured poses (rows, 3): x [m], y [m], heading [rad, unwrapped]; NaN where there is none.
         wheels: Measured wheel speeds (rows, 2), left and right [rad/s], or None.
         issued: When each command was issued (M,) [s], held until the next; None where they go with the samples.
+        measured: Poses as they were measured, where they have times of their own: `poses` has each moved to the
+            nearest free sample along the motion round it, by a sample at most. None where they lie on the grid.
     """
 
     name: str
@@ -50,6 +67,7 @@ class LogEpisode:
     poses: Floats
     wheels: Floats | None
     issued: Floats | None = None
+    measured: Measured | None = None
 
     @property
     def held(self) -> Floats:
@@ -96,10 +114,14 @@ class Log:
         name: What the log is called.
         robot: Name of the robot.
         command: Kind of the commands, one of COMMANDS; "none" for still frames, whose commands are (rows, 0).
-        rate_hz: Samples per second; 0 for still frames that state none, whose times are as in the file.
+        rate_hz: Samples per second; 0 for still frames that state none, whose times are as in the file. Where poses
+            have times of their own, those of the grid that they are moved to.
         geometry: Figures that log.toml states itself: wheel_radius, effective_baseline [m], full_speed [m/s].
         episodes: The drives.
         frames: What its camera saw, or None.
+        clock_offset_s: How much later its poses are stamped than its commands [s], as log.toml declares; None where
+            it says nothing. Commands have been moved to the poses' clock.
+        fit_clock_offset: Whether log.toml asks for the offset to be fitted, the robot's delay being what it declares.
     """
 
     name: str
@@ -109,3 +131,12 @@ class Log:
     geometry: dict[str, float]
     episodes: tuple[LogEpisode, ...]
     frames: Frames | None = None
+    clock_offset_s: float | None = None
+    fit_clock_offset: bool = False
+
+    @property
+    def poses_hz(self) -> float:
+        """Measured poses a second: the rate of the samples, or what is usual where poses have times of their own."""
+        between = [np.diff(episode.measured.times) for episode in self.episodes if episode.measured is not None]
+        usual = np.concatenate(between) if between else np.empty(0)
+        return 1.0 / float(np.median(usual)) if len(usual) else self.rate_hz

@@ -1,6 +1,7 @@
 """Clocks that are apart are told and put right; clocks that are not are left alone."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,13 @@ def test_motion_that_no_delay_accounts_for_is_told_with_its_offset_for_the_nomin
     assert found.offset.interval[0] < found.offset.value < found.offset.interval[1]
     assert found.left_s == pytest.approx(0.15)
     assert (found.drives, found.jumps) == ({}, ())
+
+
+def test_an_offset_that_a_log_asks_to_fit_is_what_the_latency_has_beside_the_nominal_delay():
+    log = replace(hidden.make_log(CASE, late_s=0.1, **SHORT), fit_clock_offset=True)
+    found = read_clocks(log, ROBOT)
+    assert found.offset.value == pytest.approx(CASE.delay + 0.1 - 0.15, abs=0.02)
+    assert found.left_s == pytest.approx(0.15)
 
 
 @pytest.mark.parametrize("late", [0.0, 0.1, 0.3, -0.05])

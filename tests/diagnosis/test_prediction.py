@@ -9,11 +9,14 @@ import pytest
 
 sys.path.append(str(Path(__file__).parent))
 
+from foreign_robot import FOREIGN_TRUTH, drive, write_own_times
 from learnt_truth import MANY, TURNING
 from planted import ROBOT, TRUTH, planted_log
 
 from proxytune.diagnosis.horizon.prediction import agreement, predict
+from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.errors import LogError
+from proxytune.logs import read_log
 
 COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
 
@@ -147,3 +150,19 @@ def test_an_episode_with_a_pose_or_two_is_predicted_from_it(log, known):
 def test_random_effects_are_predicted_by_their_mean(log):
     late = predict(log, ROBOT, {"trim": 0.03, "delay": 0.07, "delay_jitter": 0.1}, 2.0)
     assert agreement(late, log, 2.0).place < 1e-9
+
+
+@pytest.fixture(scope="module")
+def own_times(tmp_path_factory):
+    home = tmp_path_factory.mktemp("own_times")
+    return read_log(write_own_times(home, [drive(1, seconds=20.0)]))
+
+
+def test_poses_at_times_of_their_own_are_predicted_at_those_times(own_times):
+    (episode,) = own_times.episodes
+    robot = robot_of(own_times)
+    table = predict(own_times, robot, FOREIGN_TRUTH, 2.0)
+    assert set(table.time) == set(episode.measured.times[episode.measured.times >= table.time.min()])
+    found = agreement(table, own_times, 2.0)
+    assert found.place < 0.0035, "noise of 1 mm at the start and 3 mrad over up to 0.5 m"
+    assert found.poses > 1500

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proxytune.diagnosis.measured.rests import cut_out_long_rests
-from proxytune.logs import Log, LogEpisode
+from proxytune.logs import Log, LogEpisode, Measured
 
 
 def log(*told, rows=4000, **more):
@@ -51,3 +51,14 @@ def test_commands_at_times_of_their_own_go_with_their_stretch():
     np.testing.assert_array_equal(second.issued, [60.0, 150.0, 170.0])
     np.testing.assert_array_equal(second.held[[0, -1]], [[0, 0], [0, 0]])
     np.testing.assert_array_equal(second.commands, commands[2:])
+
+
+def test_poses_at_times_of_their_own_go_with_their_stretch():
+    whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
+    (episode,) = whole.episodes
+    rows = np.arange(0, 4000, 3)
+    measured = Measured(episode.times[rows] + 0.01, episode.poses[rows], rows)
+    own = replace(whole, episodes=(replace(episode, measured=measured),))
+    for piece in cut_out_long_rests(own).episodes:
+        np.testing.assert_allclose(piece.times[piece.measured.rows] + 0.01, piece.measured.times)
+        assert len(piece.measured.times) == pytest.approx(len(piece.times) / 3, abs=1)

@@ -7,18 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nominal_camera import CAMERA
 
 from proxytune.driving import cameras
-from proxytune.driving.cameras import CAMERA_CHANNELS, SKY, CameraFigures, GroundPlaneCamera, ground_points, lens_rays
+from proxytune.driving.cameras import CAMERA_CHANNELS, SKY, GroundPlaneCamera, ground_points, lens_rays
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import COLOURS, Floor, draw_floor
 from proxytune.effects import PARAMETERS
 from proxytune.errors import SettingsError
 
-LEVEL = {"roll_deg": 0.0, "yaw_deg": 0.0, "k1": 0.0}
-NOMINAL = CameraFigures(
-    columns=64, rows=48, forward_m=0.066, pitch_deg=19.15, height_m=0.108, field_of_view_deg=75.0, **LEVEL
-)
+NOMINAL = replace(CAMERA, columns=64, rows=48)
 ONE_PIXEL = replace(NOMINAL, columns=1, rows=1)
 SMALL_LOOP = shipped_map("small_loop")
 FLOOR = draw_floor(SMALL_LOOP)

@@ -22,23 +22,13 @@ import matplotlib.image
 import numpy as np
 import pandas as pd
 import pytest
+from nominal_camera import CAMERA
 
-from proxytune.driving.cameras import CameraFigures, GroundPlaneCamera, ground_points
+from proxytune.driving.cameras import GroundPlaneCamera, ground_points
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 
 LOG = Path(__file__).resolve().parents[2] / "../shared/data/logs/gym_duckietown_frames"
-CAMERA = CameraFigures(
-    columns=160,
-    rows=120,
-    forward_m=0.066,
-    pitch_deg=19.15,
-    roll_deg=0.0,
-    yaw_deg=0.0,
-    height_m=0.108,
-    field_of_view_deg=75.0,
-    k1=0.0,
-)
 SMALL_LOOP = shipped_map("small_loop")
 TILE, MIDDLE = SMALL_LOOP.size[0] / 3, SMALL_LOOP.size[0] / 2
 

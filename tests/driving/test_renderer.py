@@ -5,17 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pybullet
 import pytest
+from nominal_camera import CAMERA
 
 from proxytune.driving.bullet import renderer
 from proxytune.driving.bullet.renderer import BulletCamera
-from proxytune.driving.cameras import SKY, CameraFigures, GroundPlaneCamera, ground_points
+from proxytune.driving.cameras import SKY, GroundPlaneCamera, ground_points
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import Floor, draw_floor
 
-LEVEL = {"roll_deg": 0.0, "yaw_deg": 0.0, "k1": 0.0}
-NOMINAL = CameraFigures(
-    columns=64, rows=48, forward_m=0.066, pitch_deg=19.15, height_m=0.108, field_of_view_deg=75.0, **LEVEL
-)
+NOMINAL = replace(CAMERA, columns=64, rows=48)
 SMALL_LOOP = shipped_map("small_loop")
 FLOOR = draw_floor(SMALL_LOOP)
 

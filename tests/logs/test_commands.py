@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from log_folders import complaint, write_files
 
 from proxytune.errors import LogError
 from proxytune.logs import COMMANDS, read_log
@@ -17,18 +18,10 @@ GOOD = HEADER + "b,0,0.1,0.2\na,5.013,0.5,0.1\na,5.127,0.6,0.2\na,9.5,0.7,0.3\n"
 @pytest.fixture
 def folder(tmp_path):
     def write(commands=GOOD, samples=SAMPLES, description=TOML):
-        for name, text in (("log.toml", description), ("samples.csv", samples), ("commands.csv", commands)):
-            (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
-        return tmp_path
+        files = {"log.toml": description, "samples.csv": samples, "commands.csv": commands}
+        return write_files(tmp_path / "log", files)
 
     return write
-
-
-def complaint(path):
-    with pytest.raises(LogError) as caught:
-        read_log(path)
-    assert "\n" not in str(caught.value)
-    return str(caught.value).removeprefix(f"{path}")
 
 
 def test_commands_keep_their_own_times_and_poses_their_grid(folder):

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from log_folders import complaint, write_files
 
 from proxytune.api.logs import log_of
-from proxytune.errors import LogError
 from proxytune.logs import read_log
 
 DATA = Path(__file__).resolve().parents[2] / "../shared/data/logs/gym_duckietown_frames"
@@ -25,24 +25,14 @@ LISTED = HEADER + "7,a,5.013\n9,a,5.3\n8,b,0.2\n"
 @pytest.fixture
 def folder(tmp_path):
     def write(frames=LISTED, description=TOML, pictures=range(7, 10), samples=SAMPLES, ending="jpg"):
-        home = tmp_path / "log"
-        (home / "frames").mkdir(parents=True, exist_ok=True)
-        (home / "log.toml").write_text(description, encoding="utf-8")
-        (home / "samples.csv").write_text(samples, encoding="utf-8")
-        if frames is not None:
-            (home / "frames.csv").write_bytes(frames if isinstance(frames, bytes) else frames.encode())
+        files = {"log.toml": description, "samples.csv": samples}
+        home = write_files(tmp_path / "log", files if frames is None else files | {"frames.csv": frames})
+        (home / "frames").mkdir(exist_ok=True)
         for number in pictures:
             (home / "frames" / f"{number:04d}.{ending}").touch()
         return home
 
     return write
-
-
-def complaint(path):
-    with pytest.raises(LogError) as caught:
-        read_log(path)
-    assert "\n" not in str(caught.value)
-    return str(caught.value).removeprefix(f"{path}")
 
 
 def test_frames_have_their_own_times_and_numbers(folder):

@@ -13,7 +13,10 @@ sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
 from pictured import ROBOT, lane_poses, write_still_frames
 
+from proxytune.diagnosis.camera.conclusion import Evidence, conclude
 from proxytune.diagnosis.camera.diagnose import diagnose_camera
+from proxytune.diagnosis.camera.error import weighing
+from proxytune.diagnosis.camera.look.appearance import look_at
 from proxytune.diagnosis.camera.look.blemishes import Blemish
 from proxytune.diagnosis.camera.result import CameraEffect, LaidLine, LaidMap
 from proxytune.diagnosis.result import Estimate
@@ -27,13 +30,14 @@ from proxytune.report.diagnosis.camera.words import camera_headline, camera_note
 from proxytune.report.diagnosis.model_names import BEFORE
 
 AFTER = "with camera roll"
+DECLARED = ("camera_pitch", "blur")
 
 
 @pytest.fixture(scope="module")
 def diagnosis(tmp_path_factory):
     theta = {"camera_pitch": 19.15, "camera_roll": 4.0}
     folder = write_still_frames(tmp_path_factory.mktemp("rolled") / "log", theta, lane_poses(30), columns=96)
-    found = diagnose_camera(read_log(folder), ROBOT, ("camera_pitch", "blur"))
+    found = diagnose_camera(read_log(folder), ROBOT, DECLARED)
     assert [effect.effect for effect in found.effects] == ["camera_roll"]
     return found
 
@@ -74,11 +78,16 @@ def test_every_number_of_the_document_is_plain_and_finite(diagnosis):
     assert sum(isinstance(leaf, float) for leaf in told) > 50
 
 
-def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis):
-    (roll,) = diagnosis.effects
-    document = camera_document(replace(diagnosis, effects=(), immaterial=(roll,), theta={}))
+def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis, monkeypatch):
+    monkeypatch.setattr(weighing, "MATERIAL", math.inf)
+    weighed = weighing.weigh_effects(diagnosis.named, 1)
+    look = look_at(diagnosis.gathered, weighed.named.model)
+    dropped = conclude(Evidence(diagnosis.gathered, weighed, look, DECLARED, ()), 1)
+    document = camera_document(dropped)
+    assert "camera_roll" not in document["extended"]
     low, high = document["immaterial"][0]["parameters"]["camera_roll"]["interval"]
     assert low < 4.0 < high < 6.0
+    assert any(line.startswith("detectable but immaterial: camera_roll 4.") for line in camera_notes(dropped))
 
 
 def test_brightness_has_no_floor_where_none_is_known(diagnosis):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from proxytune.diagnosis.camera.error.comparing import compare_brightness
 from proxytune.diagnosis.camera.error.weighing import MATERIAL, Weighed
 from proxytune.diagnosis.camera.gathering import Gathered
-from proxytune.diagnosis.camera.laying import TWO_SIDED, describe_map
+from proxytune.diagnosis.camera.laying import describe_map
 from proxytune.diagnosis.camera.look.appearance import Appearance, changes
 from proxytune.diagnosis.camera.model.fitting import CameraFit
 from proxytune.diagnosis.camera.model.optics import READOUT, effects_of
@@ -14,7 +14,7 @@ from proxytune.diagnosis.camera.naming.checks import matched_share
 from proxytune.diagnosis.camera.naming.gate import Leftover, find_leftover
 from proxytune.diagnosis.camera.naming.search import Named
 from proxytune.diagnosis.camera.naming.visibility import ALWAYS, hidden_effects, next_views
-from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect
+from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect, Comparison, estimate_of
 from proxytune.diagnosis.result import Estimate
 from proxytune.effects import PARAMETERS, effect_of
 
@@ -41,23 +41,19 @@ class Evidence:
 def conclude(found: Evidence, seed: int) -> CameraDiagnosis:
     """Give the verdict, with everything that it goes by."""
     named, look = found.weighed.named, found.look
-    added = tuple(effect for effect in changes(look) if effect not in found.declared)
     tuned = tuple(name for name, one in look.figures.items() if effect_of(name) in found.declared and one.identified)
-    on_look = tuple(name for effect in added for name in _names(look, effect))
-    looks = ({name: look.figures[name].value for name in tuned}, look_values(look, (*tuned, *on_look)))
-    grey, ratios = compare_brightness(found.gathered, named, looks, seed)
-    added = tuple(effect for effect in added if effect != "exposure" or ratios[effect] >= MATERIAL)
-    on_look = tuple(name for effect in added for name in _names(look, effect))
-    effects = _geometric(found, named.effects) + _on_look(look, added, ratios)
+    grey, on_look = _compare_look(found, tuned, seed)
+    effects = _geometric(found, named.effects) + on_look
     gates, hidden = (find_leftover(named.declared), find_leftover(named.model)), _hidden(found)
     return CameraDiagnosis(
         verdict=_verdict(gates[1], look, named=bool(effects)),
         declared=_estimates(named.declared, found.declared) | _figures(look, tuned),
         theta=_estimates(named.model, (*found.declared, *named.effects))
         | _stated(named)
-        | _figures(look, (*tuned, *on_look)),
+        | _figures(look, (*tuned, *(name for effect in on_look for name in effect.names))),
         effects=effects,
         immaterial=_geometric(found, found.weighed.dropped),
+        dropped=_estimates(found.weighed.with_dropped, found.weighed.dropped),
         candidates=named.alone,
         pixels=found.weighed.pixels,
         grey=grey,
@@ -73,10 +69,22 @@ def conclude(found: Evidence, seed: int) -> CameraDiagnosis:
     )
 
 
+def _compare_look(found: Evidence, tuned: Sequence[str], seed: int) -> tuple[Comparison, tuple[CameraEffect, ...]]:
+    """Brightness before and after, and the effects that were added for how pictures look.
+
+    Exposure is one of them where the error without it is larger.
+    """
+    look = found.look
+    changed = tuple(effect for effect in changes(look) if effect not in found.declared)
+    looks = (look_values(look, tuned), look_values(look, (*tuned, *_names(look, changed))))
+    grey, ratios = compare_brightness(found.gathered, found.weighed.named, looks, seed)
+    added = tuple(effect for effect in changed if effect != "exposure" or ratios[effect] >= MATERIAL)
+    return grey, _on_look(look, added, ratios)
+
+
 def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
     """Values of the look's figures by name in θ, within their bounds."""
-    bounds = {name: (PARAMETERS[name].low, PARAMETERS[name].high) for name in names}
-    return {name: min(max(look.figures[name].value, low), high) for name, (low, high) in bounds.items()}
+    return {name: PARAMETERS[name].clipped(look.figures[name].value) for name in names}
 
 
 def _geometric(found: Evidence, effects: Sequence[str]) -> tuple[CameraEffect, ...]:
@@ -98,7 +106,7 @@ def _on_look(look: Appearance, added: Sequence[str], ratios: dict[str, float]) -
     return tuple(
         CameraEffect(
             effect,
-            _names(look, effect),
+            _names(look, (effect,)),
             None,
             ratios[effect] if effect != "image_noise" else None,
             texture.get(effect, ()),
@@ -107,8 +115,9 @@ def _on_look(look: Appearance, added: Sequence[str], ratios: dict[str, float]) -
     )
 
 
-def _names(look: Appearance, effect: str) -> tuple[str, ...]:
-    return tuple(name for name in look.figures if effect_of(name) == effect)
+def _names(look: Appearance, effects: Sequence[str]) -> tuple[str, ...]:
+    """Their figures by name in θ, effect by effect."""
+    return tuple(name for effect in effects for name in look.figures if effect_of(name) == effect)
 
 
 def _stated(named: Named) -> dict[str, Estimate]:
@@ -126,12 +135,11 @@ def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:
 def _estimates(fit: CameraFit, effects: Sequence[str]) -> dict[str, Estimate]:
     """Values with their intervals, of the parameters that were free."""
     parameters = fit.views.optics.robot.catalogue.parameters
-    known = {}
-    for name, sd in zip(fit.names, fit.sd, strict=True):
-        if effect_of(name) in effects:
-            value = fit.theta[name]
-            known[name] = Estimate(value, (value - TWO_SIDED * sd, value + TWO_SIDED * sd), parameters[name].unit)
-    return known
+    return {
+        name: estimate_of(fit.theta[name], sd, parameters[name].unit)
+        for name, sd in zip(fit.names, fit.sd, strict=True)
+        if effect_of(name) in effects
+    }
 
 
 def _hidden(found: Evidence) -> tuple[str, ...]:
@@ -140,7 +148,8 @@ def _hidden(found: Evidence) -> tuple[str, ...]:
     fitted = effects_of(named.model.names)
     hidden = [effect for effect in hidden_effects(named.full, fitted) if effect not in fitted]
     dark = [name for name, figure in found.look.figures.items() if not figure.identified]
-    return effects_of(tuple(name for name in (*hidden, *dark) if effect_of(name) not in changes(found.look)))
+    changed = changes(found.look)
+    return effects_of(tuple(name for name in (*hidden, *dark) if effect_of(name) not in changed))
 
 
 def _verdict(gate: Leftover, look: Appearance, *, named: bool) -> str:

@@ -4,12 +4,8 @@ import numpy as np
 
 from proxytune.diagnosis.camera.model.fitting import CameraFit
 from proxytune.diagnosis.camera.model.views import Tape
-from proxytune.diagnosis.camera.result import LaidLine, LaidMap
-from proxytune.diagnosis.result import Estimate
+from proxytune.diagnosis.camera.result import LaidLine, LaidMap, estimate_of, interval_of
 from proxytune.driving.road.markings import LINES
-
-TWO_SIDED = 1.96
-"""Standard deviations on either side of a 95 % interval."""
 
 SURE = 3.0
 """A line is told to lie beside its place from so many standard deviations on."""
@@ -21,11 +17,11 @@ def describe_map(fit: CameraFit) -> LaidMap:
     """What the fit says of the map."""
     degrees = np.array((1.0, 1.0, np.degrees(1.0)))
     offsets = zip(("x_m", "y_m", "heading_deg"), fit.state.offset * degrees, fit.offset_sd * degrees, strict=True)
-    offset = {name: _estimate(value, sd, name.rpartition("_")[-1]) for name, value, sd in offsets}
+    offset = {name: estimate_of(value, sd, name.rpartition("_")[-1]) for name, value, sd in offsets}
     stretches = fit.views.markings.stretches
     first = Tape(stretches).size - len(WIDTHS)
     widths = zip(WIDTHS, fit.state.tape[first:], fit.tape_sd[first:], strict=True)
-    return LaidMap(offset, _lines(fit, stretches), {name: _estimate(value, sd, "m") for name, value, sd in widths})
+    return LaidMap(offset, _lines(fit, stretches), {name: estimate_of(value, sd, "m") for name, value, sd in widths})
 
 
 def _lines(fit: CameraFit, stretches: int) -> tuple[LaidLine, ...]:
@@ -35,9 +31,5 @@ def _lines(fit: CameraFit, stretches: int) -> tuple[LaidLine, ...]:
             place = tape.shift(np.array(stretch), np.array(number))
             value, sd = float(fit.state.tape[place]), float(fit.tape_sd[place])
             if abs(value) > SURE * sd:
-                lines.append(LaidLine(name, stretch, value, (value - TWO_SIDED * sd, value + TWO_SIDED * sd)))
+                lines.append(LaidLine(name, stretch, value, interval_of(value, sd)))
     return tuple(sorted(lines, key=lambda line: -abs(line.right_m)))
-
-
-def _estimate(value: float, sd: float, unit: str) -> Estimate:
-    return Estimate(float(value), (float(value - TWO_SIDED * sd), float(value + TWO_SIDED * sd)), unit)

@@ -16,6 +16,9 @@ from proxytune.diagnosis.result import Estimate
 
 Floats = NDArray[np.float64]
 
+TWO_SIDED = 1.96
+"""Standard deviations on either side of a 95 % interval."""
+
 
 @dataclass(frozen=True)
 class CameraEffect:
@@ -96,6 +99,7 @@ class CameraDiagnosis:
         theta: All parameters of the extended model, by name in θ.
         effects: The effects that were added.
         immaterial: Effects that there is evidence for, and which hardly change the error: no part of the model.
+        dropped: Parameters of those effects, as they were fitted before they were dropped, by name in θ.
         candidates: What each effect of the catalogue costs if it is the only one added [nats], the best first.
         pixels: Displacement of markings.
         grey: Differences in brightness on the floor.
@@ -115,6 +119,7 @@ class CameraDiagnosis:
     theta: Mapping[str, Estimate]
     effects: tuple[CameraEffect, ...]
     immaterial: tuple[CameraEffect, ...]
+    dropped: Mapping[str, Estimate]
     candidates: Sequence[Subset]
     pixels: Comparison
     grey: Comparison
@@ -127,3 +132,13 @@ class CameraDiagnosis:
     notes: tuple[str, ...]
     named: Named
     gathered: Gathered
+
+
+def interval_of(value: float, sd: float) -> tuple[float, float]:
+    """The 95 % interval of a value with this standard deviation."""
+    return float(value - TWO_SIDED * sd), float(value + TWO_SIDED * sd)
+
+
+def estimate_of(value: float, sd: float, unit: str) -> Estimate:
+    """A value with this standard deviation as an estimate."""
+    return Estimate(float(value), interval_of(value, sd), unit)

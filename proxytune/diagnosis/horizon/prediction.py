@@ -46,13 +46,28 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
 
 
 def _rows(episode: LogEpisode, starts: Whole, poses: Floats) -> pd.DataFrame:
-    """The predicted poses (W, rows, 3) of an episode's windows, as far as the episode goes."""
+    """The predicted poses (W, rows, 3) of an episode's windows, as far as the episode goes, at its poses' own times."""
     covered = starts[:, None] + np.arange(poses.shape[1])
     inside = covered < len(episode.times)
-    start = np.broadcast_to(episode.times[starts, None], covered.shape)
-    times = episode.times[np.minimum(covered, len(episode.times) - 1)]
+    known = np.minimum(covered, len(episode.times) - 1)
+    stamps = episode.times
+    if episode.measured is not None:
+        stamps = np.full(len(episode.times), np.nan)
+        stamps[episode.measured.rows] = episode.measured.times
+        inside &= np.isfinite(stamps[known])
+        poses = _moved(poses, stamps[known] - episode.times[known], 1.0 / float(np.diff(episode.times[:2])[0]))
+    start = np.broadcast_to(stamps[starts, None], covered.shape)
+    times = stamps[known]
     columns = {"start_time": start, "time": times, "x": poses[..., 0], "y": poses[..., 1], "heading": poses[..., 2]}
     return pd.DataFrame({"episode": episode.name} | {name: values[inside] for name, values in columns.items()})
+
+
+def _moved(poses: Floats, seconds: Floats, rate_hz: float) -> Floats:
+    """Predicted poses (W, rows, 3) as they are some seconds (W, rows) after or before their samples."""
+    steps = np.diff(poses, axis=1)
+    ahead, behind = np.concatenate((steps, steps[:, -1:]), axis=1), np.concatenate((steps[:, :1], steps), axis=1)
+    share = (seconds * rate_hz)[..., None]
+    return np.asarray(poses + share * np.where(share > 0.0, ahead, behind))
 
 
 def _starts(episode: LogEpisode, reach: int) -> Whole:
@@ -113,8 +128,9 @@ def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:
     """
     measured = pd.concat(
         [
-            pd.DataFrame(e.poses, columns=["x", "y", "heading"]).assign(episode=e.name, time=e.times)
+            pd.DataFrame(poses, columns=["x", "y", "heading"]).assign(episode=e.name, time=times)
             for e in log.episodes
+            for times, poses in [(e.times, e.poses) if e.measured is None else e.measured[:2]]
         ]
     )
     both = table[table.time > table.start_time].merge(measured, on=["episode", "time"], suffixes=("", "_measured"))

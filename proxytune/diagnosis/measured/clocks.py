@@ -125,7 +125,7 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     latency = likeliest_latency(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
     unlike = like is not None and abs(latency.value - assumed) > max(LEAST_S, SURE * latency.deviation)
-    taken = unlike or (apart and _is_impossible(latency))
+    taken = log.fit_clock_offset or unlike or (apart and _is_impossible(latency))
     later = np.full(len(own), assumed - latency.value if taken else 0.0)
     for e, one in others.items():
         later[e] -= one.value - common

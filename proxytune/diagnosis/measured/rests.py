@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from proxytune.diagnosis.measured.commands import Floats
-from proxytune.logs import Log, LogEpisode
+from proxytune.logs import Log, LogEpisode, Measured
 
 LONGEST_S = 20.0
 """Rests are cut out if they last longer."""
@@ -53,4 +53,13 @@ def _piece(episode: LogEpisode, begin: int, stop: int) -> LogEpisode:
         issued, commands = issued[chosen], episode.commands[chosen]
     wheels: Floats | None = None if episode.wheels is None else episode.wheels[begin:stop]
     name = f"{episode.name} from {times[0]:.0f} s"
-    return LogEpisode(name, times, commands, episode.poses[begin:stop], wheels, issued)
+    poses, measured = episode.poses[begin:stop], _cut(episode.measured, begin, stop)
+    return LogEpisode(name, times, commands, poses, wheels, issued, measured)
+
+
+def _cut(measured: Measured | None, begin: int, stop: int) -> Measured | None:
+    """The poses at times of their own whose nearest rows are kept."""
+    if measured is None:
+        return None
+    own = (measured.rows >= begin) & (measured.rows < stop)
+    return Measured(measured.times[own], measured.poses[own], measured.rows[own] - begin)

@@ -11,7 +11,7 @@ from proxytune.diagnosis.camera.result import CameraDiagnosis
 from proxytune.diagnosis.log_diagnosis import LogDiagnosis
 from proxytune.diagnosis.result import Diagnosis
 from proxytune.driving.robot import robot_names
-from proxytune.effects import Catalogue, Model, model_text
+from proxytune.effects import Model, model_text
 from proxytune.logs import GEOMETRY
 from proxytune.report.diagnosis.camera.document import camera_document
 from proxytune.report.diagnosis.camera.figures import camera_figures
@@ -76,7 +76,7 @@ def model_file(found: LogDiagnosis) -> str:
     """The extended model of both as model.toml."""
     robot, parts = found.robot, [part for part in (found.motion, found.camera) if part is not None]
     estimates = {name: one for part in parts for name, one in part.theta.items()}
-    theta = {name: _within_bounds(name, float(one.value), robot.catalogue) for name, one in estimates.items()}
+    theta = {name: robot.catalogue.parameters[name].clipped(float(one.value)) for name, one in estimates.items()}
     theta |= {} if found.motion is None else dict(found.motion.learning.theta)
     bounds = {name: (float(one.interval[0]), float(one.interval[1])) for name, one in estimates.items()}
     in_robots = robot.name in robot_names(robot.catalogue.folder)
@@ -88,9 +88,3 @@ def model_file(found: LogDiagnosis) -> str:
 def _comment(kind: str, part: Diagnosis | CameraDiagnosis, log: str) -> str:
     added = ", ".join(effect.effect for effect in part.effects) or "nothing"
     return f"{kind}{part.verdict}: fitted to {log}; added to what was declared: {added}"
-
-
-def _within_bounds(name: str, value: float, catalogue: Catalogue) -> float:
-    """The value, or the nearest that a model.toml may state: pictures may ask for more than an effect goes to."""
-    parameter = catalogue.parameters[name]
-    return min(max(value, parameter.low), parameter.high)

@@ -5,21 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.error.unseen import (
-    FOLDS,
-    SCALES,
-    PictureError,
-    error_over,
-    fit_poses,
-    pixel_errors,
-    unseen_residuals,
-)
+from proxytune.diagnosis.camera.error.unseen import FOLDS, SCALES, PictureError, error_over, fit_poses, pixel_errors
 from proxytune.diagnosis.camera.gathering import Gathered
 from proxytune.diagnosis.camera.look.appearance import floor_pixels
 from proxytune.diagnosis.camera.model.drawing import Pictures, draw_pictures
 from proxytune.diagnosis.camera.model.fitting import CameraFit, fit_camera
 from proxytune.diagnosis.camera.model.optics import effects_of
-from proxytune.diagnosis.camera.naming.search import Named, fit_set
+from proxytune.diagnosis.camera.model.views import Views
+from proxytune.diagnosis.camera.naming.search import Named
 from proxytune.diagnosis.camera.result import Comparison
 from proxytune.effects import effect_of
 
@@ -29,22 +22,22 @@ Look = Mapping[str, float]
 """Values of effects on pictures, by name in θ."""
 
 
-def compare_displacement(named: Named, seed: int) -> tuple[Comparison, dict[str, float]]:
-    """Displacement of markings before and after, and the error without each effect over the error with all."""
-    views = named.full.views
-    without = {
-        effect: fit_set(named.full, [one for one in effects_of(named.model.names) if one != effect])
-        for effect in named.effects
-    }
-    fits = [named.declared, named.model, named.full, *without.values()]
-    residuals = [unseen_residuals(views, fit.state, fit.names) for fit in fits]
-    before, after, floor = pixel_errors(views, residuals[:3], seed)
-    lowest = floor if floor.value < after.value else after
-    ratios = {}
-    for effect, residual in zip(without, residuals[3:], strict=True):
-        with_all, missing = pixel_errors(views, (residuals[1], residual), seed)
-        ratios[effect] = missing.value / max(with_all.value, 1e-9)
-    return Comparison(before, after, lowest, "px"), ratios
+def compare_displacement(views: Views, residuals: tuple[Floats, Floats, Floats], seed: int) -> Comparison:
+    """Displacement of markings before and after, from residuals on unseen frames.
+
+    Args:
+        views: Whose edge points these are.
+        residuals: Of the declared camera, of the model's and of the one with every effect (n,) each [pixel].
+        seed: Of the bootstrap.
+    """
+    before, after, floor = pixel_errors(views, residuals, seed)
+    return Comparison(before, after, floor if floor.value < after.value else after, "px")
+
+
+def displacement_ratio(views: Views, residuals: tuple[Floats, Floats], seed: int) -> float:
+    """The error without an effect over the error with it, from residuals of both on unseen frames (n,) [pixel]."""
+    without, with_it = pixel_errors(views, residuals, seed)
+    return without.value / max(with_it.value, 1e-9)
 
 
 def compare_brightness(
@@ -71,6 +64,22 @@ def compare_brightness(
     return Comparison(before, after, None, "grey levels"), ratios
 
 
+def grey_differences(
+    measured: Pictures, drawn: Pictures, floor: NDArray[np.bool_], *, fixed_exposure: bool
+) -> Pictures:
+    """Absolute differences on the floor (n, floor pixels, 3) [grey levels].
+
+    Args:
+        measured: Pictures (n, rows, columns, 3).
+        drawn: The same as a model has them.
+        floor: Pixels that look at the floor (rows, columns).
+        fixed_exposure: Whether pictures compare as they are; else each at its own brightness, which no model knows.
+    """
+    measured, drawn = measured[:, floor], drawn[:, floor]
+    levels = 1.0 if fixed_exposure else _levels(measured, drawn)
+    return np.asarray(np.abs(measured - np.clip(drawn * levels, 0.0, 255.0)))
+
+
 def _grey_errors(
     gathered: Gathered, fit: CameraFit, looks: Sequence[Look], out: NDArray[np.bool_], seed: int
 ) -> list[PictureError]:
@@ -81,14 +90,12 @@ def _grey_errors(
     counts, errors = np.full(len(frames), float(floor.sum())), []
     for look in looks:
         drawn = draw_pictures(views, state, look, frames)
-        if not gathered.frames.fixed_exposure:
-            drawn = drawn * _levels(measured, drawn, floor)
-        differences = np.abs(measured - np.clip(drawn, 0.0, 255.0)).mean(axis=-1)[:, floor]
-        errors.append(error_over(differences.sum(axis=1).astype(float), counts, seed))
+        differences = grey_differences(measured, drawn, floor, fixed_exposure=gathered.frames.fixed_exposure)
+        errors.append(error_over(differences.mean(axis=-1).sum(axis=1).astype(float), counts, seed))
     return errors
 
 
-def _levels(measured: Pictures, drawn: Pictures, floor: NDArray[np.bool_]) -> Pictures:
-    """How much brighter each frame was exposed than drawn (n, 1, 1, 1)."""
-    ratio = np.median(measured[:, floor].mean(axis=-1) / np.maximum(drawn[:, floor].mean(axis=-1), 1.0), axis=1)
-    return np.asarray(ratio[:, None, None, None], dtype=np.float32)
+def _levels(measured: Pictures, drawn: Pictures) -> Pictures:
+    """How much brighter each frame was exposed than drawn (n, 1, 1), of pixels (n, pixels, 3)."""
+    ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
+    return np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, Normal, fit_camera, robust_weight
-from proxytune.diagnosis.camera.model.projection import State, pose_slopes, project
+from proxytune.diagnosis.camera.model.fitting import SCALE_PX, fit_camera
+from proxytune.diagnosis.camera.model.normal_equations import count_points, eliminate_poses
+from proxytune.diagnosis.camera.model.projection import State, project
 from proxytune.diagnosis.camera.model.views import Views
 
 Floats = NDArray[np.float64]
@@ -59,9 +60,8 @@ def fit_poses(views: Views, state: State, frames: NDArray[np.bool_]) -> State:
     state = replace(state, poses=np.where(frames[:, None], 0.0, state.poses))
     for scale in np.geomspace(4.0 * SCALE_PX, SCALE_PX, POSE_STEPS):
         there = project(views, state)
-        weight = np.where(there.valid & frames[views.edges.frame], robust_weight(there.residual, scale), 0.0)
-        problem = Normal(np.zeros((len(weight), 0)), pose_slopes(there), there.residual, EVIDENCE * weight)
-        own = problem.marginal(views.edges.frame, state.poses, views.pose_scatter)[-1]
+        points = count_points(views, there, scale, frames, least=0.0)
+        own = eliminate_poses(views, state, there, points, np.zeros((len(points.rows), 0))).own
         state = replace(state, poses=state.poses - np.where(frames[:, None], own, 0.0))
     return state
 

@@ -11,7 +11,7 @@ from proxytune.diagnosis.camera.look.blemishes import Blemish, find_blemishes
 from proxytune.diagnosis.camera.look.grain import Grain, fit_grain
 from proxytune.diagnosis.camera.look.light import Fitted, Light, fit_light
 from proxytune.diagnosis.camera.look.sharpness import Edges, Sharpness, fit_sharpness
-from proxytune.diagnosis.camera.model.drawing import NOISE, draw_pictures
+from proxytune.diagnosis.camera.model.drawing import BLUR, NOISE, draw_pictures
 from proxytune.diagnosis.camera.model.fitting import CameraFit
 from proxytune.diagnosis.camera.model.projection import pose_slopes, project
 from proxytune.driving.cameras import ground_points
@@ -53,15 +53,15 @@ class Appearance:
         }
 
 
-LEAST: Mapping[str, tuple[float, float]] = {
-    "vignetting": (0.0, 0.05),
-    "exposure.gain": (1.0, 0.08),
-    "exposure.gamma": (1.0, 0.1),
-    "image_noise": (0.0, 2.0),
-    "defocus": (0.0, 0.006),
-    "blur": (0.0, 0.01),
+LEAST: Mapping[str, float] = {
+    "vignetting": 0.05,
+    "exposure.gain": 0.08,
+    "exposure.gamma": 0.1,
+    "image_noise": 2.0,
+    "defocus": 0.006,
+    "blur": 0.01,
 }
-"""The neutral value of each, and how far from it a figure must lie to matter for what an agent sees."""
+"""How far from its neutral value a figure must lie to matter for what an agent sees."""
 
 NARROW = 0.12
 """Half of an interval of gain or gamma that is found only where every paint is as declared."""
@@ -106,11 +106,11 @@ def changes(look: Appearance) -> tuple[str, ...]:
 
 def _matters(name: str, figure: Fitted) -> bool:
     """Whether a figure differs from its neutral value beyond doubt, by enough, and to where a camera's can be."""
-    neutral, least = LEAST[name]
-    low, high = figure.interval
+    parameter, (low, high) = PARAMETERS[name], figure.interval
+    neutral = parameter.neutral_value({})
     sure = name == NOISE or not low <= neutral <= high
-    possible = PARAMETERS[name].low <= figure.value <= PARAMETERS[name].high
-    return sure and possible and abs(figure.value - neutral) >= least
+    possible = parameter.low <= figure.value <= parameter.high
+    return sure and possible and abs(figure.value - neutral) >= LEAST[name]
 
 
 def _half(figure: Fitted) -> float:
@@ -118,7 +118,8 @@ def _half(figure: Fitted) -> float:
 
 
 def _soft(blur_s: float, defocus: float) -> dict[str, float]:
-    return {"blur": float(np.clip(blur_s, 0.0, 0.2)), "defocus": float(np.clip(defocus, 0.0, 0.05))}
+    values = {BLUR: blur_s, "defocus": defocus}
+    return {name: PARAMETERS[name].clipped(float(value)) for name, value in values.items()}
 
 
 def _sharp_edges(fit: CameraFit) -> Edges:

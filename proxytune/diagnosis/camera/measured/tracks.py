@@ -83,7 +83,7 @@ def track_frames(log: Log, frames: Frames) -> tuple[Tracks, NDArray[np.intp]]:
     if not len(kept):
         raise LogError(f"{log.name}: no frame has a pose near its time; check that times are on the poses' clock")
     times, poses, rates = (np.concatenate(column) for column in zip(*parts, strict=True))
-    share = 1.0 if still else float(np.sqrt((savgol_coeffs(_samples(log.rate_hz), ORDER) ** 2).sum()))
+    share = 1.0 if still else float(np.sqrt((savgol_coeffs(_samples(log.poses_hz), ORDER) ** 2).sum()))
     return Tracks(times, poses, rates, instants[kept], begins[kept], share), kept
 
 

@@ -7,21 +7,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.diagnosis.camera.model.normal_equations import Counted, count_points, eliminate, eliminate_poses
 from proxytune.diagnosis.camera.model.projection import (
     Projection,
     State,
     camera_slopes,
     map_slopes,
-    pose_slopes,
     project,
     tape_slopes,
 )
 from proxytune.diagnosis.camera.model.views import MAP_SCATTER, Tape, Views
 
 Floats = NDArray[np.float64]
-
-EVIDENCE = 0.1
-"""Edge points of a picture are not independent: so much of a point's evidence counts."""
 
 SCALE_PX = 1.0
 """Standard deviation of an edge point in the end; what is far beyond counts no more."""
@@ -89,26 +86,16 @@ def fit_camera(
         frames: Which frames count (N,); all if not given.
     """
     names = tuple(names)
-    counted = np.ones(len(views.edges.row), dtype=bool) if frames is None else frames[views.edges.frame]
     for scale in scales_px:
         there = project(views, state)
-        weight = np.where(there.valid & counted, robust_weight(there.residual, scale), 0.0)
-        step = _solve(views, state, names, there, weight)
+        step = _solve(views, state, names, there, count_points(views, there, scale, frames))
         state = _moved(views, state, names, step)
     return _fit_of(views, names, state, step)
 
 
-def robust_weight(residual: Floats, scale_px: float) -> Floats:
-    """Weights of Geman and McClure's loss: 1 at zero, none far beyond the scale."""
-    return np.asarray(1.0 / (1.0 + (residual / scale_px) ** 2) ** 2)
-
-
-def _solve(views: Views, state: State, names: tuple[str, ...], there: Projection, weight: Floats) -> _Step:
-    chosen = np.flatnonzero(weight > 1e-4)
-    columns = common_slopes(views, state, there, names)[chosen]
-    system = Normal(columns, pose_slopes(there)[chosen], there.residual[chosen], EVIDENCE * weight[chosen])
-    frame = views.edges.frame[chosen]
-    matrix, right, inverse, coupling, own = system.marginal(frame, state.poses, views.pose_scatter)
+def _solve(views: Views, state: State, names: tuple[str, ...], there: Projection, points: Counted) -> _Step:
+    columns = common_slopes(views, state, there, names)[points.rows]
+    matrix, right, inverse, coupling, own = eliminate_poses(views, state, there, points, columns)
     precision, pull = _priors(views, state, names)
     matrix[np.diag_indices_from(matrix)] += precision
     common = np.asarray(-np.linalg.solve(matrix, right + pull), dtype=float)
@@ -126,55 +113,6 @@ def common_slopes(views: Views, state: State, there: Projection, names: tuple[st
     for place, slope in tape_slopes(views, there):
         columns[rows, first + place] += slope
     return columns
-
-
-class Normal(NamedTuple):
-    """A weighted linear problem: columns that all frames share, and three of each frame's own pose."""
-
-    columns: Floats
-    poses: Floats
-    residual: Floats
-    weight: Floats
-
-    def marginal(
-        self, frame: NDArray[np.intp], corrections: Floats, scatter: Floats
-    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Normal equations of the common columns with every frame's pose eliminated under its prior.
-
-        Args:
-            frame: Of each row (n,), in ascending order.
-            corrections: What is added to each frame's tracked pose so far (N, 3).
-            scatter: Standard deviations of tracked poses (3,).
-
-        Returns:
-            Their matrix and right side, the inverse of each pose's block (N, 3, 3), how poses follow the common
-            columns (N, 3, columns), and where they would go by themselves (N, 3).
-        """
-        weighted = self.columns * self.weight[:, None]
-        matrix, right = weighted.T @ self.columns, weighted.T @ self.residual
-        count = len(corrections)
-        blocks, cross, pulls = self._by_frame(frame, count)
-        blocks[:, (0, 1, 2), (0, 1, 2)] += 1.0 / scatter**2
-        pulls += corrections / scatter**2
-        inverse = np.asarray(np.linalg.inv(blocks), dtype=float)
-        coupling = inverse @ cross
-        own_step = (inverse @ pulls[..., None])[..., 0]
-        flat = cross.reshape(3 * count, self.columns.shape[1])
-        matrix -= flat.T @ coupling.reshape(3 * count, self.columns.shape[1])
-        right -= flat.T @ own_step.ravel()
-        return matrix, right, inverse, coupling, own_step
-
-    def _by_frame(self, frame: NDArray[np.intp], count: int) -> tuple[Floats, Floats, Floats]:
-        """Each pose's block (count, 3, 3), its part with the common columns (count, 3, columns) and right side."""
-        first = np.searchsorted(frame, np.arange(count + 1))
-        blocks, cross = np.zeros((count, 3, 3)), np.zeros((count, 3, self.columns.shape[1]))
-        pulls = np.zeros((count, 3))
-        for number in range(count):
-            own = slice(first[number], first[number + 1])
-            slopes = self.poses[own] * self.weight[own, None]
-            blocks[number], cross[number] = slopes.T @ self.poses[own], slopes.T @ self.columns[own]
-            pulls[number] = slopes.T @ self.residual[own]
-        return blocks, cross, pulls
 
 
 def _precisions(views: Views, names: tuple[str, ...]) -> Floats:
@@ -202,7 +140,7 @@ def _fit_of(views: Views, names: tuple[str, ...], state: State, step: _Step) -> 
     camera, rest = slice(len(names)), slice(len(names), None)
     matrix = step.matrix
     across = matrix[camera, rest]
-    information = matrix[camera, camera] - across @ np.linalg.solve(matrix[rest, rest], across.T)
+    information = eliminate(matrix[camera, camera], across, matrix[rest, rest], across.T)
     sd = np.sqrt(np.diag(np.linalg.inv(matrix)))[len(names) :]
     return CameraFit(
         views, names, state, information - np.diag(_precisions(views, names)), sd[3:], sd[:3], step.pose_sd

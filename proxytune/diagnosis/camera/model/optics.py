@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from proxytune.driving.cameras import CameraFigures
 from proxytune.driving.mounting import mounted_camera
@@ -43,7 +44,7 @@ class Optics:
         effects = effects_from(own, self.robot.figures, self.robot.catalogue)
         return replace(mounted_camera(self.robot, effects), rows=self.rows, columns=self.columns)
 
-    @property
+    @cached_property
     def mounting(self) -> tuple[str, ...]:
         """The names in θ of what places the camera and shapes its lens, a user's own effects included."""
         catalogue = self.robot.catalogue
@@ -67,8 +68,7 @@ class Optics:
 
     def clipped(self, name: str, value: float) -> float:
         """The nearest value within the parameter's bounds."""
-        parameter = self.robot.catalogue.parameters[name]
-        return min(max(value, parameter.low), parameter.high)
+        return self.robot.catalogue.parameters[name].clipped(value)
 
 
 def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.diagnosis.camera.model.fitting import CameraFit
+from proxytune.diagnosis.camera.model.normal_equations import eliminate
 from proxytune.diagnosis.camera.model.optics import effects_of
+from proxytune.effects import effect_of
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +50,7 @@ def rank_subsets(full: CameraFit, declared: Sequence[str], size: int) -> list[Su
 
 def _loss(full: CameraFit, effects: Sequence[str]) -> float:
     """What is lost if only these effects' parameters may differ from their neutral values [nats]."""
-    kept = np.array([effects_of((name,))[0] in effects for name in full.names])
+    kept = np.array([effect_of(name) in effects for name in full.names])
     if kept.all():
         return 0.0
     off = np.array([full.theta[name] - full.views.optics.neutral(name) for name in full.names])[~kept]
@@ -56,5 +58,5 @@ def _loss(full: CameraFit, effects: Sequence[str]) -> float:
     across, inner = matrix[np.ix_(~kept, kept)], matrix[np.ix_(kept, kept)]
     left = matrix[np.ix_(~kept, ~kept)]
     if kept.any():
-        left = left - across @ np.linalg.solve(inner + 1e-9 * np.diag(np.diag(inner)), across.T)
+        left = eliminate(left, across, inner + 1e-9 * np.diag(np.diag(inner)), across.T)
     return float(0.5 * off @ left @ off)

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, CameraFit, Normal, common_slopes, robust_weight
-from proxytune.diagnosis.camera.model.projection import Projection, pose_slopes, project
+from proxytune.diagnosis.camera.model.fitting import SCALE_PX, CameraFit, common_slopes
+from proxytune.diagnosis.camera.model.normal_equations import count_points, eliminate, eliminate_poses
+from proxytune.diagnosis.camera.model.projection import Projection, project
 from proxytune.diagnosis.camera.model.views import MAP_SCATTER, Views
 
 Floats = NDArray[np.float64]
@@ -78,23 +79,21 @@ def _gain(field: Floats, matrix: Floats, right: Floats) -> float:
 def _system(fit: CameraFit, there: Projection, half: NDArray[np.bool_]) -> tuple[Floats, Floats, float]:
     """Normal equations of the field on some frames, all else eliminated, and those frames' cost [nats]."""
     views, names = fit.views, fit.names
-    weight = np.where(there.valid & half[views.edges.frame], robust_weight(there.residual, SCALE_PX), 0.0)
-    chosen = np.flatnonzero(weight > 1e-4)
-    terms = _terms(*_places(views))[chosen]
-    normal = views.edges.normal[chosen]
+    points = count_points(views, there, SCALE_PX, half)
+    terms, normal = _terms(*_places(views))[points.rows], views.edges.normal[points.rows]
     field = np.concatenate((normal[:, :1] * terms, normal[:, 1:] * terms), axis=1)
-    columns = np.concatenate((field, common_slopes(views, fit.state, there, names)[chosen]), axis=1)
-    residual, counted = there.residual[chosen], EVIDENCE * weight[chosen]
-    normal_equations = Normal(columns, pose_slopes(there)[chosen], residual, counted)
-    matrix, right, *_ = normal_equations.marginal(views.edges.frame[chosen], fit.state.poses, views.pose_scatter)
+    columns = np.concatenate((field, common_slopes(views, fit.state, there, names)[points.rows]), axis=1)
+    matrix, right, *_ = eliminate_poses(views, fit.state, there, points, columns)
     own, rest = slice(field.shape[1]), slice(field.shape[1], None)
     precision = np.concatenate((np.full(len(names), 1e-9), MAP_SCATTER**-2.0, views.tape_scatter**-2.0))
     pull = precision * np.concatenate((np.zeros(len(names)), fit.state.offset, fit.state.tape))
-    inner = matrix[rest, rest] + np.diag(precision)
-    through = np.linalg.solve(inner, matrix[rest, own]).T
-    marginal = matrix[own, own] - through @ matrix[rest, own]
-    cost = 0.5 * float((counted * residual**2).sum())
-    return marginal, right[own] - through @ (right[rest] + pull), cost
+    across, inner = matrix[own, rest], matrix[rest, rest] + np.diag(precision)
+    cost = 0.5 * float((points.weight * there.residual[points.rows] ** 2).sum())
+    return (
+        eliminate(matrix[own, own], across, inner, matrix[rest, own]),
+        eliminate(right[own], across, inner, right[rest] + pull),
+        cost,
+    )
 
 
 def _places(views: Views) -> tuple[Floats, Floats]:

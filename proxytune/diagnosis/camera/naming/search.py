@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from proxytune.diagnosis.camera.model.fitting import EVIDENCE, SCALE_PX, CameraFit, fit_camera
-from proxytune.diagnosis.camera.model.optics import MOVING, effects_of
+from proxytune.diagnosis.camera.model.fitting import SCALE_PX, CameraFit, fit_camera
+from proxytune.diagnosis.camera.model.normal_equations import EVIDENCE
+from proxytune.diagnosis.camera.model.optics import MOVING
 from proxytune.diagnosis.camera.model.projection import neutral_state, project
 from proxytune.diagnosis.camera.model.scatter import PASSES, pose_scatter
 from proxytune.diagnosis.camera.model.views import Views
 from proxytune.diagnosis.camera.naming.choice import LEAST_NATS, MOST, TRIED, Subset, rank_subsets
+from proxytune.effects import effect_of
 
 FIRST = ("camera_pitch", "camera_roll", "camera_yaw", "camera_height", "field_of_view", "camera_latency")
 """What is fitted first, from far away: nothing of it stands in for something else."""
@@ -72,14 +74,15 @@ def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float
 
 def name_camera_effects(full: CameraFit, declared: Sequence[str]) -> Named:
     """Find the fewest effects besides those declared that explain what all together do."""
-    enough = max(LEAST_NATS, LEAST_SHARE * cost_of(full))
+    least = cost_of(full)
+    enough = max(LEAST_NATS, LEAST_SHARE * least)
     best: list[tuple[Subset, CameraFit]] = []
     rivals: list[Subset] = []
     for size in range(MOST + 1):
         sets = rank_subsets(full, declared, size)[:TRIED]
         if not sets:
             break
-        fits = sorted((_fitted(full, declared, one) for one in sets), key=lambda pair: pair[0].loss)
+        fits = sorted((_fitted(full, least, declared, one) for one in sets), key=lambda pair: pair[0].loss)
         best.append(fits[0])
         rivals = [one for one, _ in fits[1:] if one.loss <= fits[0][0].loss + RIVAL_NATS]
         if fits[0][0].loss <= enough:
@@ -101,14 +104,14 @@ def cost_of(fit: CameraFit) -> float:
 
 def fit_set(full: CameraFit, effects: Sequence[str]) -> CameraFit:
     """The camera with the parameters of these effects alone, from where all together have them."""
-    names = [name for name in full.names if effects_of((name,))[0] in effects]
+    names = [name for name in full.names if effect_of(name) in effects]
     optics = full.views.optics
     theta = {name: optics.neutral(name) if name in full.names else value for name, value in full.theta.items()}
     state = replace(full.state, theta={**theta, **{name: full.theta[name] for name in names}})
     return fit_camera(full.views, state, names, FROM_ALL)
 
 
-def _fitted(full: CameraFit, declared: Sequence[str], subset: Subset) -> tuple[Subset, CameraFit]:
-    """A set fitted, with what it really costs where that is less than promised."""
+def _fitted(full: CameraFit, least: float, declared: Sequence[str], subset: Subset) -> tuple[Subset, CameraFit]:
+    """A set fitted, with what it really costs beyond the full fit where that is less than promised."""
     fit = fit_set(full, (*declared, *subset.effects))
-    return Subset(subset.effects, min(subset.loss, cost_of(fit) - cost_of(full))), fit
+    return Subset(subset.effects, min(subset.loss, cost_of(fit) - least)), fit

@@ -87,7 +87,6 @@ def _sums(cell: NDArray[np.intp], values: Floats) -> Floats:
 def _field(diagnosis: CameraDiagnosis, gate: Leftover, places: Floats) -> Arrows:
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
     right, down = (2.0 * places / (columns, rows) - 1.0).T
-    # The gate's field is how far the model lies from the markings
     return Arrows(places, gate.displacement(right, down))
 
 

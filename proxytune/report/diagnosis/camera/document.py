@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from proxytune.diagnosis.camera.laying import TWO_SIDED
 from proxytune.diagnosis.camera.look.blemishes import Blemish
 from proxytune.diagnosis.camera.naming.gate import Leftover
 from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect, Comparison, LaidMap
@@ -15,12 +14,11 @@ from proxytune.diagnosis.result import Estimate
 
 def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
     """Everything that `diagnose --json` prints of the camera."""
-    dropped = dropped_values(diagnosis)
     return {
         "verdict": diagnosis.verdict,
         "declared": estimates_document(diagnosis.declared),
         "effects": [_effect(effect, diagnosis, diagnosis.theta) for effect in diagnosis.effects],
-        "immaterial": [_effect(effect, diagnosis, dropped) for effect in diagnosis.immaterial],
+        "immaterial": [_effect(effect, diagnosis, diagnosis.dropped) for effect in diagnosis.immaterial],
         "extended": estimates_document(diagnosis.theta),
         "candidates": [{"name": "+".join(one.effects), "loss": _number(one.loss)} for one in diagnosis.candidates],
         "error": _comparison(diagnosis.pixels),
@@ -40,17 +38,6 @@ def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
 def estimates_document(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
     """Values with their intervals and units, by name."""
     return {name: _estimate(one) for name, one in estimates.items()}
-
-
-def dropped_values(diagnosis: CameraDiagnosis) -> dict[str, Estimate]:
-    """Fitted values of effects that do not matter, by name in θ; they are not in the model."""
-    fit = diagnosis.named.model
-    parameters, names = fit.views.optics.robot.catalogue.parameters, dict(zip(fit.names, fit.sd, strict=True))
-    values = {}
-    for name in (name for effect in diagnosis.immaterial for name in effect.names if name in names):
-        value, half = fit.theta[name], TWO_SIDED * float(names[name])
-        values[name] = Estimate(value, (value - half, value + half), parameters[name].unit)
-    return values
 
 
 def _number(value: float) -> float | None:

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from proxytune.diagnosis.camera.look.blemishes import Blemish
 from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect, LaidLine, LaidMap
 from proxytune.diagnosis.result import Estimate
-from proxytune.report.diagnosis.camera.document import dropped_values
 from proxytune.report.numbers import fixed, listed, short
 
 MEANINGS = {
@@ -35,8 +34,7 @@ def camera_headline(log: str, diagnosis: CameraDiagnosis) -> str:
 def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
     lines = _say_added(diagnosis.effects)
-    dropped = dropped_values(diagnosis)
-    lines += [_say_immaterial(effect, dropped) for effect in diagnosis.immaterial]
+    lines += [_say_immaterial(effect, diagnosis.dropped) for effect in diagnosis.immaterial]
     lines += _say_left_over(diagnosis)
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
     lines += [_say_blemish(blemish, rows, columns) for blemish in diagnosis.blemishes]

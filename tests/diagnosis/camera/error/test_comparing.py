@@ -12,7 +12,8 @@ sys.path.append(str(Path(__file__).parents[1]))
 from pictured import lane_poses, pictures
 from viewed import everything
 
-from proxytune.diagnosis.camera.error.comparing import compare_brightness, compare_displacement
+from proxytune.diagnosis.camera.error import weighing
+from proxytune.diagnosis.camera.error.comparing import compare_brightness
 from proxytune.diagnosis.camera.error.unseen import FOLDS
 from proxytune.diagnosis.camera.gathering import Gathered
 from proxytune.diagnosis.camera.naming.search import name_camera_effects
@@ -31,8 +32,8 @@ def gathered(shown, fixed=True):
 
 
 @functools.cache
-def displaced():
-    return compare_displacement(named(), 1)
+def weighed():
+    return weighing.weigh_effects(named(), 1)
 
 
 @functools.cache
@@ -42,7 +43,7 @@ def shown():
 
 @pytest.mark.slow
 def test_the_added_effect_lowers_the_displacement_to_about_the_floor():
-    pixels, ratios = displaced()
+    pixels, ratios = weighed().pixels, weighed().ratios
     assert pixels.unit == "px"
     assert pixels.after.value < 0.5 * pixels.before.value
     assert pixels.floor.value <= pixels.after.value
@@ -53,14 +54,24 @@ def test_the_added_effect_lowers_the_displacement_to_about_the_floor():
 
 @pytest.mark.slow
 def test_intervals_hold_their_values_and_one_seed_gives_one_result():
-    pixels, ratios = displaced()
+    pixels = weighed().pixels
     for error in (pixels.before, pixels.after, pixels.floor):
         assert error.interval[0] < error.value < error.interval[1]
-    again, other = compare_displacement(named(), 1), compare_displacement(named(), 2)
-    assert again[0].after.interval == pixels.after.interval
-    assert other[0].after.interval != pixels.after.interval
-    assert again[1] == ratios
-    assert other[0].after.value == pixels.after.value
+    again, other = (weighing.weigh_effects(named(), seed) for seed in (1, 2))
+    assert again.pixels.after.interval == pixels.after.interval
+    assert other.pixels.after.interval != pixels.after.interval
+    assert again.ratios == weighed().ratios
+    assert other.pixels.after.value == pixels.after.value
+
+
+@pytest.mark.slow
+def test_without_what_does_not_matter_the_model_is_as_if_it_had_not_been_named(monkeypatch):
+    monkeypatch.setattr(weighing, "MATERIAL", np.inf)
+    left = weighing.weigh_effects(named(), 1)
+    assert (left.named.effects, left.dropped) == ((), ("camera_roll",))
+    assert left.named.model.theta == named().declared.theta
+    assert left.pixels.after.value == left.pixels.before.value
+    assert left.with_dropped is named().model
 
 
 def test_the_added_effect_lowers_the_difference_of_brightness():

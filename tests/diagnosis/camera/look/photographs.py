@@ -6,26 +6,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from nominal_camera import CAMERA
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from proxytune.diagnosis.camera.look.light import squared_radius
-from proxytune.driving.cameras import CameraFigures, GroundPlaneCamera, ground_points
+from proxytune.driving.cameras import GroundPlaneCamera, ground_points
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import Floor, draw_floor
 
-LOG = Path(__file__).resolve().parents[3] / "../shared/data/logs/gym_duckietown_frames"
-CAMERA = CameraFigures(
-    columns=160,
-    rows=120,
-    forward_m=0.066,
-    pitch_deg=19.15,
-    roll_deg=0.0,
-    yaw_deg=0.0,
-    height_m=0.108,
-    field_of_view_deg=75.0,
-    k1=0.0,
-)
+LOG = Path(__file__).resolve().parents[4] / "../shared/data/logs/gym_duckietown_frames"
 REACH_M = 1.2
 FRAMES = 100
 needs_measured = pytest.mark.skipif(not LOG.is_dir(), reason=f"needs measured data in {LOG.parent.name}/{LOG.name}")

@@ -10,7 +10,8 @@ import pytest
 sys.path.append(str(Path(__file__).parents[1]))
 from viewed import NEUTRAL, OPTICS, SCATTER, at_truth, driven, everything, stood
 
-from proxytune.diagnosis.camera.model.fitting import Normal, fit_camera, robust_weight
+from proxytune.diagnosis.camera.model.fitting import fit_camera
+from proxytune.diagnosis.camera.model.normal_equations import Normal, robust_weight
 from proxytune.diagnosis.camera.model.optics import MOVING
 from proxytune.diagnosis.camera.naming.search import FAR, NEAR
 

@@ -1,0 +1,45 @@
+"""What a log.toml is to say besides what the source holds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from proxytune.errors import InputError
+from proxytune.logs import GEOMETRY
+
+NONE: Mapping[str, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What only the user knows of a source.
+
+    Attributes:
+        robot: Name of the robot; empty: the log's own name.
+        figures: Its wheel_radius_m, baseline_m and full_speed_m_s, where there is no folder of it.
+        road: The map that pictures show: a name, or the path of a map file.
+        clock_offset: Seconds that poses are stamped later than commands, "fit", or empty.
+    """
+
+    robot: str = ""
+    figures: Mapping[str, float] = field(default_factory=lambda: NONE)
+    road: str = ""
+    clock_offset: str = ""
+
+
+def read_figures(given: list[str]) -> dict[str, float]:
+    """Figures of a robot from texts such as baseline_m=0.16.
+
+    Raises:
+        InputError: If one is no such figure.
+    """
+    figures = {}
+    for text in given:
+        key, _, value = text.partition("=")
+        if key.strip() not in GEOMETRY:
+            raise InputError(f"--figure {text}: write one of {', '.join(GEOMETRY)}, as in baseline_m=0.16")
+        try:
+            figures[key.strip()] = float(value)
+        except ValueError:
+            raise InputError(f"--figure {text}: '{value}' is no number; write it as in {key}=0.16") from None
+    return figures

@@ -1,0 +1,26 @@
+"""Folders with a user's log, good or wrong, and what reading them says."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from proxytune.errors import LogError
+from proxytune.logs import read_log
+
+
+def write_files(folder: Path, files: Mapping[str, str | bytes]) -> Path:
+    """Write files by name into a folder, which need not be there yet."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    return folder
+
+
+def complaint(folder: Path) -> str:
+    """What reading the log complains of: one line, from the folder's name on."""
+    with pytest.raises(LogError) as caught:
+        read_log(folder)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(str(folder))
+    return str(caught.value).removeprefix(str(folder))

@@ -1,0 +1,115 @@
+"""Pictures keep their pixels, whatever their encoding, and are read one at a time."""
+
+from io import BytesIO
+from types import SimpleNamespace
+
+import bags
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from proxytune.errors import LogError
+from proxytune.importing.ros import pictures
+from proxytune.importing.ros.bag import open_bag
+from proxytune.importing.ros.pictures import picture_of, read_pictures
+
+TIMES = 1.7e9 + np.arange(3) * 0.1
+RGB = np.random.default_rng(0).integers(0, 256, (3, 4, 5, 3)).astype(np.uint8)
+OPAQUE = np.full((3, 4, 5, 1), 255, dtype=np.uint8)
+ENCODED = {
+    "rgb8": RGB,
+    "bgr8": RGB[..., ::-1],
+    "rgba8": np.concatenate((RGB, OPAQUE), axis=3),
+    "bgra8": np.concatenate((RGB[..., ::-1], OPAQUE), axis=3),
+}
+
+
+def written(tmp_path, storage="ros1", **options):
+    """A bag of three pictures."""
+    return bags.write_messages(tmp_path / "run.bag", storage, bags.picture_messages(TIMES, **options))
+
+
+def read(path, topic="/camera/image_raw"):
+    with open_bag(path) as bag:
+        return read_pictures(bag, topic, "header")[0]
+
+
+@pytest.mark.parametrize("storage", bags.STORAGES)
+@pytest.mark.parametrize("pad", [0, 7])
+@pytest.mark.parametrize("encoding", ENCODED)
+def test_colours_stay_in_place_and_padding_is_left_out(tmp_path, storage, pad, encoding):
+    read_back = read(written(tmp_path, storage, pictures=ENCODED[encoding], encoding=encoding, pad=pad))
+    assert np.array_equal(np.array(list(read_back.read())), RGB)
+    assert read_back.times == pytest.approx(TIMES, abs=1e-6)
+
+
+def test_grey_is_grey_in_all_colours(tmp_path):
+    read_back = read(written(tmp_path, pictures=RGB[..., :1], encoding="mono8"))
+    assert np.array_equal(np.array(list(read_back.read())), np.repeat(RGB[..., :1], 3, axis=3))
+
+
+@given(st.integers(1, 6), st.integers(1, 6), st.integers(0, 5), st.sampled_from(sorted(ENCODED)))
+def test_any_size_and_step_gives_back_the_pixels(rows, columns, pad, encoding):
+    rgb = np.random.default_rng(rows).integers(0, 256, (1, rows, columns, 3)).astype(np.uint8)
+    pixels = rgb[..., ::-1] if encoding.startswith("bgr") else rgb
+    pixels = np.concatenate((pixels, rgb[..., :1]), axis=3) if "a" in encoding else pixels
+    ((_, _, _, fields),) = bags.picture_messages(TIMES[:1], pixels, encoding=encoding, pad=pad)
+    assert np.array_equal(picture_of(SimpleNamespace(**fields)), rgb[0])
+
+
+@pytest.mark.parametrize("form", ["png", "jpeg"])
+def test_a_compressed_picture_is_opened(tmp_path, form):
+    flat = np.full((4, 5, 3), (200, 40, 90), dtype=np.uint8)
+    file = BytesIO()
+    Image.fromarray(flat).save(file, form, **({"quality": 100, "subsampling": 0} if form == "jpeg" else {}))
+    (picture,) = read(compressed(tmp_path, file.getvalue(), form), "/camera").read()
+    assert np.abs(picture.astype(int) - flat).max() <= (2 if form == "jpeg" else 0)
+
+
+def compressed(tmp_path, data, form):
+    fields = {"header": bags.header(TIMES[0]), "format": form, "data": np.frombuffer(data, dtype=np.uint8)}
+    message = ("/camera", "sensor_msgs/msg/CompressedImage", TIMES[0], fields)
+    return bags.write_messages(tmp_path / "run.bag", "ros1", [message])
+
+
+def test_a_compressed_picture_that_is_damaged_is_told_by_number(tmp_path):
+    file = BytesIO()
+    Image.fromarray(RGB[0]).save(file, "png")
+    for data in (b"", b"no picture", file.getvalue()[:60]):
+        (tmp_path / f"{len(data)}").mkdir()
+        damaged = read(compressed(tmp_path / f"{len(data)}", data, "png"), "/camera")
+        with pytest.raises(LogError, match=r"run.bag: /camera, message 1: is no picture .*'png'.* --frames none"):
+            list(damaged.read())
+
+
+def test_a_picture_of_16_bits_is_refused(tmp_path):
+    file = BytesIO()
+    Image.fromarray(np.ones((4, 5), dtype=np.uint16)).save(file, "png")
+    with pytest.raises(LogError, match="/camera, message 1: has more than 8 bits a pixel"):
+        list(read(compressed(tmp_path, file.getvalue(), "png"), "/camera").read())
+
+
+def test_an_unknown_encoding_is_told_before_anything_is_made(tmp_path):
+    bag = written(tmp_path, pictures=RGB, encoding="bayer_rggb8")
+    with pytest.raises(LogError, match="message 1: encoding 'bayer_rggb8' is none of rgb8, .* --frames none"):
+        read(bag)
+
+
+@pytest.mark.parametrize("change", [{"step": 14}, {"height": 5}])
+def test_too_few_bytes_are_told(tmp_path, change):
+    messages = [(*rest, fields | change) for *rest, fields in bags.picture_messages(TIMES, RGB)]
+    bag = bags.write_messages(tmp_path / "run.bag", "ros1", messages)
+    with pytest.raises(LogError, match="message 1: 60 bytes do not hold 5 × . pixels"):
+        read(bag)
+
+
+def test_pictures_are_made_one_at_a_time_and_anew_each_time(tmp_path, monkeypatch):
+    made = []
+    monkeypatch.setattr(pictures, "picture_of", lambda message: made.append(message) or picture_of(message))
+    read_back = read(written(tmp_path, pictures=RGB))
+    assert not made
+    next(read_back.read())
+    assert len(made) == 1
+    assert len(list(read_back.read())) == 3

@@ -1,0 +1,95 @@
+"""Stamps are put in order and what was odd is said; what cannot be mended is refused with what to do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from imported_drives import drive
+
+from proxytune.errors import LogError
+from proxytune.importing.checks import checked_drive
+
+GRID = np.arange(0.0, 10.0, 0.05)
+
+
+def complaint(given):
+    with pytest.raises(LogError) as caught:
+        checked_drive(given, "bag")
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_stamps_in_order_are_kept_without_a_word():
+    given = drive(GRID, GRID)
+    kept, notes = checked_drive(given, "bag")
+    assert notes == []
+    np.testing.assert_array_equal(kept.poses.times, GRID)
+    np.testing.assert_array_equal(kept.commands.times, GRID)
+
+
+def test_messages_that_came_out_of_order_are_sorted():
+    times = GRID.copy()
+    times[[40, 41]] = times[[41, 40]]
+    kept, notes = checked_drive(drive(times, GRID), "bag")
+    np.testing.assert_array_equal(kept.poses.times, GRID)
+    assert notes == ["drive run: 1 poses came after later ones (by up to 0.05 s); sorted"]
+
+
+def test_of_repeated_stamps_the_first_pose_and_the_last_command_are_kept():
+    times = np.append(GRID, GRID[-1])
+    given = drive(times, times)
+    values = np.arange(2.0 * len(times)).reshape(-1, 2)
+    places = np.column_stack((np.arange(len(times)), times * 0, times * 0))
+    commands, poses = replace(given.commands, values=values), replace(given.poses, places=places)
+    kept, notes = checked_drive(replace(given, commands=commands, poses=poses), "bag")
+    assert len(kept.poses.times) == len(kept.commands.times) == len(GRID)
+    assert kept.poses.places[-1, 0] == len(GRID) - 1
+    np.testing.assert_array_equal(kept.commands.values[-1], values[-1])
+    assert [note.split(": ")[1] for note in notes] == [
+        "1 poses repeat a stamp; the first of each was kept",
+        "1 commands repeat a stamp; the last of each was kept",
+    ]
+
+
+def test_a_clock_that_was_set_anew_is_refused():
+    times = np.concatenate((GRID, GRID))
+    assert "the stamps of its poses go back by 9.95 s at number 201" in complaint(drive(times, GRID))
+
+
+def test_a_clock_that_was_never_set_is_told():
+    _, notes = checked_drive(drive(GRID + 2e5, GRID + 2e5), "bag")
+    assert any("before the year 2000" in note for note in notes)
+
+
+def test_stamps_that_are_all_one_are_refused():
+    assert "only 1 of its poses have a time of their own" in complaint(drive(np.full(50, 7.0), GRID))
+
+
+def test_commands_and_poses_of_different_times_are_refused():
+    assert "two clocks; use --stamps receive" in complaint(drive(GRID, GRID + 1.7e9))
+
+
+def test_a_drive_without_commands_of_its_own_is_refused():
+    given = drive(GRID, GRID)
+    none = replace(given.commands, times=np.empty(0), values=np.empty((0, 2)))
+    assert "has no commands" in complaint(replace(given, commands=none))
+
+
+def test_a_robot_that_lies_on_its_side_is_refused():
+    given = drive(GRID, GRID)
+    tilted = replace(given.poses, tilts=np.full(len(GRID), np.pi / 2))
+    assert "the robot's z axis lies 90° from the world's" in complaint(replace(given, poses=tilted))
+
+
+def test_a_world_that_is_y_up_is_refused():
+    given = drive(GRID, GRID)
+    places = np.column_stack((np.cos(GRID), 0.001 * GRID, np.sin(GRID)))
+    upright = replace(given.poses, places=places)
+    assert "the world is not z-up" in complaint(replace(given, poses=upright))
+
+
+def test_a_drive_along_a_wall_on_a_flat_floor_is_not_taken_for_another_axis():
+    given = drive(GRID, GRID)
+    places = np.column_stack((GRID, np.zeros(len(GRID)), 0.01 * np.sin(GRID)))
+    _, notes = checked_drive(replace(given, poses=replace(given.poses, places=places)), "bag")
+    assert notes == []

@@ -1,0 +1,272 @@
+"""CSV files of others are read by their columns' names or a map, and every complaint says where and what to do."""
+
+import numpy as np
+import pytest
+from drives import HEADINGS, PLACES, SPEEDS, TIMES, write_csv
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from proxytune.errors import LogError
+from proxytune.importing.csv_tables import is_csv_tables, read_csv_tables
+from proxytune.importing.wanted import Wanted
+
+POSES = "time,x,y,heading\n0,0,0,0\n0.1,0.1,0,0.1\n0.2,0.2,0,0.2\n"
+BOTH = "time,x,y,heading,v,omega\n0,0,0,0,0.5,0\n0.1,0.1,0,0.1,,\n0.2,,,,0.6,0.1\n0.3,0.3,0,0.2,0.6,0.1\n"
+COMMANDS = "time,v,omega\n0.01,0.5,0\n0.15,0.6,0.1\n"
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(text, name="run1.csv"):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write
+
+
+def read(path, **wanted):
+    return read_csv_tables(path, Wanted(**wanted))
+
+
+def complaint(path, **wanted):
+    with pytest.raises(LogError) as caught:
+        read(path, **wanted)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_a_file_in_ns_mm_and_degrees_is_read_by_its_names(tmp_path):
+    (drive,) = read(write_csv(tmp_path)).drives
+    assert (drive.name, drive.commands.kind) == ("run1", "twist")
+    np.testing.assert_allclose(drive.poses.times, TIMES, atol=1e-6)
+    np.testing.assert_allclose(drive.poses.places[:, :2], PLACES, atol=1e-9)
+    np.testing.assert_allclose(drive.poses.headings, HEADINGS, atol=1e-9)
+    np.testing.assert_allclose(drive.commands.values, SPEEDS, atol=1e-9)
+
+
+def test_what_was_taken_for_what_is_told(tmp_path):
+    source = read(write_csv(tmp_path))
+    assert source.form == "CSV table"
+    assert "time from 'stamp_ns' (ns, by its name), x from 'pos_x_mm' (mm, by its name)" in source.notes[0]
+    assert "v from 'cmd_lin' (m/s, assumed)" in source.notes[0]
+    assert [channel.role for channel in source.channels] == ["time", "x", "y", "heading", "v", "omega"]
+    assert {channel.count for channel in source.channels} == {60}
+
+
+def test_rows_may_hold_commands_or_poses_alone(file):
+    (drive,) = read(file(BOTH)).drives
+    np.testing.assert_array_equal(drive.poses.times, [0.0, 0.1, 0.3])
+    np.testing.assert_array_equal(drive.commands.times, [0.0, 0.2, 0.3])
+    np.testing.assert_array_equal(drive.commands.values, [[0.5, 0.0], [0.6, 0.1], [0.6, 0.1]])
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " ", ", "])
+def test_separators_are_seen(file, separator):
+    text = POSES.replace(",", separator) if separator != " " else POSES.replace(",", "   ")
+    (drive,) = read(file(text), commands="none").drives
+    np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.1, 0.2])
+
+
+def test_decimal_commas_a_byte_order_mark_and_comments_are_read(file):
+    text = "\ufeff# recorded on Monday\ntime;x;y;heading\n0,0;0;0;0\n# half way\n0,1;0,25;0;0,5\n;;;\n"
+    (drive,) = read(file(text), commands="none").drives
+    np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.25])
+    np.testing.assert_array_equal(drive.poses.headings, [0.0, 0.5])
+
+
+def test_the_last_comment_may_name_the_columns(file):
+    text = "# by numpy\n# time,x,y,heading\n0,0,0,0\n1,1,0,0\n"
+    np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0.0, 1.0])
+
+
+def test_a_column_map_goes_before_names(file):
+    columns = {"time": "clock:ms", "x": "a:cm", "y": "b:cm", "heading": "c:deg", "v": "d:km/h", "omega": "e:deg/s"}
+    text = "clock,a,b,c,d,e,left,right\n0,0,0,90,3.6,90,0,0\n100,10,0,90,3.6,90,0,0\n"
+    (drive,) = read(file(text), columns=columns).drives
+    np.testing.assert_allclose(drive.poses.times, [0.0, 0.1])
+    np.testing.assert_allclose(drive.poses.places[1], [0.1, 0.0, 0.0])
+    np.testing.assert_allclose(drive.poses.headings, np.pi / 2)
+    np.testing.assert_allclose(drive.commands.values, [[1.0, np.pi / 2]] * 2)
+
+
+def test_duplicate_and_backward_stamps_are_kept(file):
+    text = POSES + "0.2,0.2,0,0.2\n0.15,0.3,0,0.3\n"
+    np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0, 0.1, 0.2, 0.2, 0.15])
+
+
+def test_quaternions_give_headings_and_tilts(file):
+    text = "t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,1\n1,1,0,1,0,0,1,1\n2,1,0,1,1,0,0,1\n"
+    poses = read(file(text), commands="none").drives[0].poses
+    np.testing.assert_allclose(poses.headings, [0.0, np.pi / 2, 0.0])
+    np.testing.assert_allclose(poses.tilts, [0.0, 0.0, np.pi / 2], atol=1e-7)
+    np.testing.assert_array_equal(poses.places[:, 2], 1.0)
+
+
+def test_stamps_since_1970_are_taken_by_their_size(file):
+    text = "stamp,x,y,yaw\n1700000000000000000,0,0,0\n1700000000100000000,1,0,0\n"
+    source = read(file(text), commands="none")
+    np.testing.assert_allclose(source.drives[0].poses.times, [1.7e9, 1.7e9 + 0.1], atol=1e-6)
+    assert "(ns, by its size)" in source.notes[0]
+
+
+def test_a_column_of_drives_makes_drives(file):
+    text = "run,time,x,y,yaw,v,omega\na,0,0,0,0,1,0\na,1,1,0,0,1,0\nb,0,0,0,0,2,0\nb,1,2,0,0,2,0\n"
+    first, second = read(file(text)).drives
+    assert (first.name, second.name) == ("a", "b")
+    np.testing.assert_array_equal(second.commands.values[:, 0], [2.0, 2.0])
+
+
+def test_each_file_of_a_folder_is_a_drive(tmp_path, file):
+    file(BOTH, "one.csv"), file(BOTH, "two.csv")
+    source = read(tmp_path)
+    assert [drive.name for drive in source.drives] == ["one", "two"]
+    assert source.form == "folder of 2 CSV files"
+    assert len(source.notes) == 1
+
+
+@pytest.mark.parametrize("name", ["commands.csv", "cmd_vel.csv", "run1_cmd_vel.csv", "run1_commands.txt"])
+def test_commands_beside_the_poses_are_joined(file, name):
+    file(COMMANDS, name)
+    source = read(file(POSES))
+    np.testing.assert_array_equal(source.drives[0].commands.times, [0.01, 0.15])
+    assert source.channels[-1].name == f"{name}: omega"
+    assert any(note.startswith(f"Commands of {name}: ") for note in source.notes)
+
+
+def test_a_named_file_of_commands_goes_before_columns(file):
+    file(COMMANDS, "joystick.txt")
+    (drive,) = read(file(BOTH), commands="joystick.txt").drives
+    np.testing.assert_array_equal(drive.commands.times, [0.01, 0.15])
+
+
+def test_each_file_s_own_columns_may_be_mapped(file):
+    file("at;lin;ang\n10;0.5;0\n150;0.6;0.1\n", "commands.csv")
+    path = file(POSES.replace("time", "clock"))
+    columns = {"time": "clock", "v": "lin", "omega": "ang"}
+    assert "no column found for time" in complaint(path, columns=columns)
+    file("t_ms;lin;ang\n10;0.5;0\n150;0.6;0.1\n", "commands.csv")
+    np.testing.assert_allclose(read(path, columns=columns).drives[0].commands.times, [0.01, 0.15])
+
+
+def test_drives_of_one_clock_share_a_file_of_commands_by_time(tmp_path, file):
+    file(POSES, "a.csv")
+    file(POSES.replace("\n0", "\n10"), "b.csv")
+    file("time,v,omega\n-1,0.1,0\n0.1,0.2,0\n0.5,0.3,0\n10.1,0.4,0\n", "commands.csv")
+    first, second = read(tmp_path).drives
+    np.testing.assert_array_equal(first.commands.values[:, 0], [0.1, 0.2])
+    np.testing.assert_array_equal(second.commands.values[:, 0], [0.3, 0.4])
+
+
+def test_drives_that_overlap_cannot_share_commands_by_time(tmp_path, file):
+    file(POSES, "a.csv"), file(POSES, "b.csv"), file(COMMANDS, "commands.csv")
+    assert "add a column 'episode'" in complaint(tmp_path)
+    file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\na,0.1,2,0\n", "commands.csv")
+    assert [drive.commands.values[0, 0] for drive in read(tmp_path).drives] == [2.0, 1.0]
+    file("episode,time,v,omega\nb,0,1,0\nc,0.1,1,0\n", "commands.csv")
+    assert "drive 'c' has no poses" in complaint(tmp_path)
+
+
+def test_without_commands_only_if_asked_for(file):
+    assert "leave them out (--commands none)" in complaint(file(POSES))
+    assert read(file(POSES), commands="none").drives[0].commands is None
+    assert read(file(BOTH), kind="none").drives[0].commands is None
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "remedy"),
+    [
+        ("", "is empty", "a row for each sample"),
+        ("\n \n", "is empty", "a row for each sample"),
+        ("time,x,y,heading\n", "no rows", "add one for each sample"),
+        (b"\x89PNG\r\n\x1a\n\0\0", "not text", "save it as a text table"),
+        ("a\0b,c\n1,2\n", "binary", "save it as a text table"),
+        (POSES + "0.3,1,2\n", "line 5: has 3 cells, but there are 4 columns", "correct that line"),
+        (POSES.replace("0.2,0,0.2", "0.2,oops,0.2"), "line 4, column 'y': must be a finite number", "'oops'"),
+        (POSES.replace("0.2,0,0.2", "0.2,inf,0.2"), "line 4, column 'y'", "'inf'"),
+        (POSES.replace("0.2,0,0.2", "0.2,,0.2"), "line 4, column 'y': is empty beside time, x, heading", "fill it"),
+        ("0,0,0,0\n1,1,1,1\n", "line 1: holds numbers", "add a line of names"),
+        ("time,x,x\n1,2,3\n", "names the column 'x' twice", "rename"),
+        (
+            "time,x,y\n0,1,2\n1,1,2\n",
+            "no column found for heading (or qx, qy, qz, qw); its columns are: time, x, y",
+            "=",
+        ),
+        ("time,stamp,x,y,yaw\n0,0,1,2,0\n", "time may be 'time' or 'stamp'", "--columns time=time"),
+        ("time,x,y,heading\n0,0,0,0\n0,1,0,0\n0,2,0,0\n", "all 3 stamps are 0 s", "a clock that runs"),
+        ("time,x,y,heading\n0,0,0,0\n", "a single pose", "two or more"),
+        ("time,x,y,heading\n0,,,\n1,,,\n", "no row with a pose", "give the file"),
+        ("time,x,y,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,0,0,0,0,0,0\n", "orientation 2 is the quaternion (0, 0, 0, 0)", "set"),
+        ("time,x,y,yaw_deg\n0,0,0,1.2\n1,1,0,-3\n", "look like radians", "--columns heading=yaw_deg:deg"),
+        ("time,x_mm,y_mm,yaw\n0,0,0,0\n1,2.5,0,0\n", "moved 2.5 mm in all", "--columns x=x_mm:m"),
+        ("t_ns,x,y,yaw\n0,0,0,0\n0.1,2.5,0,0\n", "rows would be 1e-10 s apart", "--columns time=t_ns:ns"),
+        ('time,x,y,"yaw\n0,0,0,0\n', "line 1: is not a row of a CSV table", "correct"),
+    ],
+)
+def test_bad_poses_are_refused_with_where_and_what_to_do(file, text, where, remedy):
+    path = file(text)
+    said = complaint(path, commands="none")
+    assert said.startswith(str(path))
+    assert where in said
+    assert remedy in said
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        (BOTH.replace("0.6,0.1\n0.3", ",0.1\n0.3"), "line 4, column 'v': is empty beside time, omega"),
+        (BOTH.replace("omega", "other"), "no column found for omega"),
+        (BOTH.replace("omega", "right").replace("v", "left").replace("0.6", "90"), "90 is more than full duty"),
+        ("time,x,y,yaw,v,omega,left,right\n0,0,0,0,0,0,0,0\n", "may be duty or twist; choose one, as in --kind duty"),
+        ("time,x,y,yaw,v,omega\n0,0,0,0,,\n1,1,0,0,,\n", "no row with one"),
+        ("run,time,x,y,yaw,v,omega\na,0,0,0,0,1,1\na,1,0,0,0,1,1\nb,1,,,,0,0\n", "drive 'b' has commands but no poses"),
+    ],
+)
+def test_bad_commands_are_refused(file, text, where):
+    assert where in complaint(file(text))
+
+
+@pytest.mark.parametrize(
+    ("columns", "where"),
+    [
+        ({"haeding": "yaw"}, "unknown name 'haeding'; did you mean 'heading'?"),
+        ({"x": "xx"}, "column map: x=xx: has no column 'xx'"),
+        ({"heading": "headin"}, "did you mean 'heading'?"),
+        ({"x": "x:parsec"}, "unknown unit 'parsec'; known are: m, cm, mm, km"),
+        ({"v": "lin"}, "has no column 'lin'"),
+    ],
+)
+def test_a_bad_column_map_is_refused(file, columns, where):
+    assert where in complaint(file(POSES), columns=columns)
+
+
+def test_missing_files_are_told(tmp_path, file):
+    assert "no such file" in complaint(tmp_path / "none.csv")
+    assert "no such file of commands" in complaint(file(POSES), commands="other.csv")
+    assert "has no CSV file with poses" in complaint(tmp_path, commands="run1.csv")
+
+
+def test_tables_are_known_by_content(tmp_path, file):
+    assert is_csv_tables(file(POSES, "poses.txt"))
+    assert is_csv_tables(file("", "empty.csv"))
+    assert is_csv_tables(tmp_path)
+    assert not is_csv_tables(file("Dear reader,\nthis is prose, and long\n", "notes.txt"))
+    assert not is_csv_tables(file(b"\x89PNG\0\0", "picture"))
+    assert not is_csv_tables(tmp_path / "missing")
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(file, data):
+    content = bytearray(BOTH.encode())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = file(bytes(content[: data.draw(st.integers(0, len(content)))]))
+    is_csv_tables(path)
+    drives, said = (), ""
+    try:
+        drives = read(path).drives
+    except LogError as problem:
+        said = str(problem)
+    assert "\n" not in said
+    assert all(np.isfinite(drive.poses.places).all() for drive in drives)

@@ -74,22 +74,6 @@ def test_a_family_follows_its_truth_and_refuses_what_it_does_not_know(typed, tmp
     assert "truth.toml: grip: unknown key" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-def test_a_new_robot_is_recorded_diagnosed_predicted_and_exported(typed, tmp_path):
-    typed(f"new robot rover --figures {SIX}")
-    typed("new study rover_study --robot rover")
-    typed("record rover_study --model rover_study/truth.toml --output log --repeats 1 --seconds 30")
-    found = typed("diagnose log --output found")
-    assert found["verdict"] == "explained"
-    assert [effect["name"] for effect in found["effects"]] == ["dead_band"]
-    assert found["effects"][0]["parameters"]["width"]["value"] == pytest.approx(0.06, abs=0.01)
-    assert typed("predict found/model.toml log --output predicted.csv")["error"]["value"] < 0.02
-    for form in ("urdf", "mjcf", "ros"):
-        exported = typed(f"export found/model.toml --to {form} --output rover.{form}")
-        assert "dead_band.width" in [line["name"] for line in exported["no_place"]]
-        assert (tmp_path / f"rover.{form}").is_file()
-
-
 def test_nothing_is_written_over_what_is_there(typed, tmp_path, capsys):
     (tmp_path / "rover").mkdir()
     (tmp_path / "rover" / "mine.txt").write_text("mine")

@@ -4,6 +4,7 @@ import argparse
 import os
 import shutil
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 
 from rich.text import Text
@@ -42,9 +43,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Answer:
     """Write the skeleton's folder."""
     folder = Path(arguments.name)
-    _check(arguments)
     if folder.exists():
         raise InputError(f"{folder}: is there already; choose another name, or move it away")
+    _check(arguments)
     skeleton = _skeleton(arguments)
     write_folder(folder, skeleton)
     files = [str(folder / name) for name in skeleton.files]
@@ -98,6 +99,8 @@ def _check(arguments: argparse.Namespace) -> None:
         raise InputError(f"'{name}': a name has letters, digits, _ and -, and begins with a letter; it is no path")
     if kind == "family" and "-" in name:
         raise InputError(f"'{name}': a family is a Python module; write _ for -")
+    if kind == "family" and find_spec(name) is not None:
+        raise InputError(f"'{name}': a Python module of this name is installed; choose another name")
     if kind == "robot" and name in robot_names():
         raise InputError(f"'{name}': a robot of this name comes with proxytune; choose another name")
     for option, of in (("figures", "robot"), ("urdf", "robot"), ("robot", "study")):

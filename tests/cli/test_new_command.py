@@ -40,6 +40,7 @@ QUICK = (("budget = 20", "budget = 4"), ("initial = 8", "initial = 3\nconfirm = 
 QUICK_ROBOT = (*QUICK, ("starts = 4", "starts = 2"), ("seconds = 20.0", "seconds = 3.0"), ("jobs = 2", "jobs = 1"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
 def test_a_new_robot_runs_a_new_study_on_either_plant_by_the_commands_that_are_named(typed, tmp_path, plant):
     made = typed(f"new robot rover --figures {SIX}")
@@ -53,6 +54,7 @@ def test_a_new_robot_runs_a_new_study_on_either_plant_by_the_commands_that_are_n
     assert len(typed(run)["trials"]) == 4
 
 
+@pytest.mark.slow
 def test_a_new_family_runs_by_the_commands_that_are_named_and_keeps_every_promise(typed, tmp_path, monkeypatch):
     made = typed("new family carts")
     shorten(tmp_path / "carts" / "study.toml", ("budget = 20", "budget = 9"))
@@ -67,9 +69,9 @@ def test_a_new_family_runs_by_the_commands_that_are_named_and_keeps_every_promis
 
 
 def test_a_family_follows_its_truth_and_refuses_what_it_does_not_know(typed, tmp_path, capsys):
-    typed("new family carts")
-    (tmp_path / "carts" / "truth.toml").write_text("grip = 1.0\n")
-    line = ["measure", "carts", "--model", "carts/truth.toml", "--output", "carts/target.csv"]
+    typed("new family sleds")
+    (tmp_path / "sleds" / "truth.toml").write_text("grip = 1.0\n")
+    line = ["measure", "sleds", "--model", "sleds/truth.toml", "--output", "sleds/target.csv"]
     assert main(line) == 2
     assert "truth.toml: grip: unknown key" in capsys.readouterr().err
 
@@ -83,9 +85,10 @@ def test_nothing_is_written_over_what_is_there(typed, tmp_path, capsys):
 
 
 BAD = {
-    "a path": ("robot ../rover", "a name has letters, digits, _ and -"),
+    "a path": ("robot sub/rover", "a name has letters, digits, _ and -"),
     "a robot that comes with proxytune": ("robot duckiebot", "a robot of this name comes with proxytune"),
     "a family that is no module": ("family my-family", "a family is a Python module; write _ for -"),
+    "a family that would hide a module": ("family numpy", "a Python module of this name is installed"),
     "an unknown robot": ("study mine --robot rover", "robot 'rover' is unknown"),
     "a robot without a camera": ("study mine --robot husky", "robot 'husky' has no camera"),
     "figures of a study": ("study mine --figures mass=1", "--figures: is for `new robot`; leave it out"),

@@ -66,7 +66,10 @@ def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, capsy
     document = json.loads(capsys.readouterr().out)
     assert document["at"] == {"chosen": "best", "theta": best}
     assert document["curves"][0]["base"] == best
-    assert main([*arguments, "--at", "best"]) == 0
+
+
+def test_the_best_theta_is_told_in_words_too(finished, capsys):
+    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", "best"]) == 0
     assert "the others are held at the study's best θ: delay=" in " ".join(capsys.readouterr().out.split())
 
 

@@ -18,10 +18,10 @@ LINES = [
     if line.startswith("python -m proxytune ")
 ]
 QUICK = {
-    "budget = 20": "budget = 5",
+    "budget = 16": "budget = 5",
     "initial = 8": "initial = 4",
     "starts = 4": "starts = 2",
-    "seconds = 20.0": "seconds = 5.0",
+    "seconds = 10.0": "seconds = 5.0",
 }
 
 

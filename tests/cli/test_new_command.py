@@ -36,8 +36,8 @@ def shorten(path, *pairs):
     path.write_text(text)
 
 
-QUICK = (("budget = 20", "budget = 4"), ("initial = 8", "initial = 3\nconfirm = 0\npreflight = false"))
-QUICK_ROBOT = (*QUICK, ("starts = 4", "starts = 2"), ("seconds = 20.0", "seconds = 3.0"), ("jobs = 2", "jobs = 1"))
+QUICK = (("budget = 16", "budget = 4"), ("initial = 8", "initial = 3\nconfirm = 0\npreflight = false"))
+QUICK_ROBOT = (*QUICK, ("starts = 4", "starts = 2"), ("seconds = 10.0", "seconds = 3.0"), ("jobs = 2", "jobs = 1"))
 
 
 @pytest.mark.slow

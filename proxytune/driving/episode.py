@@ -1,7 +1,7 @@
 """One episode: an agent drives a plant through the effects of a domain instance until time or luck runs out."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -13,7 +13,7 @@ from proxytune.driving.cameras import Camera
 from proxytune.driving.drivetrain import Drivetrain
 from proxytune.driving.plant import Plant
 from proxytune.driving.robot import Robot
-from proxytune.effects import Chain, Effect, Setting, Signal, Stage, stage_chain
+from proxytune.effects import Chain, Setting, Signal
 from proxytune.errors import EpisodeError
 
 TICK_HZ = 60
@@ -105,16 +105,6 @@ class Course:
     ended: Callable[[float, float], bool]
 
 
-def image_chain(effects: Iterable[Effect], figures: Mapping[str, float]) -> Chain:
-    """The image effects that change a picture, given the nominal figures: neutral ones would only cost time."""
-    chain = stage_chain(effects, Stage.IMAGE)
-    return Chain(tuple(effect for effect in chain.effects if not _is_neutral(effect, figures)))
-
-
-def _is_neutral(effect: Effect, figures: Mapping[str, float]) -> bool:
-    return all(getattr(effect, one.name, None) == one.neutral_value(figures) for one in effect.parameters)
-
-
 class _View:
     """The camera with its image effects: the newest picture at the camera's rate."""
 
@@ -143,6 +133,42 @@ class _View:
         return np.asarray(signal[-1].reshape(self._shape))
 
 
+class Rollout:
+    """An episode under way, one command after the other: `drive` asks an agent for them, an environment its user.
+
+    Attributes:
+        steps: How many commands there is time for.
+        poses: After each tick of the last step, (ticks, 3): x [m], y [m], heading [rad]; before the first, the start.
+        crashed: Whether the robot has hit something or fallen over.
+    """
+
+    def __init__(self, instance: Instance, plant: Plant, course: Course) -> None:
+        figures = instance.robot.figures
+        self._drivetrain, self._plant, self._course = instance.drivetrain, plant, course
+        self._hold = round(TICK_HZ / figures["control_rate"])
+        self._memory = instance.drivetrain.begin(_setting(figures, course))
+        self._view = _View(instance, course.start, course.seed)
+        self.steps = round(course.seconds * figures["control_rate"])
+        self.poses: Signal = course.start[None]
+        self.crashed = False
+
+    @property
+    def picture(self) -> Picture:
+        """The newest picture."""
+        return self._view.picture
+
+    @property
+    def ended(self) -> bool:
+        """Whether the robot has crashed or left the course."""
+        return self.crashed or self._course.ended(float(self.poses[-1, 0]), float(self.poses[-1, 1]))
+
+    def step(self, command: Command) -> None:
+        """Hold a command (2,) for one control step."""
+        twists, self._memory = self._drivetrain.apply(np.repeat(command[None], self._hold, axis=0), self._memory)
+        self.poses, self.crashed = self._plant.move(twists)
+        self._view.pass_by(self.poses)
+
+
 def picture_only(picture: Picture, pose: Signal) -> Picture:
     """All that an agent sees."""
     return picture
@@ -167,23 +193,18 @@ def drive(
     Raises:
         EpisodeError: If the agent raises, or its answer is not two finite duties.
     """
-    figures = instance.robot.figures
-    hold = round(TICK_HZ / figures["control_rate"])
-    memory = instance.drivetrain.begin(_setting(figures, course))
-    view = _View(instance, course.start, course.seed)
+    rollout, control_hz = Rollout(instance, plant, course), instance.robot.figures["control_rate"]
     remembered = _begin(driver, instance.robot)
-    moved, crashed = course.start[None], False
-    poses, commands = [moved], []
-    for step in range(round(course.seconds * figures["control_rate"])):
-        command, remembered = _ask(driver, sees(view.picture, moved[-1]), remembered, step / figures["control_rate"])
-        twists, memory = instance.drivetrain.apply(np.repeat(command[None], hold, axis=0), memory)
-        moved, crashed = plant.move(twists)
-        view.pass_by(moved)
-        poses.append(moved)
+    poses, commands = [rollout.poses], []
+    for step in range(rollout.steps):
+        seen = sees(rollout.picture, rollout.poses[-1])
+        command, remembered = _ask(driver, seen, remembered, step / control_hz)
+        rollout.step(command)
+        poses.append(rollout.poses)
         commands.append(command)
-        if crashed or course.ended(float(moved[-1, 0]), float(moved[-1, 1])):
+        if rollout.ended:
             break
-    return Drive(np.concatenate(poses), np.array(commands), crashed, remembered)
+    return Drive(np.concatenate(poses), np.array(commands), rollout.crashed, remembered)
 
 
 def _setting(figures: Mapping[str, float], course: Course) -> Setting:
@@ -210,10 +231,19 @@ def _ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command
         command = np.asarray(answer, dtype=float)
     except Exception as problem:
         raise EpisodeError(f"raised {type(problem).__name__} at {time_s:.2f} s: {problem}") from problem
+    check_command(command, time_s)
+    return command, memory
+
+
+def check_command(command: Command, time_s: float) -> None:
+    """Refuse what are not two finite duties.
+
+    Raises:
+        EpisodeError: With the time [s].
+    """
     if command.shape != (2,):
         raise EpisodeError(
             f"answered with shape {command.shape} at {time_s:.2f} s; a command is two duties, left and right"
         )
     if not (math.isfinite(command[0]) and math.isfinite(command[1])):
         raise EpisodeError(f"answered {command.tolist()} at {time_s:.2f} s; duties must be finite")
-    return command, memory

@@ -27,13 +27,12 @@ from proxytune.driving.episode import (
     Instance,
     Sight,
     drive,
-    image_chain,
     measured,
     picture_only,
 )
 from proxytune.driving.expert import Expert
 from proxytune.driving.identity import earlier_identities, identity_of
-from proxytune.driving.mounting import mounted_camera
+from proxytune.driving.mounting import image_chain, mounted_camera
 from proxytune.driving.picture_size import with_columns
 from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
@@ -156,7 +155,7 @@ class LaneFollowing:
         Raises:
             EpisodeError: With the time at which the agent failed.
         """
-        return self._drive(episode, load_agent(episode.agent, self.folder), self._course(episode, self.seconds))
+        return self._drive(episode, load_agent(episode.agent, self.folder), self.course(episode, self.seconds))
 
     @property
     def best_score(self) -> float:
@@ -171,7 +170,7 @@ class LaneFollowing:
         """
         robot = read_robot(self.robot, self.folder)
         expert = Expert(self.map, *robot.expert_figures(), seed=episode.seed)
-        shown = self._drive(episode, expert, self._course(episode, seconds), Sight).memory
+        shown = self._drive(episode, expert, self.course(episode, seconds), Sight).memory
         kept = np.array(shown.on_road)
         samples = Demonstration(np.stack(shown.pictures)[kept], np.stack(shown.commands)[kept])
         return samples, round(seconds * robot.figures["control_rate"])
@@ -184,7 +183,7 @@ class LaneFollowing:
             SettingsError: If the robot does not state the distance between its wheels.
         """
         wheel_distance = read_robot(self.robot, self.folder).wheel_distance()
-        driven = self._drive(episode, Pupil(policy), self._course(episode, self.seconds))
+        driven = self._drive(episode, Pupil(policy), self.course(episode, self.seconds))
         return task.driving_score(
             self.map,
             driven.poses,
@@ -211,7 +210,8 @@ class LaneFollowing:
         noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
         return np.asarray(task.start_pose(self.map, episode.start, seed=episode.seed, **noise))
 
-    def _course(self, episode: Episode, seconds: float) -> Course:
+    def course(self, episode: Episode, seconds: float) -> Course:
+        """Where an episode starts, and its end: after some time [s], or off the map."""
         return Course(self._start(episode), seconds, episode.seed, functools.partial(off_map, self.map))
 
     def _drive(

@@ -1,1 +1,17 @@
-"""Gymnasium both ways: lane following as an environment, and any environment as a domain family."""
+"""Gymnasium both ways: lane following as an environment, and any environment as a domain family.
+
+Importing this package registers `proxytune/LaneFollowing-v0`, so that `gymnasium.make` knows it. Gymnasium itself can
+be told to: `gymnasium.make("proxytune.environments:proxytune/LaneFollowing-v0")`.
+"""
+
+from proxytune.errors import ExtensionError
+
+try:
+    import gymnasium
+except ModuleNotFoundError:
+    raise ExtensionError('gymnasium is not installed; pip install "proxytune[gym]"') from None
+
+LANE_FOLLOWING = "proxytune/LaneFollowing-v0"
+
+if LANE_FOLLOWING not in gymnasium.registry:
+    gymnasium.register(LANE_FOLLOWING, entry_point="proxytune.environments.lane_following:LaneFollowingEnv")

@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from proxytune.errors import LogError
-from proxytune.importing.arrays import is_arrays, read_arrays
 from proxytune.importing.checks import checked_drive
-from proxytune.importing.csv_tables import is_csv_tables, read_csv_tables
-from proxytune.importing.mrclam import is_mrclam, read_mrclam
 from proxytune.importing.ros import is_bag, read_bag
 from proxytune.importing.source import Source
 from proxytune.importing.survey import clock_notes, survey
-from proxytune.importing.tum import is_tum, read_tum
+from proxytune.importing.tables.arrays import is_arrays, read_arrays
+from proxytune.importing.tables.csv_tables import is_csv_tables, read_csv_tables
+from proxytune.importing.tables.mrclam import is_mrclam, read_mrclam
+from proxytune.importing.tables.tum import is_tum, read_tum
 from proxytune.importing.wanted import Wanted
 
 

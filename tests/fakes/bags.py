@@ -123,6 +123,12 @@ def pose_messages(times, poses, topic="/pose", clock_s=0.0, delay_s=0.0, kind=PO
         yield topic, kind, time + delay, {"header": header(time + ahead, frame), "pose": body}
 
 
+def transform_messages(parent, child, rows, times, topic="/tf"):
+    """Transforms (N, 3) or (N, 7) of a child in its parent, a message each, received as stamped."""
+    for time, row in zip(times, rows, strict=True):
+        yield topic, "tf2_msgs/msg/TFMessage", time, {"transforms": [transform(time, parent, child, row)]}
+
+
 def picture_messages(times, pictures, topic="/camera/image_raw", encoding="rgb8", pad=0, delay_s=0.0):
     """Pictures (K, rows, columns, channels), each row padded with some bytes."""
     for time, picture in zip(times, pictures, strict=True):

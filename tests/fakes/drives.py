@@ -3,10 +3,13 @@
 import numpy as np
 
 ROWS = 60
-TIMES = 1_700_000_000.0 + 0.05 * np.arange(ROWS)
-HEADINGS = np.arctan2(np.sin(0.7 * 0.05 * np.arange(ROWS) + 2.0), np.cos(0.7 * 0.05 * np.arange(ROWS) + 2.0))
-PLACES = np.column_stack((1.5 + 0.02 * np.arange(ROWS), -0.5 + 0.01 * np.arange(ROWS)))
-SPEEDS = np.column_stack((0.3 + 0.1 * np.sin(np.arange(ROWS)), 0.7 * np.cos(np.arange(ROWS))))
+STEP_S = 0.05
+TIMES = 1_700_000_000.0 + STEP_S * np.arange(ROWS)
+SPEEDS = np.column_stack((0.3 + 0.1 * np.sin(np.arange(ROWS) / 5), 0.7 + 0.2 * np.cos(np.arange(ROWS) / 7)))
+TURNED = 2.0 + STEP_S * np.concatenate(([0.0], np.cumsum(SPEEDS[:-1, 1])))
+HEADINGS = np.arctan2(np.sin(TURNED), np.cos(TURNED))
+STEPS = STEP_S * SPEEDS[:, :1] * np.column_stack((np.cos(TURNED), np.sin(TURNED)))
+PLACES = np.array([1.5, -0.5]) + np.vstack((np.zeros((1, 2)), np.cumsum(STEPS[:-1], axis=0)))
 
 
 def write(path, header, columns, separator=","):

@@ -1,6 +1,7 @@
 """Clocks are told in numbers and in sentences that say what to do."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,3 +53,10 @@ def test_what_is_wrong_is_one_sentence_with_what_to_do(found, says):
     assert says in note
     assert "\n" not in note
     assert any(word in note for word in ("Stamp both", "Check how", "Keep clocks"))
+
+
+def test_an_offset_that_the_log_declares_is_told_instead_of_a_doubt():
+    declared = replace(clocks(), declared_s=-0.25)
+    assert clocks_document((declared,))["declared_offset_s"] == -0.25
+    (note,) = clocks_notes("yard", (declared,), {"delay": 0.1})
+    assert note == "poses of yard are stamped -0.25 s later than commands, as it declares; that was taken out"

@@ -77,6 +77,7 @@ class Clocks:
         jumps: Clocks that jump within a drive, of which the longest stretch is kept.
         later_s: How much later the poses of each drive are put (E,) [s].
         kept_s: From when to when each drive is used (E, 2) [s after its beginning].
+        declared_s: How much later poses are stamped, as log.toml declares; that was taken out beforehand [s], or None.
     """
 
     latency: Offset
@@ -86,6 +87,7 @@ class Clocks:
     jumps: tuple[Jump, ...]
     later_s: Floats
     kept_s: Floats
+    declared_s: float | None = None
 
     @property
     def left_s(self) -> float:
@@ -113,7 +115,7 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     drives = gather(log, robot, log.episodes)
     speeds = measured_speeds(drives)
     if not len(speeds.first):
-        return _one_clock(len(log.episodes))
+        return replace(_one_clock(len(log.episodes)), declared_s=log.clock_offset_s)
     squares, latencies, apart = _squares(log, drives, speeds)
     kept, jumps = stretches(log, squares, latencies)
     varied = not _is_rare(len({jump.drive for jump in jumps}), len(log.episodes))
@@ -137,6 +139,7 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
         jumps=jumps,
         later_s=later,
         kept_s=np.array(kept, dtype=float),
+        declared_s=log.clock_offset_s,
     )
 
 

@@ -48,9 +48,9 @@ def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
     """
     if wanted.kind and wanted.kind not in COMMANDS:
         raise LogError(f"{where}: unknown kind of commands '{wanted.kind}'; {nearest(wanted.kind, COMMANDS)}")
-    still = "none" in (wanted.commands, wanted.kind)
-    commands = None if still else _choose(_command_role(wanted), topics, wanted.commands, where)
-    if not still and commands is None:
+    without = "none" in (wanted.commands, wanted.kind)
+    commands = None if without else _choose(_command_role(wanted), topics, wanted.commands, where)
+    if not without and commands is None:
         raise LogError(f"{_nothing(COMMAND_ROLE, topics, where)}, or take a log without commands by --commands none")
     transform = wanted.poses if ">" in wanted.poses else ""
     role = replace(POSE_ROLE, ranks={"TFMessage": 0, "tfMessage": 0}) if transform else POSE_ROLE

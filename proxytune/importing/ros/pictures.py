@@ -76,11 +76,11 @@ def _check(message: Any) -> tuple[float, ...]:
         return ()
     if message.encoding not in ENCODINGS:
         known = ", ".join(ENCODINGS)
-        raise LogError(f"encoding '{message.encoding}' is none of {known}; leave pictures out by --frames none")
+        raise LogError(f"encoding '{message.encoding}' is none of {known}; leave pictures out by --pictures none")
     channels = ENCODINGS[message.encoding][0]
     if message.step < channels * message.width or len(message.data) < message.step * message.height:
         size = f"{message.width} × {message.height} pixels in rows of {message.step} bytes"
-        raise LogError(f"{len(message.data)} bytes do not hold {size}; record it again, or take --frames none")
+        raise LogError(f"{len(message.data)} bytes do not hold {size}; record it again, or take --pictures none")
     return ()
 
 
@@ -96,8 +96,8 @@ def _compressed(message: Any) -> Picture:
     try:
         with Image.open(BytesIO(np.asarray(message.data, dtype=np.uint8).tobytes())) as image:
             if image.mode.startswith(("I", "F")):
-                raise LogError("has more than 8 bits a pixel; leave pictures out by --frames none")
+                raise LogError("has more than 8 bits a pixel; leave pictures out by --pictures none")
             return np.array(image.convert("RGB"))
     except BROKEN:
         text = f"is no picture that can be read (format '{message.format}')"
-        raise LogError(f"{text}; record it again, or leave pictures out by --frames none") from None
+        raise LogError(f"{text}; record it again, or leave pictures out by --pictures none") from None

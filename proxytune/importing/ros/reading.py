@@ -6,10 +6,11 @@ from pathlib import Path
 from proxytune.errors import LogError
 from proxytune.importing.ros.bag import Bag, Topic, bags_in, form_of, open_bag
 from proxytune.importing.ros.choice import Choice, channels_of, choose, notes_of
+from proxytune.importing.ros.composing import read_chain
 from proxytune.importing.ros.messages import read_commands, read_poses
 from proxytune.importing.ros.pictures import read_pictures
 from proxytune.importing.ros.roles import TRANSFORMS
-from proxytune.importing.ros.transforms import choose_transform, read_chain, read_transforms
+from proxytune.importing.ros.transforms import choose_transform, read_transforms
 from proxytune.importing.source import Drive, Poses, Source
 from proxytune.importing.wanted import Wanted
 
@@ -66,7 +67,7 @@ def _merge(topics: list[Topic], bags: int) -> Topic:
 def _with_transform(choice: Choice, path: Path, wanted: Wanted) -> Choice:
     """The choice with the transform that the first bag's pose is."""
     with open_bag(path) as bag:
-        transforms = read_transforms(bag, _transform_topics(bag), wanted.stamps)
+        transforms = read_transforms(bag, _transform_topics(bag))
         return replace(choice, transform=choose_transform(transforms, f"{path}: {choice.poses.name}"))
 
 
@@ -89,8 +90,8 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
 def _read_poses(bag: Bag, choice: Choice, wanted: Wanted) -> tuple[Poses, Notes]:
     if not choice.of_transforms:
         return read_poses(bag, choice.poses.name, wanted.stamps)
-    transforms = read_transforms(bag, _transform_topics(bag), wanted.stamps)
-    return read_chain(transforms, choice.transform, f"{bag.path}: {choice.poses.name}")
+    transforms = read_transforms(bag, _transform_topics(bag))
+    return read_chain(transforms, choice.transform, wanted.stamps, f"{bag.path}: {choice.poses.name}")
 
 
 def _transform_topics(bag: Bag) -> tuple[str, ...]:

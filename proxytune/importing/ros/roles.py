@@ -88,7 +88,7 @@ POSE_ROLE = Role(
     first=("mocap", "vicon", "vrpn", "optitrack", "qualisys", "ground_truth"),
     never=("goal", "target", "setpoint", "initialpose", "cmd", "command", "tf_static"),
 )
-PICTURE_ROLE = Role("pictures", "--frames", {"Image": 0, "CompressedImage": 1}, never=("depth", "mask", "debug"))
+PICTURE_ROLE = Role("pictures", "--pictures", {"Image": 0, "CompressedImage": 1}, never=("depth", "mask", "debug"))
 
 
 def short(kind: str) -> str:

@@ -15,6 +15,7 @@ def clocks_document(clocks: Sequence[Clocks]) -> dict[str, Any]:
         "latency_s": own.latency.value,
         "latency_interval": list(own.latency.interval),
         "assumed_delay_s": own.assumed_delay_s,
+        "declared_offset_s": own.declared_s,
         "drives": {name: {"offset_s": one.value, "interval": list(one.interval)} for name, one in own.drives.items()},
         "jumps": [{"drive": jump.drive, "time_s": jump.time_s, "by_s": jump.by_s} for jump in own.jumps],
     }
@@ -25,7 +26,12 @@ def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -
     """What is wrong with the clocks and what to do; where a delay was fitted, that an offset looks the same."""
     notes = [note for own in clocks for note in (*_whole(own), *_drives(own), *_jumps(own))]
     notes = [f"clocks of {log}: {note}" for note in notes]
-    if "delay" in theta:
+    declared = clocks[0].declared_s
+    if declared is not None:
+        notes.append(
+            f"poses of {log} are stamped {declared:.3g} s later than commands, as it declares; that was taken out"
+        )
+    elif "delay" in theta:
         notes.append(
             "delay and an offset between the clocks of commands and poses are one number: the delay is the "
             "robot's only if one clock stamped both"

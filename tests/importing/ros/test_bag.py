@@ -124,6 +124,16 @@ def test_a_message_that_is_not_its_type_is_told_by_number(tmp_path, monkeypatch)
             list(bag.messages("/pose"))
 
 
+def test_a_complaint_of_the_library_is_one_line_without_control_characters(tmp_path, monkeypatch):
+    def open_badly(self):
+        raise OSError("first line\n\x1b[31msecond line")
+
+    bag = bags.write_bag(tmp_path / "run.bag", "ros1", *DRIVE)
+    monkeypatch.setattr("rosbags.highlevel.AnyReader.open", open_badly)
+    with pytest.raises(LogError, match=r"cannot be read as a bag \(first line \[31msecond line\); copy it again"):
+        read_bag(bag, Wanted())
+
+
 def test_without_the_library_one_line_says_what_to_install(tmp_path, monkeypatch):
     bag = bags.write_bag(tmp_path / "run.bag", "ros1", *DRIVE)
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)

@@ -80,7 +80,7 @@ def test_a_compressed_picture_that_is_damaged_is_told_by_number(tmp_path):
     for data in (b"", b"no picture", file.getvalue()[:60]):
         (tmp_path / f"{len(data)}").mkdir()
         damaged = read(compressed(tmp_path / f"{len(data)}", data, "png"), "/camera")
-        with pytest.raises(LogError, match=r"run.bag: /camera, message 1: is no picture .*'png'.* --frames none"):
+        with pytest.raises(LogError, match=r"run.bag: /camera, message 1: is no picture .*'png'.* --pictures none"):
             list(damaged.read())
 
 
@@ -93,7 +93,7 @@ def test_a_picture_of_16_bits_is_refused(tmp_path):
 
 def test_an_unknown_encoding_is_told_before_anything_is_made(tmp_path):
     bag = written(tmp_path, pictures=RGB, encoding="bayer_rggb8")
-    with pytest.raises(LogError, match="message 1: encoding 'bayer_rggb8' is none of rgb8, .* --frames none"):
+    with pytest.raises(LogError, match="message 1: encoding 'bayer_rggb8' is none of rgb8, .* --pictures none"):
         read(bag)
 
 

@@ -86,13 +86,8 @@ def test_bags_of_a_folder_share_their_topics(tmp_path):
 
 
 def test_transforms_of_the_first_bag_are_those_of_all(tmp_path):
-    def moving(child):
-        for time, row in zip(TIMES, POSES, strict=True):
-            transforms = [bags.transform(time, "map", child, row)]
-            yield "/tf", "tf2_msgs/msg/TFMessage", time, {"transforms": transforms}
-
-    bags.write_messages(tmp_path / "one.bag", "ros1", moving("base_link"))
-    bags.write_messages(tmp_path / "two.bag", "ros1", moving("robot"))
+    for name, child in (("one.bag", "base_link"), ("two.bag", "robot")):
+        bags.write_messages(tmp_path / name, "ros1", bags.transform_messages("map", child, POSES, TIMES))
     with pytest.raises(LogError, match="two.bag: /tf: no transforms lead from 'map' to 'base_link'"):
         read_bag(tmp_path, Wanted(commands="none"))
 
@@ -114,6 +109,14 @@ def test_a_bag_without_definitions_is_read_by_those_of_humble(tmp_path):
     assert np.array_equal(source.drives[0].commands.values, TWISTS)
     assert "run does not define its types of message: those of ROS 2 Humble were taken." in source.notes
     assert "does not define wheel_msgs/msg/WheelsCmdStamped" in source.channels[2].role
+
+
+def test_messages_that_only_the_metadata_know_are_missing(tmp_path):
+    bag = bags.write_bag(tmp_path / "run", "sqlite3", *DRIVE)
+    with sqlite3.connect(bag / "run.db3") as table:
+        table.execute("DELETE FROM messages WHERE topic_id = (SELECT id FROM topics WHERE name = '/pose')")
+    with pytest.raises(LogError, match="run: /pose: no messages; take another topic, or leave the bag out"):
+        read_bag(bag, Wanted())
 
 
 def test_several_publishers_of_a_topic_are_one_topic(tmp_path):

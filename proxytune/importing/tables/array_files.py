@@ -9,8 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from proxytune.errors import LogError
-from proxytune.importing.columns import usual_names
-from proxytune.importing.tables import Table
+from proxytune.importing.tables.cells import Table
+from proxytune.importing.tables.columns import usual_names
 
 Arrays = Mapping[str, NDArray[Any]]
 

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.errors import LogError
-from proxytune.importing.columns import Columns, column_values, missing
-from proxytune.importing.fields import PLACE, POSE, QUATERNION
 from proxytune.importing.orientation import headings_and_tilts
 from proxytune.importing.source import Commands, Floats, Poses
-from proxytune.importing.tables import Table
+from proxytune.importing.tables.cells import Table
+from proxytune.importing.tables.columns import Columns, column_values, missing
+from proxytune.importing.tables.fields import PLACE, POSE, QUATERNION
 from proxytune.logs import COMMANDS
 
 Mask = NDArray[np.bool_]

@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from proxytune.errors import LogError
-from proxytune.importing.arrays import is_arrays, read_arrays
-from proxytune.importing.csv_tables import read_csv_tables
+from proxytune.importing.tables.arrays import is_arrays, read_arrays
+from proxytune.importing.tables.csv_tables import read_csv_tables
 from proxytune.importing.wanted import Wanted
 
 FRAMES = np.arange(ROWS * 2 * 3 * 3, dtype=np.uint64).astype(np.uint8).reshape(ROWS, 2, 3, 3)
@@ -99,6 +99,29 @@ def test_a_column_map_names_columns_of_arrays_with_units(tmp_path):
     np.testing.assert_allclose(drive.commands.values, SPEEDS * 2 * np.pi)
 
 
+def test_places_of_a_column_map_are_in_the_user_s_own_frame(tmp_path):
+    path = write_arrays(tmp_path)
+    columns = {
+        "x": "positions[0]",
+        "y": "positions[2]",
+        "heading": "angles",
+        "left": "actions[0]",
+        "right": "actions[1]",
+    }
+    source = read(path, columns=columns)
+    np.testing.assert_array_equal(source.drives[0].poses.places[:, 1], -PLACES[:, 1])
+    assert len(source.notes) == 1
+
+
+def test_frames_without_a_time_are_left_out(tmp_path):
+    unknown = np.arange(ROWS) == 2
+    arrays = {"timestamps": np.where(unknown, np.nan, TIMES), "observations": FRAMES}
+    arrays |= {"positions": np.where(unknown[:, None], np.nan, 1.0) * np.ones(3), "actions": None}
+    path = write_arrays(tmp_path, **arrays, angles=np.where(unknown, np.nan, HEADINGS))
+    pictures = read(path, commands="none").drives[0].pictures
+    np.testing.assert_array_equal(np.stack(list(pictures.read())), FRAMES[~unknown])
+
+
 def test_our_own_names_and_several_drives_need_no_map(tmp_path):
     arrays = {**OWN, "state": None, "x": PLACES[:, 0], "y": PLACES[:, 1], "yaw": HEADINGS, "v": SPEEDS[:, 0]}
     arrays |= {"omega": SPEEDS[:, 1], "episode": np.repeat(["a", "b"], ROWS // 2), "frames": FRAMES}
@@ -119,6 +142,8 @@ def test_without_commands_only_if_asked_for(tmp_path):
     assert "no column found for left, right" in complaint(path, kind="duty")
     assert "no column found for commands" in complaint(path)
     assert read(path, commands="none").drives[0].commands is None
+    other = write_arrays(tmp_path, actions=SPEEDS[:7])
+    assert read(other, commands="none").drives[0].commands is None
 
 
 @pytest.mark.parametrize(
@@ -137,7 +162,7 @@ def test_without_commands_only_if_asked_for(tmp_path):
         (OWN, {"columns": {"x": "state[5]"}}, "has no column 'state[5]'"),
         (OWN, {"columns": {"time": "clock"}}, "say it, as in --columns time=timestamps:s"),
         ({"short": TIMES[:5]}, {"columns": {"x": "short"}}, "array 'short' is (5,) of float64, but there are 60 times"),
-        ({}, {"commands": "actions"}, "--columns left=actions[0] right=actions[1]"),
+        ({}, {"commands": "actions"}, "--columns left=actions[0],right=actions[1]"),
         ({}, {"columns": {"speed": "v"}}, "unknown name 'speed'"),
     ],
 )

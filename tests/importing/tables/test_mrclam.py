@@ -10,11 +10,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from proxytune.errors import LogError
-from proxytune.importing.csv_tables import read_csv_tables
-from proxytune.importing.mrclam import is_mrclam, read_mrclam
+from proxytune.importing.tables.csv_tables import read_csv_tables
+from proxytune.importing.tables.mrclam import is_mrclam, read_mrclam
 from proxytune.importing.wanted import Wanted
 
-LOG = Path(__file__).resolve().parents[2] / "../shared/data/logs/mrclam6_robot1"
+LOG = Path(__file__).resolve().parents[3] / "../shared/data/logs/mrclam6_robot1"
 
 
 def complaint(path, **wanted):

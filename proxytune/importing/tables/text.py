@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from proxytune.errors import LogError
-from proxytune.importing.tables import Table
+from proxytune.importing.tables.cells import Table
 
 HEAD_BYTES = 65536
 """How much of a file is looked at to recognise it."""

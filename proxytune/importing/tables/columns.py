@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from proxytune.errors import LogError
-from proxytune.importing.fields import EXAMPLE, QUANTITIES, QUATERNION, USUAL
 from proxytune.importing.source import Channel, Floats
-from proxytune.importing.tables import Table
-from proxytune.importing.units import Unit, contradiction, epoch_unit, own_unit, split_ending, split_unit
+from proxytune.importing.tables.cells import Table
+from proxytune.importing.tables.fields import EXAMPLE, QUANTITIES, QUATERNION, USUAL
+from proxytune.importing.tables.units import Unit, contradiction, epoch_unit, own_unit, split_ending, split_unit
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
 
@@ -182,3 +182,12 @@ def _of_an_epoch(table: Table, column: Column) -> Column:
         return column
     unit = epoch_unit(table.numbers(column.name))
     return replace(column, unit=unit, known_by="by its size") if unit else column
+
+
+def summed(parts: Sequence[Sequence[Channel]]) -> tuple[Channel, ...]:
+    """Columns of several files, those of equal name and role as one."""
+    counts: dict[tuple[str, str], int] = {}
+    for channel in (channel for part in parts for channel in part):
+        key = channel.name, channel.role
+        counts[key] = counts.get(key, 0) + channel.count
+    return tuple(Channel(name, "column", count, role) for (name, role), count in counts.items())

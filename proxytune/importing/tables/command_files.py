@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.errors import LogError
-from proxytune.importing.columns import channels_of, choose_columns, command_kind, described, named_in
-from proxytune.importing.fields import COMMAND_FIELDS
-from proxytune.importing.measures import commands_by_drive
 from proxytune.importing.source import Channel, Commands, Drive
-from proxytune.importing.text import read_text_table
+from proxytune.importing.tables.columns import channels_of, choose_columns, command_kind, described, named_in
+from proxytune.importing.tables.fields import COMMAND_FIELDS
+from proxytune.importing.tables.measures import commands_by_drive
+from proxytune.importing.tables.text import read_text_table
 from proxytune.importing.wanted import Wanted
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from proxytune.errors import LogError
-from proxytune.importing.csv_tables import is_csv_tables, read_csv_tables
+from proxytune.importing.tables.csv_tables import is_csv_tables, read_csv_tables
 from proxytune.importing.wanted import Wanted
 
 POSES = "time,x,y,heading\n0,0,0,0\n0.1,0.1,0,0.1\n0.2,0.2,0,0.2\n"
@@ -103,6 +103,26 @@ def test_quaternions_give_headings_and_tilts(file):
     np.testing.assert_array_equal(poses.places[:, 2], 1.0)
 
 
+BOTH_TURNS = "t,x,y,yaw,qx,qy,qz,qw\n0,0,0,2,0,0,0,1\n1,1,0,2,0,0,0,1\n"
+
+
+def test_of_heading_and_quaternion_the_quaternion_is_taken(file):
+    source = read(file(BOTH_TURNS), commands="none")
+    np.testing.assert_array_equal(source.drives[0].poses.headings, 0.0)
+    assert [channel.role for channel in source.channels][3:] == ["left out", "qx", "qy", "qz", "qw"]
+
+
+def test_a_heading_that_is_mapped_goes_before_a_quaternion(file):
+    source = read(file(BOTH_TURNS), commands="none", columns={"heading": "yaw"})
+    np.testing.assert_array_equal(source.drives[0].poses.headings, 2.0)
+    assert [channel.role for channel in source.channels][3:] == ["heading", *["left out"] * 4]
+
+
+def test_a_column_that_is_mapped_is_nothing_else(file):
+    source = read(file(BOTH), columns={"left": "v", "right": "omega"})
+    assert source.drives[0].commands.kind == "duty"
+
+
 def test_stamps_since_1970_are_taken_by_their_size(file):
     text = "stamp,x,y,yaw\n1700000000000000000,0,0,0\n1700000000100000000,1,0,0\n"
     source = read(file(text), commands="none")
@@ -121,7 +141,7 @@ def test_each_file_of_a_folder_is_a_drive(tmp_path, file):
     file(BOTH, "one.csv"), file(BOTH, "two.csv")
     source = read(tmp_path)
     assert [drive.name for drive in source.drives] == ["one", "two"]
-    assert source.form == "folder of 2 CSV files"
+    assert source.form == "folder of CSV files"
     assert len(source.notes) == 1
 
 
@@ -167,6 +187,15 @@ def test_drives_that_overlap_cannot_share_commands_by_time(tmp_path, file):
     assert "drive 'c' has no poses" in complaint(tmp_path)
 
 
+def test_each_drive_must_have_commands(tmp_path, file):
+    file(POSES, "a.csv")
+    file(POSES.replace("\n0", "\n10"), "b.csv")
+    commands = file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\n", "commands.csv")
+    assert complaint(tmp_path) == (f"{commands}: has no commands for drive 'a'; add them, or leave its poses out")
+    file("time,v,omega\n5,1,0\n10.1,1,0\n", "commands.csv")
+    assert "has no command while 'a' was driven, 0 to 0.2 s; check that" in complaint(tmp_path)
+
+
 def test_without_commands_only_if_asked_for(file):
     assert "leave them out (--commands none)" in complaint(file(POSES))
     assert read(file(POSES), commands="none").drives[0].commands is None
@@ -192,6 +221,7 @@ def test_without_commands_only_if_asked_for(file):
             "no column found for heading (or qx, qy, qz, qw); its columns are: time, x, y",
             "=",
         ),
+        ("run,time,x,y,yaw\na,0,0,0,0\n,1,1,0,0\n", "line 3, column 'run': is empty", "name the drive"),
         ("time,stamp,x,y,yaw\n0,0,1,2,0\n", "time may be 'time' or 'stamp'", "--columns time=time"),
         ("time,x,y,heading\n0,0,0,0\n0,1,0,0\n0,2,0,0\n", "all 3 stamps are 0 s", "a clock that runs"),
         ("time,x,y,heading\n0,0,0,0\n", "a single pose", "two or more"),
@@ -215,6 +245,7 @@ def test_bad_poses_are_refused_with_where_and_what_to_do(file, text, where, reme
     ("text", "where"),
     [
         (BOTH.replace("0.6,0.1\n0.3", ",0.1\n0.3"), "line 4, column 'v': is empty beside time, omega"),
+        ("time,x,winkel\n0,0,0\n", "no column found for y, heading"),
         (BOTH.replace("omega", "other"), "no column found for omega"),
         (BOTH.replace("omega", "right").replace("v", "left").replace("0.6", "90"), "90 is more than full duty"),
         ("time,x,y,yaw,v,omega,left,right\n0,0,0,0,0,0,0,0\n", "may be duty or twist; choose one, as in --kind duty"),

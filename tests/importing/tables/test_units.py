@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from proxytune.errors import LogError
-from proxytune.importing.units import UNITS, contradiction, epoch_unit, own_unit, split_ending, split_unit
+from proxytune.importing.tables.units import UNITS, contradiction, epoch_unit, own_unit, split_ending, split_unit
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,11 @@ import re
 from pathlib import Path
 
 from proxytune.errors import LogError
-from proxytune.importing.columns import channels_of, own_columns
-from proxytune.importing.measures import commands_by_drive, poses_by_drive
 from proxytune.importing.source import Channel, Drive, Source
-from proxytune.importing.tables import Table
-from proxytune.importing.text import read_text_table
+from proxytune.importing.tables.cells import Table
+from proxytune.importing.tables.columns import channels_of, own_columns
+from proxytune.importing.tables.measures import commands_by_drive, poses_by_drive
+from proxytune.importing.tables.text import read_text_table
 from proxytune.importing.wanted import Wanted
 from proxytune.settings import nearest
 

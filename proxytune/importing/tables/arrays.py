@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.errors import LogError
-from proxytune.importing.array_files import Arrays, as_table, load_arrays
-from proxytune.importing.columns import (
+from proxytune.importing.source import Channel, Drive, Source
+from proxytune.importing.tables.array_files import Arrays, as_table, load_arrays
+from proxytune.importing.tables.cells import Table
+from proxytune.importing.tables.columns import (
     Columns,
     channels_of,
     check_fields,
@@ -18,11 +20,9 @@ from proxytune.importing.columns import (
     command_kind,
     described,
 )
-from proxytune.importing.fields import COMMAND_FIELDS, POSE
-from proxytune.importing.frame_arrays import find_frames, pictures_of
-from proxytune.importing.measures import commands_by_drive, poses_by_drive
-from proxytune.importing.source import Channel, Drive, Source
-from proxytune.importing.tables import Table
+from proxytune.importing.tables.fields import COMMAND_FIELDS, POSE
+from proxytune.importing.tables.frame_arrays import find_frames, pictures_of
+from proxytune.importing.tables.measures import commands_by_drive, poses_by_drive
 from proxytune.importing.wanted import Wanted
 from proxytune.logs import COMMANDS
 
@@ -66,7 +66,7 @@ def _check_wanted(table: Table, arrays: Arrays, wanted: Wanted) -> None:
     if wanted.commands not in ("", "none"):
         raise LogError(
             f"{table.path}: --commands {wanted.commands}: name arrays by column, as in --columns "
-            f"left={wanted.commands}[0] right={wanted.commands}[1]"
+            f"left={wanted.commands}[0],right={wanted.commands}[1]"
         )
     usual = {} if wanted.columns else {name: name for name in (*ACTIONS, *POSITIONS, *ANGLES)}
     if "none" in (wanted.commands, wanted.kind):

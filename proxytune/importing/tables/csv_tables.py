@@ -1,11 +1,12 @@
 """CSV files: poses and commands in one table, or in two that are joined by time."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from proxytune.errors import LogError
-from proxytune.importing.columns import (
+from proxytune.importing.source import Channel, Commands, Drive, Source
+from proxytune.importing.tables.cells import Table
+from proxytune.importing.tables.columns import (
     Columns,
     channels_of,
     check_fields,
@@ -14,13 +15,12 @@ from proxytune.importing.columns import (
     described,
     holds_commands,
     named_in,
+    summed,
 )
-from proxytune.importing.command_files import find_commands, is_named_as_commands, read_commands, share_commands
-from proxytune.importing.fields import COMMAND_FIELDS, EXAMPLE, POSE
-from proxytune.importing.measures import commands_by_drive, pose_fields, poses_by_drive
-from proxytune.importing.source import Channel, Commands, Drive, Source
-from proxytune.importing.tables import Table
-from proxytune.importing.text import first_rows, is_number, read_text_table
+from proxytune.importing.tables.command_files import find_commands, is_named_as_commands, read_commands, share_commands
+from proxytune.importing.tables.fields import COMMAND_FIELDS, EXAMPLE, POSE
+from proxytune.importing.tables.measures import commands_by_drive, pose_fields, poses_by_drive
+from proxytune.importing.tables.text import first_rows, is_number, read_text_table
 from proxytune.importing.wanted import Wanted
 from proxytune.logs import COMMANDS
 
@@ -70,7 +70,11 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
     check_fields(wanted.columns, str(path))
     files = _files(path, wanted)
     recordings = [_read_recording(file, wanted, alone=len(files) == 1) for file in files]
-    drives, channels, notes = [], list(_summed(recordings)), [recording.note for recording in recordings]
+    drives, channels, notes = (
+        [],
+        list(summed([recording.channels for recording in recordings])),
+        [recording.note for recording in recordings],
+    )
     for apart in dict.fromkeys(recording.apart for recording in recordings):
         mine = [recording for recording in recordings if recording.apart == apart]
         group = [drive for recording in mine for drive in recording.drives]
@@ -80,7 +84,7 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
             channels += commands.channels
             notes.append(commands.note)
         drives += group
-    form = f"folder of {len(files)} CSV files" if path.is_dir() else "CSV table"
+    form = "folder of CSV files" if path.is_dir() else "CSV table"
     return Source(form, tuple(drives), tuple(channels), tuple(dict.fromkeys(notes)))
 
 
@@ -133,13 +137,3 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
     kind = command_kind(columns, wanted.kind, table)
     unused = set(COMMAND_FIELDS) - set(COMMANDS[kind])
     return {field: column for field, column in columns.items() if field not in unused}, kind
-
-
-def _summed(recordings: Sequence[Recording]) -> list[Channel]:
-    """Columns of equal name and role as one."""
-    counts: dict[tuple[str, str], int] = {}
-    for recording in recordings:
-        for channel in recording.channels:
-            key = channel.name, channel.role
-            counts[key] = counts.get(key, 0) + channel.count
-    return [Channel(name, "column", count, role) for (name, role), count in counts.items()]

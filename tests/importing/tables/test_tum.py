@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from proxytune.errors import LogError
-from proxytune.importing.csv_tables import read_csv_tables
-from proxytune.importing.tum import is_tum, read_tum
+from proxytune.importing.tables.csv_tables import read_csv_tables
+from proxytune.importing.tables.tum import is_tum, read_tum
 from proxytune.importing.wanted import Wanted
 
 LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"
@@ -111,7 +111,8 @@ def test_trajectories_are_known_by_content(file, tmp_path):
     assert is_tum(file("", "empty.tum"))
     assert not is_tum(file("time,x\n1,2\n", "a.csv"))
     assert not is_tum(file("1 2 3\n", "b.txt"))
-    assert not is_tum(tmp_path)
+    assert is_tum(tmp_path), "a folder with such a file"
+    assert not is_tum(tmp_path.parent)
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

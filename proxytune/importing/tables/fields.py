@@ -10,7 +10,7 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 POSE = (*PLACE, "heading", *QUATERNION)
 COMMAND_FIELDS = tuple(field for pair in COMMANDS.values() for field in pair)
 
-EXAMPLE = "--columns time=stamp_ns:ns x=pos_x_mm:mm y=pos_y_mm:mm heading=yaw_deg:deg v=cmd_lin omega=cmd_ang"
+EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_deg:deg,v=cmd_lin,omega=cmd_ang"
 """A column map, for complaints."""
 
 QUANTITIES: Mapping[str, str] = MappingProxyType(

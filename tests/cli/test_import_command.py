@@ -1,0 +1,117 @@
+"""`import` lists what a source holds, writes a log that reads back, and complains in one line."""
+
+import json
+
+import foreign_robot
+import pytest
+
+from proxytune.cli.main import main
+from proxytune.logs import read_log
+
+FIGURES = [word for key, value in foreign_robot.FIGURES.items() for word in ("--figure", f"{key}={value}")]
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    drives = [foreign_robot.drive(number, seconds=20.0, offset_s=-0.25) for number in range(2)]
+    return foreign_robot.write_form(tmp_path_factory.mktemp("source"), "csv", drives)
+
+
+def document(capsys, *words):
+    assert main(["import", *words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def complaint(capsys, *words):
+    assert main(["import", *words]) == 2
+    told = capsys.readouterr()
+    (line,) = told.err.strip().splitlines()
+    assert told.out == ""
+    return line.removeprefix("proxytune import: ")
+
+
+def test_without_an_output_it_lists_and_writes_nothing(capsys, table, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found = document(capsys, str(table))
+    assert found["log"] is None
+    assert found["form"].startswith("folder of")
+    assert {one["name"]: one["role"] for one in found["channels"]}["yaw_deg"] == "heading"
+    assert [one["name"] for one in found["drives"]] == ["run0", "run1"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_log_reads_back_with_robot_figures_and_offset(capsys, table, tmp_path):
+    words = (str(table), str(tmp_path / "log"), "--robot", "nobodys", *FIGURES, "--clock-offset", "-0.25")
+    assert document(capsys, *words)["log"] == str(tmp_path / "log")
+    log = read_log(tmp_path / "log")
+    assert (log.robot, log.command, log.clock_offset_s, len(log.episodes)) == ("nobodys", "twist", -0.25, 2)
+
+
+def test_two_clocks_are_told_before_anything_is_fitted(capsys, table):
+    found = document(capsys, str(table))
+    assert all(drive["lag_s"] < -0.05 for drive in found["drives"])
+    assert any("turn before they are told to" in note for note in found["notes"])
+
+
+def test_people_read_tables_of_what_there_is_and_of_the_drives(capsys, table):
+    assert main(["import", str(table)]) == 0
+    text = capsys.readouterr().out
+    for part in ("yaw_deg", "heading", "run1", "answers after", "give OUTPUT to write the log"):
+        assert part in text
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--columns", "x"), "--columns x: write OURS=THEIRS"),
+        (("--clock-offset", "soon"), "--clock-offset soon: give seconds"),
+        (("--figure", "width=2"), "--figure width=2: write one of"),
+        (("--columns", "x=nowhere:mm"), "no column 'nowhere'"),
+        (("--columns", "x=pos_x_mm:inch"), "inch"),
+    ],
+)
+def test_a_wrong_option_is_one_line(capsys, table, words, says):
+    assert says in complaint(capsys, str(table), *words)
+
+
+def test_a_source_that_is_none_is_one_line(capsys, tmp_path):
+    assert "no such file or folder" in complaint(capsys, str(tmp_path / "none"))
+
+
+def test_an_output_that_is_there_is_left_alone(capsys, table, tmp_path):
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log" / "mine").write_text("kept")
+    assert "is there already" in complaint(capsys, str(table), str(tmp_path / "log"))
+    assert [path.name for path in (tmp_path / "log").iterdir()] == ["mine"]
+
+
+@pytest.fixture
+def model(tmp_path):
+    text = (
+        'format = 1\nrobot = "nobodys"\n[geometry]\nwheel_radius_m = 0.033\nbaseline_m = 0.16\nfull_speed_m_s = 0.5\n'
+    )
+    effects = "[effects.dead_band]\nwidth = 0.06\n[effects.motor_lag]\ntime_constant = 0.12\n"
+    gains = "[effects.wheel_gain]\nleft = 0.95\nright = 1.0\n[effects.delay]\ndelay = 0.06\n"
+    (tmp_path / "model.toml").write_text(text + effects + gains, encoding="utf-8")
+    return tmp_path / "model.toml"
+
+
+def test_predict_takes_a_table_as_it_is_at_its_poses_own_times(capsys, model, tmp_path):
+    one = foreign_robot.drive(5, seconds=20.0)
+    home = foreign_robot.write_form(tmp_path, "csv", [one])
+    words = ["predict", str(model), str(home / "run0.csv"), "--output", str(tmp_path / "poses.csv"), "--json"]
+    assert main(words) == 0
+    assert json.loads(capsys.readouterr().out)["error"]["value"] < 0.0035
+
+
+@pytest.mark.slow
+def test_diagnose_takes_a_folder_of_tables_and_names_what_the_robot_has(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    drives = [foreign_robot.drive(100 + number, seconds=40.0, offset_s=-0.25) for number in range(6)]
+    home = foreign_robot.write_form(tmp_path, "csv", drives)
+    assert main(["diagnose", str(home), "--robot", "nobodys", *FIGURES, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {"dead_band", "wheel_gain", "motor_lag"} <= {effect["name"] for effect in found["effects"]}
+    assert {effect["name"] for effect in found["effects"]} <= {"dead_band", "wheel_gain", "motor_lag", "delay"}
+    assert found["clocks"]["offset_s"] == pytest.approx(-0.24, abs=0.02)
+    assert any("two clocks" in note for note in found["imported"])

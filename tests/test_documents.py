@@ -40,12 +40,12 @@ LOGS_PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
 
 LONGEST_README = 120
 """Lines: the README is read in one go; the rest is in docs/."""
-RUN_ELSEWHERE = "extending.md"
-"""Its commands need its files: tests/test_extending.py runs them."""
+RUN_ELSEWHERE = ("extending.md", "own_robot.md")
+"""Their commands need what comes before them: tests/test_extending.py and tests/test_own_robot.py run them."""
 COMMAND_LINES = sorted(
     {
         line.removeprefix("$ ")
-        for text in (README, *(text for path, text in DOCS.items() if path.name != RUN_ELSEWHERE))
+        for text in (README, *(text for path, text in DOCS.items() if path.name not in RUN_ELSEWHERE))
         for block in re.findall(r"```(?:sh|console)\n(.*?)```", text, flags=re.DOTALL)
         for line in block.splitlines()
         if line.removeprefix("$ ").startswith("python -m proxytune")

@@ -50,6 +50,8 @@ COMMANDS: dict[str, Command] = {
     "predict": Command("predict", "predict the poses of a log with a fitted model"),
     "compare": Command("compare", "compare how fast each search engine finds a good θ", resumes=True),
     "plot": Command("plot", "draw a study's figures and report again, without simulating"),
+    "new": Command("new", "write a robot, study or domain family to start from"),
+    "export": Command("export", "write what was found to a URDF, a MuJoCo model or ROS parameters"),
     "list": Command("listing", "list robots, maps, effects, agents, metrics, engines or measures"),
 }
 

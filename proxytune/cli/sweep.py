@@ -33,6 +33,7 @@ from proxytune.study.evaluation import Spent
 from proxytune.study.provenance import adopt
 from proxytune.study.study import Study, open_study
 from proxytune.study.study_run import StudyRun
+from proxytune.sweep.answer import best_theta, has_answer
 from proxytune.sweep.discrepancy import discrepancy_study
 from proxytune.sweep.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval, with_target
 
@@ -48,8 +49,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--points", type=int, default=13, metavar="N", help="number of values of the parameter [13]")
     parser.add_argument(
         "--at",
-        metavar="NAME=VALUE,…|MODEL",
-        help="values of the other parameters, or a model.toml with them [nominal]",
+        metavar="NAME=VALUE,…|MODEL|best|nominal",
+        help="values of the other parameters: given, from a model.toml, the study's best θ, or the robot's own"
+        " [best once a trial is finished, else nominal]",
     )
     parser.add_argument(
         "--target-model",
@@ -65,7 +67,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Simulate what is missing of the sweeps, and draw them."""
     folder = study_folder(arguments.path)
     study = open_study(folder)
-    sweeps, discrepancy = _plan(study, arguments), None
+    word = arguments.at or ("best" if has_answer(study) else "nominal")
+    sweeps, discrepancy = _plan(study, arguments, word), None
     if arguments.target_model:
         discrepancy = discrepancy_study(study, arguments.target_model)
         sweeps = [with_target(sweep, arguments.target_model, discrepancy) for sweep in sweeps]
@@ -79,7 +82,8 @@ def run(arguments: argparse.Namespace) -> Answer:
                 run_sweep(run, sweep, discrepancy)
         curves = [curve for sweep in sweeps if (curve := curve_of(run, sweep))]
     output = arguments.output or folder / "figures"
-    return _answer(curves, run.spent, draw_curves(curves, output), write_curves(curves, output))
+    answer = _answer(curves, run.spent, draw_curves(curves, output), write_curves(curves, output))
+    return _say_base(answer, word, sweeps[0].base)
 
 
 def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
@@ -108,12 +112,12 @@ def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
 
 
 def read_base(text: str | None, catalogue: Catalogue = SHIPPED) -> Theta:
-    """The values of the other parameters, from NAME=VALUE pairs or a model.toml.
+    """The values of the other parameters, from NAME=VALUE pairs or a model.toml; none for `nominal`.
 
     Raises:
         InputError: If it is neither.
     """
-    if text is None:
+    if text is None or text == "nominal":
         return {}
     if text.endswith(".toml"):
         return read_model(Path(text), catalogue).theta
@@ -121,16 +125,16 @@ def read_base(text: str | None, catalogue: Catalogue = SHIPPED) -> Theta:
     try:
         base = {name.strip(): float(value) for name, _, value in pairs}
     except ValueError:
-        raise InputError(f"--at {text}: write NAME=VALUE,NAME=VALUE or the path of a model.toml") from None
+        raise InputError(f"--at {text}: write NAME=VALUE,NAME=VALUE, best, nominal or a model.toml") from None
     if len(base) < len(pairs):
         raise InputError(f"--at {text}: names a parameter twice; give each once")
     return base
 
 
-def _plan(study: Study, arguments: argparse.Namespace) -> list[SweepRecord]:
+def _plan(study: Study, arguments: argparse.Namespace, word: str) -> list[SweepRecord]:
     if not 2 <= arguments.points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {arguments.points}")
-    base = read_base(arguments.at, Catalogue(study.settings.folder.resolve()))
+    base = best_theta(study) if word == "best" else read_base(word, Catalogue(study.settings.folder.resolve()))
     check_base(study, base)
     names = study.settings.space.names if arguments.parameter == "all" else (arguments.parameter,)
     return [plan_sweep(sweep_interval(study, name), base, arguments.points) for name in names]
@@ -149,6 +153,18 @@ def _answer(curves: Sequence[Curve], spent: Spent, figures: Sequence[Path], file
     hints = [] if all(curve.has_pod for curve in curves) else [NO_POD]
     lines = [*failures(curves), *hints, f"{spent.episodes} episodes run", *(str(path) for path in [*figures, *files])]
     return Answer(document, Group(*parts, Text("\n".join(lines))))
+
+
+def _say_base(answer: Answer, word: str, base: Theta) -> Answer:
+    """The answer with what the other parameters are held at."""
+    values = ", ".join(f"{name}={value:g}" for name, value in sorted(base.items()))
+    lines = {
+        "best": f"the others are held at the study's best θ: {values}; --at nominal holds the robot's own",
+        "nominal": "the others are nominal",
+    }
+    line = lines.get(word, f"the others are held at {values}")
+    document = {**answer.document, "at": {"chosen": word if word in lines else "given", "theta": dict(base)}}
+    return Answer(document, Group(answer.text, Text(line)))
 
 
 def _base(curve: Curve) -> tuple[tuple[str, float], ...]:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from proxytune.driving.body import check_body
 from proxytune.driving.lane_following import CAMERAS, PLANTS, LaneFollowing
 from proxytune.driving.road.reading import chosen_map
 from proxytune.driving.robot import Robot, read_robot, robot_names
@@ -46,7 +47,7 @@ def _check_equipment(section: Section, robot: Robot, plant: str) -> None:
     try:
         robot.camera_figures()
         if plant == "bullet":
-            robot.body()
+            check_body(robot)
     except SettingsError as problem:
         raise section.error("robot", str(problem)) from None
 

@@ -14,6 +14,8 @@ SAME_CODE = (
     "fe8ac42c83cd70a7928304e0df8b369a9dae86a3c4d198fb4e6a4bb7303b5e7f",
     "8d856fded410f9a6b4828fb7fb8791fae50be3d452e98e549daaddd751990838",
     "0fbbd46b4e353c48e3cfd813ad93c838152e08f779b7d1bb734fbb095aa9ec5f",
+    "25287b445f9a33278dabd80c1f2a748eed1e97a7aada1c62148a0217453015ee",
+    "560c6fcf838d5a1f165a4c832f91ef66c052dc5e6a018d86e8821c82f8ce09ba",
 )
 """What code means that drives the same episodes, the oldest first: that one names them all."""
 

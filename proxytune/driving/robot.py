@@ -146,14 +146,13 @@ class Robot:
 
 
 def robot_names(folder: Path | None = None) -> tuple[str, ...]:
-    """The robots of a user's folder, of plug-ins, and those shipped."""
-    homes = [shipped("robots"), *([folder] if folder else [])]
-    names = {path.parent.name for home in homes for path in home.glob("*/robot.toml")}
+    """The robots of a user's folder and of the one above it, of plug-ins, and those shipped."""
+    names = {path.parent.name for home in _homes(folder) for path in home.glob("*/robot.toml")}
     return tuple(sorted(names | set(plugins("robot"))))
 
 
 def robot_home(name: str, folder: Path | None = None) -> Path:
-    """The folder of a robot: beside the study first, then shipped, then what a plug-in names.
+    """The folder of a robot: in the study's folder first, then beside it, then shipped, then what a plug-in names.
 
     Args:
         name: The folder's name, or that of a plug-in.
@@ -166,7 +165,7 @@ def robot_home(name: str, folder: Path | None = None) -> Path:
     if name not in robot_names(folder):
         hint = nearest(name, robot_names(folder))
         raise SettingsError(f"robot '{name}' is unknown (your own is a folder {name} with robot.toml); {hint}")
-    for home in ([folder] if folder else []) + [shipped("robots")]:
+    for home in _homes(folder):
         if (home / name / "robot.toml").is_file():
             return home / name
     found = load(name, kind="robot")
@@ -216,6 +215,12 @@ def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: 
         )
     figures = {**geometry, "motor_time_constant": 0.0, "control_rate": control_rate}
     return Robot(name, "as its log describes it", MappingProxyType(figures), MappingProxyType({}), None)
+
+
+def _homes(folder: Path | None) -> list[Path]:
+    """Where robots are looked for, in this order."""
+    own = [folder, folder.resolve().parent] if folder else []
+    return [*own, shipped("robots")]
 
 
 def _urdf(settings: Section) -> Path | None:

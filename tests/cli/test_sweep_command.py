@@ -58,6 +58,42 @@ def test_trials_and_sweeps_share_episodes(finished, capsys):
     assert json.loads(capsys.readouterr().out)["episodes"] == {"run": 2 * 18}
 
 
+def test_a_finished_study_is_swept_at_its_best_theta_and_says_so(finished, capsys):
+    assert main(["study", str(finished), "--json"]) == 0
+    best = json.loads(capsys.readouterr().out)["best"]["theta"]
+    arguments = ["sweep", str(finished), "--parameter", "trim", "--points", "2"]
+    assert main([*arguments, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["at"] == {"chosen": "best", "theta": best}
+    assert document["curves"][0]["base"] == best
+
+
+def test_the_best_theta_is_told_in_words_too(finished, capsys):
+    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", "best"]) == 0
+    assert "the others are held at the study's best θ: delay=" in " ".join(capsys.readouterr().out.split())
+
+
+def test_nominal_holds_the_robots_own_values_also_when_the_study_is_finished(finished, capsys):
+    assert main(["sweep", str(finished), "--parameter", "trim", "--points", "2", "--at", "nominal", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["at"] == {"chosen": "nominal", "theta": {}}
+    assert document["curves"][0]["base"] == {}
+
+
+def test_a_study_that_has_not_run_is_swept_at_nominal_values(make_study, capsys):
+    assert main(["sweep", str(make_study()), "--parameter", "trim", "--points", "2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["at"] == {"chosen": "nominal", "theta": {}}
+
+
+def test_a_study_that_was_changed_since_has_no_best_theta_but_nominal_values(finished, make_study, capsys):
+    make_study(seed="2")
+    arguments = ["sweep", str(finished), "--parameter", "trim", "--points", "2"]
+    assert main(arguments) == 2
+    assert "changed since the first trial: seed (was 1)" in (told := capsys.readouterr().err)
+    assert told.endswith("or hold other values: --at nominal\n")
+    assert main([*arguments, "--at", "nominal"]) == 0
+
+
 def test_a_base_is_read_from_pairs_or_from_a_model(tmp_path):
     assert read_base(None) == {}
     assert read_base("trim=0.1, delay=2e-1") == {"trim": 0.1, "delay": 0.2}
@@ -93,6 +129,10 @@ BAD = {
     "a family that cannot replay": (
         ["--parameter", "trim", "--target-model", __file__],
         "wobbly:wobbly has no `drive` and `replay`",
+    ),
+    "the best of a study that has not run": (
+        ["--parameter", "trim", "--at", "best"],
+        "has no finished trial; run it first (python -m proxytune study",
     ),
     "one point": (["--parameter", "trim", "--points", "1"], "--points must be between 2 and"),
 }

@@ -1,0 +1,86 @@
+"""`export`: what was found, written to a URDF, a MuJoCo model or ROS parameters."""
+
+import argparse
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from rich.text import Text
+
+from proxytune.api.studies import read_study
+from proxytune.cli.terminal.answer import Answer
+from proxytune.driving.lane_following import LaneFollowing
+from proxytune.driving.robot import Robot, read_robot, robot_from_geometry, robot_names
+from proxytune.effects import Catalogue, Model, read_model
+from proxytune.errors import InputError
+from proxytune.report.export.instance import Instance, Line, lines_of
+from proxytune.report.export.mjcf import mjcf_text
+from proxytune.report.export.places import FORMATS
+from proxytune.report.export.ros import ros_text
+from proxytune.report.export.urdf import urdf_text
+from proxytune.report.writing import write_text
+
+WRITERS: Mapping[str, Callable[[Instance], str]] = {"urdf": urdf_text, "mjcf": mjcf_text, "ros": ros_text}
+NO_RATE_HZ = 20.0
+"""A robot without a folder has no rate of control; none of the formats states one."""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add what is exported, as what, and where to."""
+    parser.add_argument("model", type=Path, metavar="MODEL", help="a model.toml, or a study's folder: its best θ")
+    parser.add_argument("--to", required=True, choices=FORMATS, help="URDF, MuJoCo model or ROS 2 parameters")
+    parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="the file to write")
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Write the file, and say what went where and what has no place."""
+    instance = _of_study(arguments.model) if arguments.model.is_dir() else _of_model(arguments.model)
+    text, lines = WRITERS[arguments.to](instance), lines_of(instance, arguments.to)
+    write_text(arguments.output, text)
+    document = {
+        "output": str(arguments.output),
+        "to": arguments.to,
+        "robot": instance.robot.name,
+        "written": [_row(line) for line in lines if line.place],
+        "no_place": [_row(line) for line in lines if not line.place],
+    }
+    return Answer(document, Text("\n".join([*map(str, lines), str(arguments.output)])))
+
+
+def _row(line: Line) -> dict[str, object]:
+    interval = list(line.interval) if line.interval else None
+    return {
+        "name": line.name,
+        "value": line.value,
+        "interval": interval,
+        "unit": line.unit,
+        "place": line.place or None,
+    }
+
+
+def _of_model(path: Path) -> Instance:
+    """What a model.toml says; its robot and its own effects are looked for in the current folder."""
+    catalogue = Catalogue(Path.cwd())
+    model = read_model(path, catalogue)
+    robot = _robot(model, catalogue, path)
+    return Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path))
+
+
+def _robot(model: Model, catalogue: Catalogue, path: Path) -> Robot:
+    if model.robot in robot_names(catalogue.folder):
+        return read_robot(model.robot, catalogue.folder)
+    if not model.geometry:
+        raise InputError(
+            f"{path}: its robot '{model.robot}' is unknown here; go to the folder that {model.robot} lies in"
+        )
+    return robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
+
+
+def _of_study(folder: Path) -> Instance:
+    """The best θ of a study, with its 95 % intervals."""
+    result = read_study(folder).result
+    family, region = result.study.family, result.knowledge
+    if not isinstance(family, LaneFollowing):
+        raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
+    robot = read_robot(family.robot, family.folder)
+    theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
+    return Instance(robot, theta, dict(region.intervals), f"the best θ of the study {result.study.settings.name}")

@@ -1,0 +1,119 @@
+"""`new`: a robot, study or family to start from."""
+
+import argparse
+import os
+import shutil
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+
+from rich.text import Text
+
+from proxytune.cli.terminal.answer import Answer
+from proxytune.driving.robot import read_robot, robot_names
+from proxytune.errors import InputError, RunError
+from proxytune.skeletons.family import family_skeleton
+from proxytune.skeletons.given_urdf import robot_from_urdf
+from proxytune.skeletons.robot import robot_skeleton
+from proxytune.skeletons.skeleton import Skeleton
+from proxytune.skeletons.study import study_skeleton
+
+KINDS = ("robot", "study", "family")
+
+NARROW = 76
+"""Columns of a terminal that are left beside what commands are indented by."""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add what is new, its name, and what is known of it."""
+    parser.add_argument("kind", choices=KINDS, help="what to start")
+    parser.add_argument("name", metavar="NAME", help="its name, and that of its folder in the current one")
+    parser.add_argument(
+        "--figures",
+        metavar="NAME=VALUE,…",
+        help="of a robot: what you know, as wheel_radius=0.033,wheel_distance=0.16,full_speed=0.5,"
+        "motor_time_constant=0.1,camera_height=0.11,camera_pitch=20 (m, m/s, s, deg)",
+    )
+    parser.add_argument(
+        "--urdf", type=Path, metavar="FILE", help="of a robot: its URDF; wheels, mass and camera are read"
+    )
+    parser.add_argument("--robot", metavar="ROBOT", help="of a study: the robot that drives in it [duckiebot]")
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Write the skeleton's folder."""
+    folder = Path(arguments.name)
+    if folder.exists():
+        raise InputError(f"{folder}: is there already; choose another name, or move it away")
+    _check(arguments)
+    skeleton = _skeleton(arguments)
+    write_folder(folder, skeleton)
+    files = [str(folder / name) for name in skeleton.files]
+    document = {"kind": arguments.kind, "files": files, "notes": list(skeleton.notes), "next": list(skeleton.next)}
+    lines = [*files, *skeleton.notes, "next:", *map(pasteable, skeleton.next)]
+    return Answer(document, Text("\n".join(lines)))
+
+
+def pasteable(command: str) -> str:
+    """A command that a narrow terminal leaves whole: broken before an option, as a shell reads it."""
+    if len(command) <= NARROW or " --" not in command:
+        return f"  {command}"
+    before, _, options = command.partition(" --")
+    return f"  {before} \\\n      --{options}"
+
+
+def write_folder(folder: Path, skeleton: Skeleton) -> None:
+    """Write all files of a skeleton, or none.
+
+    Raises:
+        RunError: If they cannot be written.
+    """
+    draft = folder.with_name(f".{folder.name}.{os.getpid()}")
+    try:
+        draft.mkdir()
+        for name, text in skeleton.files.items():
+            (draft / name).write_text(text, encoding="utf-8", newline="\n")
+        draft.rename(folder)
+    except OSError as problem:
+        with suppress(OSError):
+            shutil.rmtree(draft)
+        raise RunError(f"{folder}: cannot be written ({problem.strerror}); choose another place") from None
+
+
+def read_figures(text: str | None) -> dict[str, float]:
+    """Figures from NAME=VALUE pairs.
+
+    Raises:
+        InputError: If the text is something else.
+    """
+    pairs = [pair.partition("=") for pair in text.split(",")] if text else []
+    try:
+        return {name.strip(): float(value) for name, _, value in pairs}
+    except ValueError:
+        raise InputError(f"--figures {text}: write NAME=VALUE,NAME=VALUE with numbers") from None
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    name, kind = arguments.name, arguments.kind
+    if not (name.isascii() and name.replace("-", "_").isidentifier()):
+        raise InputError(f"'{name}': a name has letters, digits, _ and -, and begins with a letter; it is no path")
+    if kind == "family" and "-" in name:
+        raise InputError(f"'{name}': a family is a Python module; write _ for -")
+    if kind == "family" and find_spec(name) is not None:
+        raise InputError(f"'{name}': a Python module of this name is installed; choose another name")
+    if kind == "robot" and name in robot_names():
+        raise InputError(f"'{name}': a robot of this name comes with proxytune; choose another name")
+    for option, of in (("figures", "robot"), ("urdf", "robot"), ("robot", "study")):
+        if getattr(arguments, option) is not None and kind != of:
+            raise InputError(f"--{option}: is for `new {of}`; leave it out")
+
+
+def _skeleton(arguments: argparse.Namespace) -> Skeleton:
+    if arguments.kind == "family":
+        return family_skeleton(arguments.name)
+    if arguments.kind == "study":
+        return study_skeleton(arguments.name, read_robot(arguments.robot or "duckiebot", Path.cwd()))
+    figures = read_figures(arguments.figures)
+    if arguments.urdf is not None:
+        return robot_from_urdf(arguments.name, arguments.urdf, figures)
+    return robot_skeleton(arguments.name, figures)

@@ -1,0 +1,182 @@
+"""What a URDF says of a robot that drives on two wheels: where they are, how large, and how heavy it is."""
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.driving.robot import Robot
+from proxytune.errors import SettingsError
+
+AXLES = ("axle_left", "axle_right")
+"""How the bullet plant calls the joints that it drives."""
+
+AGREES = 0.01
+"""How far, relatively, a URDF may be from robot.toml."""
+
+ACROSS = 0.9
+"""An axle points to the left, or to the right, by so much of its length."""
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A driven wheel.
+
+    Attributes:
+        joint: Name of its joint.
+        centre: Where it is in the root link's frame (3,) [m].
+        axis: Direction of its axle there (3,).
+        radius_m: Its radius [m]; None where its geometry is a mesh.
+        effort: The most that its motor gives [N m]; 0 where that is not said.
+    """
+
+    joint: str
+    centre: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    radius_m: float | None
+    effort: float
+
+
+@dataclass(frozen=True)
+class Body:
+    """A URDF's two driven wheels, its mass and its camera.
+
+    Attributes:
+        left: The left wheel.
+        right: The right wheel.
+        mass_kg: Of all its links [kg].
+        camera: The pose of a link called camera in the root link's frame (4, 4); None where there is none.
+    """
+
+    left: Wheel
+    right: Wheel
+    mass_kg: float
+    camera: NDArray[np.float64] | None
+
+    @property
+    def wheel_distance(self) -> float:
+        """Between the wheels' centres, across the robot [m]."""
+        return float(self.left.centre[1] - self.right.centre[1])
+
+
+def parse_urdf(path: Path) -> ET.Element:
+    """The root element of a URDF.
+
+    Raises:
+        SettingsError: If it cannot be read or is no URDF.
+    """
+    try:
+        root = ET.fromstring(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as problem:
+        raise SettingsError(f"{path}: cannot be read ({problem}); check the path") from None
+    except ET.ParseError as problem:
+        raise SettingsError(f"{path}: is not XML ({problem}); of a .xacro file make a URDF first") from None
+    if root.tag != "robot" or root.find("link") is None:
+        raise SettingsError(f"{path}: is no URDF: it needs <robot> with links; got <{root.tag}>")
+    return root
+
+
+def read_body(root: ET.Element, path: Path) -> Body:
+    """What a URDF says of its wheels, mass and camera.
+
+    Raises:
+        SettingsError: If its two driven wheels cannot be told, or a number in it is none.
+    """
+    try:
+        return _read_body(root, path)
+    except (ValueError, RecursionError) as problem:
+        raise SettingsError(f"{path}: is no sound URDF ({problem}); correct it") from None
+
+
+def _read_body(root: ET.Element, path: Path) -> Body:
+    wheels = [_wheel(root, joint) for joint in root.iter("joint") if joint.get("type") == "continuous"]
+    across = [wheel for wheel in wheels if abs(wheel.axis[1]) > ACROSS]
+    named = [wheel for wheel in across if wheel.joint in AXLES]
+    pair = sorted(named or across, key=lambda wheel: -wheel.centre[1])
+    if len(pair) != 2 or pair[0].centre[1] <= pair[1].centre[1]:
+        found = ", ".join(wheel.joint for wheel in across) or "none"
+        remedy = f"call the two driven joints {' and '.join(AXLES)}"
+        raise SettingsError(f"{path}: the axles must be two continuous joints, left and right; found {found}; {remedy}")
+    masses = (float(mass.get("value", 0.0)) for mass in root.findall("link/inertial/mass"))
+    camera = next((name for name in _links(root) if "camera" in name and "optical" not in name), None)
+    return Body(pair[0], pair[1], sum(masses), link_pose(root, camera) if camera else None)
+
+
+def _links(root: ET.Element) -> list[str]:
+    return [link.get("name", "") for link in root.iter("link")]
+
+
+def link_pose(root: ET.Element, link: str) -> NDArray[np.float64]:
+    """Pose (4, 4) of a link in the root link's frame, every joint at 0."""
+    for joint in root.iter("joint"):
+        child, parent = joint.find("child"), joint.find("parent")
+        if child is not None and parent is not None and child.get("link") == link:
+            return link_pose(root, parent.get("link", "")) @ origin_of(joint)
+    return np.eye(4)
+
+
+def add_little_mass(link: ET.Element) -> None:
+    """Give a link without mass a gram: PyBullet would give it a kilogram."""
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "mass", value="0.001")
+    ET.SubElement(inertial, "inertia", ixx="1e-7", ixy="0", ixz="0", iyy="1e-7", iyz="0", izz="1e-7")
+
+
+def origin_of(element: ET.Element) -> NDArray[np.float64]:
+    """The transform (4, 4) of an element's <origin>, roll first, then pitch, then yaw."""
+    origin = element.find("origin")
+    xyz, rpy = ((origin.get(key, "0 0 0") if origin is not None else "0 0 0").split() for key in ("xyz", "rpy"))
+    roll, pitch, yaw = (float(angle) for angle in rpy)
+    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
+    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = about_z @ about_y @ about_x, [float(value) for value in xyz]
+    return pose
+
+
+def check_body(robot: Robot) -> None:
+    """Refuse a URDF whose wheels are not those of robot.toml: the bullet plant would drive at another speed.
+
+    Raises:
+        SettingsError: If they differ, or its axles are not called as the plant calls them.
+    """
+    path = robot.body()
+    body = read_body(parse_urdf(path), path)
+    for wheel, name in zip((body.left, body.right), AXLES, strict=True):
+        if wheel.joint != name or wheel.axis[1] < 0.0:
+            said = f"joint '{wheel.joint}' must be called {name}"
+            raise SettingsError(f"{path.name}: {said}, and its axis must point to the left (0 1 0)")
+    for figure, value in _figures(body):
+        if abs(value - robot.figures[figure]) > AGREES * robot.figures[figure]:
+            said = f"has the {figure} {value:g} m, robot.toml says {robot.figures[figure]:g} m"
+            raise SettingsError(f"{path.name}: {said}; correct the one that is wrong")
+
+
+def _figures(body: Body) -> Iterator[tuple[str, float]]:
+    yield from (("wheel_radius", wheel.radius_m) for wheel in (body.left, body.right) if wheel.radius_m is not None)
+    yield "wheel_distance", body.wheel_distance
+
+
+def _wheel(root: ET.Element, joint: ET.Element) -> Wheel:
+    child, axis, limit = joint.find("child"), joint.find("axis"), joint.find("limit")
+    link = child.get("link", "") if child is not None else ""
+    direction = np.array([float(v) for v in (axis.get("xyz", "1 0 0") if axis is not None else "1 0 0").split()])
+    pose = link_pose(root, link)
+    effort = float(limit.get("effort", 0.0)) if limit is not None else 0.0
+    turned = pose[:3, :3] @ (direction / np.linalg.norm(direction))
+    return Wheel(joint.get("name", ""), pose[:3, 3], turned, _radius(root, link), effort)
+
+
+def _radius(root: ET.Element, link: str) -> float | None:
+    """Of what the wheel collides as, else of what it looks like."""
+    for part in ("collision", "visual"):
+        for shape in ("sphere", "cylinder"):
+            found = root.find(f"link[@name='{link}']/{part}/geometry/{shape}")
+            if found is not None:
+                return float(found.get("radius", 0.0))
+    return None

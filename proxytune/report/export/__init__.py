@@ -1,0 +1,1 @@
+"""What was found, written for other simulators and for the robot: URDF, MJCF and ROS parameters."""

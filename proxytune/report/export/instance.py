@@ -1,0 +1,144 @@
+"""A domain instance in the figures that other simulators take: wheels, motors, camera and the tracked point."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from proxytune.driving.cameras import CameraFigures
+from proxytune.driving.mounting import mounted_camera
+from proxytune.driving.robot import CAMERA, Robot
+from proxytune.effects import Effect, effect_of, effects_from
+from proxytune.effects.motors.power import SMALLEST_LIMIT
+from proxytune.errors import InputError
+from proxytune.report.export.places import place_of
+from proxytune.space import Theta
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """What is to be written.
+
+    Attributes:
+        robot: The robot.
+        theta: Every value that is not nominal by definition: the robot's own effects, and what was found.
+        intervals: Of those values that have one.
+        source: Where the values come from.
+    """
+
+    robot: Robot
+    theta: Theta
+    intervals: Mapping[str, Pair]
+    source: str
+
+    @property
+    def effects(self) -> Mapping[str, Effect]:
+        """The effects by name."""
+        chosen = effects_from(self.theta, self.robot.figures, self.robot.catalogue)
+        return {effect.name: effect for effect in chosen}
+
+    def value(self, effect: str, parameter: str, otherwise: float) -> float:
+        """A parameter of an effect; otherwise where the instance does not have that effect."""
+        found = self.effects.get(effect)
+        return otherwise if found is None else float(getattr(found, parameter))
+
+    def figure(self, name: str) -> float:
+        """A figure of the robot.
+
+        Raises:
+            InputError: If the robot does not state it.
+        """
+        if name not in self.robot.figures:
+            raise InputError(f"robot '{self.robot.name}' states no {name}; add it to its robot.toml")
+        return self.robot.figures[name]
+
+    @property
+    def gains(self) -> Pair:
+        """How much faster than nominal the left and right wheels turn."""
+        trim = self.value("trim", "trim", 0.0)
+        left, right = (self.value("wheel_gain", side, 1.0) for side in ("left", "right"))
+        return left * (1.0 - trim), right * (1.0 + trim)
+
+    @property
+    def limits(self) -> Pair:
+        """The duties beyond which the left and right wheels turn no faster."""
+        lost, imbalance = 1.0 - self.value("saturation", "limit", 1.0), self.value("saturation", "imbalance", 0.0)
+        left, right = (max(SMALLEST_LIMIT, 1.0 - lost * (1.0 + side * imbalance)) for side in (-1.0, 1.0))
+        return left, right
+
+    @property
+    def lags_s(self) -> Pair:
+        """Time constants of the left and right motors [s]."""
+        time, imbalance = self.value("motor_lag", "time_constant", 0.0), self.value("motor_lag", "imbalance", 0.0)
+        return time * (1.0 - imbalance), time * (1.0 + imbalance)
+
+    @property
+    def baseline_m(self) -> float:
+        """How far apart the wheels are as the turn rate shows it [m]."""
+        return self.value("yaw_scrub", "baseline", self.figure("effective_baseline"))
+
+    @property
+    def camera(self) -> CameraFigures | None:
+        """The camera with all effects; None where the robot has none."""
+        if not set(CAMERA) <= set(self.robot.figures):
+            return None
+        return mounted_camera(self.robot, self.effects.values())
+
+    @property
+    def tracked_point(self) -> tuple[float, float, float] | None:
+        """Where the tracked point is ahead of the axle's middle and to its left [m], and how it is turned [rad]."""
+        if not {"marker_offset", "heading_offset"} & set(self.effects):
+            return None
+        forward, left = (self.value("marker_offset", name, 0.0) for name in ("forward", "left"))
+        return forward, left, float(np.radians(self.value("heading_offset", "angle", 0.0)))
+
+
+@dataclass(frozen=True)
+class Line:
+    """What becomes of one value.
+
+    Attributes:
+        name: Its name in θ.
+        value: The value.
+        unit: Its unit.
+        interval: Its interval, if it has one.
+        place: Where it went; empty where it has no place.
+    """
+
+    name: str
+    value: float
+    unit: str
+    interval: Pair | None
+    place: str
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        interval = f" ({self.interval[0]:.4g} to {self.interval[1]:.4g})" if self.interval else ""
+        return f"{self.name} {self.value:.4g}{unit}{interval}: {self.place or 'NO PLACE, not in this file'}"
+
+
+def lines_of(instance: Instance, form: str) -> list[Line]:
+    """What becomes of every value in a format; those that are neutral need no place."""
+    parameters = instance.robot.catalogue.parameters
+    lines = []
+    for name, value in sorted(instance.theta.items()):
+        parameter, place = parameters.get(name), place_of(effect_of(name), form)
+        if place or parameter is None or isinstance(parameter.neutral, str) or value != parameter.neutral:
+            unit = parameter.unit if parameter else ""
+            lines.append(Line(name, value, unit, instance.intervals.get(name), place))
+    return lines
+
+
+def header(instance: Instance, form: str) -> list[str]:
+    """What the head of a file says: whose values they are, where each went, and what is not in it."""
+    found = lines_of(instance, form)
+    placed, left_out = [line for line in found if line.place], [line for line in found if not line.place]
+    return [
+        f"{instance.robot.name} as proxytune found it: {instance.source}",
+        *(["Written into this file:"] if placed else []),
+        *(f"  {line}" for line in placed),
+        *(["NOT in this file, which has no place for it:"] if left_out else []),
+        *(f"  {line}" for line in left_out),
+    ]

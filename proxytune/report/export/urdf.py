@@ -1,0 +1,107 @@
+"""A robot's URDF with what was found of its wheels, its camera and the tracked point."""
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.driving.body import AXLES, add_little_mass, link_pose, origin_of, parse_urdf, read_body
+from proxytune.driving.cameras import orientation
+from proxytune.report.export.instance import Instance, header
+
+Pose = NDArray[np.float64]
+
+
+def urdf_text(instance: Instance) -> str:
+    """A URDF of a domain instance: a literal differential drive in it turns and pulls as was found.
+
+    A wheel that turns faster than nominal is a larger one; wheels stand as far apart as the turn rate shows it.
+
+    Raises:
+        SettingsError: If the robot has no URDF, or its axles are not to be found there.
+    """
+    path = instance.robot.body()
+    root = parse_urdf(path)
+    read_body(root, path)
+    for side, (axle, gain, limit) in enumerate(zip(AXLES, instance.gains, instance.limits, strict=True)):
+        joint = next(one for one in root.iter("joint") if one.get("name") == axle)
+        _set_wheel(root, joint, (0.5 - side) * instance.baseline_m, instance.figure("wheel_radius"), gain)
+        top_speed = limit * instance.figure("full_speed") / instance.figure("wheel_radius")
+        _part(joint, "limit", effort="0").set("velocity", f"{top_speed:.6g}")
+    if (camera := instance.camera) is not None:
+        pose = _pose(orientation(camera), (camera.forward_m, 0.0, camera.height_m))
+        _mount(root, "camera", "camera_mount", pose)
+    if (tracked := instance.tracked_point) is not None:
+        forward, left, angle = tracked
+        cosine, sine = math.cos(angle), math.sin(angle)
+        turned = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+        _mount(root, "tracked_point", "tracked_point_mount", _pose(turned, (forward, left, 0.0)))
+    ET.indent(root)
+    comment = "\n     ".join(header(instance, "urdf")).replace("--", "- -")
+    return f'<?xml version="1.0"?>\n<!-- {comment} -->\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: float, gain: float) -> None:
+    """Give a wheel its place and its radius; it goes on touching the floor."""
+    parent, link = _link(joint, "parent"), _link(joint, "child")
+    above = link_pose(root, parent)
+    centre = link_pose(root, link)
+    centre[1, 3] = left_m
+    centre[2, 3] += (gain - 1.0) * radius_m
+    _set_origin(joint, np.linalg.inv(above) @ centre)
+    for shape in root.find(f"link[@name='{link}']") or ():
+        for kind in ("sphere", "cylinder"):
+            for geometry in shape.iterfind(f"geometry/{kind}"):
+                geometry.set("radius", f"{gain * float(geometry.get('radius', radius_m)):.9g}")
+
+
+def _mount(root: ET.Element, link: str, mount: str, pose: Pose) -> None:
+    """Fix a link to the robot at a pose in the root link's frame; where there is none of that name, add it."""
+    joints = [one for one in root.iter("joint") if _link(one, "child") == link]
+    if joints:
+        _set_origin(joints[0], np.linalg.inv(link_pose(root, _link(joints[0], "parent"))) @ pose)
+        return
+    add_little_mass(ET.SubElement(root, "link", name=link))
+    joint = ET.SubElement(root, "joint", name=mount, type="fixed")
+    ET.SubElement(joint, "parent", link=_root_link(root))
+    ET.SubElement(joint, "child", link=link)
+    _set_origin(joint, pose)
+
+
+def _root_link(root: ET.Element) -> str:
+    children = {_link(joint, "child") for joint in root.iter("joint")}
+    return next(name for name in (link.get("name", "") for link in root.findall("link")) if name not in children)
+
+
+def _set_origin(joint: ET.Element, pose: Pose) -> None:
+    """Write a pose as xyz and rpy, unless it is the one that stands there."""
+    if np.allclose(origin_of(joint), pose, atol=1e-12):
+        return
+    roll = math.atan2(pose[2, 1], pose[2, 2])
+    pitch = math.asin(max(-1.0, min(1.0, -pose[2, 0])))
+    yaw = math.atan2(pose[1, 0], pose[0, 0])
+    origin = _part(joint, "origin")
+    origin.set("xyz", _numbers(pose[:3, 3]))
+    origin.set("rpy", _numbers((roll, pitch, yaw)))
+
+
+def _part(element: ET.Element, tag: str, **otherwise: str) -> ET.Element:
+    found = element.find(tag)
+    return ET.SubElement(element, tag, otherwise) if found is None else found
+
+
+def _link(joint: ET.Element, end: str) -> str:
+    found = joint.find(end)
+    return "" if found is None else found.get("link", "")
+
+
+def _pose(rotation: Pose, place: tuple[float, float, float]) -> Pose:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, place
+    return pose
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{round(float(value), 12) + 0.0:.9g}" for value in values)

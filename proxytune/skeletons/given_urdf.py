@@ -1,0 +1,150 @@
+"""A robot from a URDF that there is already: read, and made as the bullet plant drives it."""
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.driving.body import AXLES, Body, add_little_mass, origin_of, parse_urdf, read_body
+from proxytune.errors import InputError
+from proxytune.skeletons.robot import Known, check_figures, completed, robot_text, then
+from proxytune.skeletons.skeleton import Skeleton
+
+
+def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float]) -> Skeleton:
+    """A robot.toml with what a URDF says, and that URDF with its axles and origin as the bullet plant has them.
+
+    Args:
+        name: Of the robot and its folder.
+        path: The URDF.
+        figures: What the user states; it goes before what the URDF says, save for the wheels.
+
+    Raises:
+        InputError: If its wheels cannot be told.
+    """
+    check_figures(figures)
+    root = parse_urdf(path)
+    _drop_empty_roots(root, path)
+    body = read_body(root, path)
+    radius = _radius(body, figures, path)
+    read = _figures(body, radius)
+    notes = tuple(_conform(root, body, radius))
+    known = (Known(read, f"read from {path.name}"), Known(figures, "given to `new robot`"))
+    values = completed({**figures, **read})
+    ET.indent(root)
+    urdf = ET.tostring(root, encoding="unicode") + "\n"
+    said = ", ".join(f"{figure} {value:.4g}" for figure, value in read.items())
+    lines = (f"read from {path.name}: {said}", *notes, "what a URDF cannot know is marked EDIT in robot.toml")
+    return Skeleton({"robot.toml": robot_text(name, values, known), f"{name}.urdf": urdf}, then(name), lines)
+
+
+def _radius(body: Body, figures: Mapping[str, float], path: Path) -> float:
+    radius = body.left.radius_m or body.right.radius_m or figures.get("wheel_radius")
+    if not radius:
+        raise InputError(f"{path}: its wheels are meshes; state their radius: --figures wheel_radius=METRES")
+    return radius
+
+
+def _figures(body: Body, radius: float) -> dict[str, float]:
+    """The figures that a URDF states; the camera's from its pose, the lens looking along its x axis."""
+    read = {"wheel_radius": radius, "wheel_distance": body.wheel_distance}
+    read |= {"mass": body.mass_kg} if body.mass_kg > 0.0 else {}
+    read |= {"wheel_torque": body.left.effort} if body.left.effort > 0.0 else {}
+    if body.camera is None:
+        return read
+    origin, place, looks = _origin(body, radius), body.camera[:3, 3], body.camera[:3, 0]
+    pitch = max(0.0, math.degrees(math.asin(max(-1.0, min(1.0, -looks[2])))))
+    forward, height = max(0.0, place[0] - origin[0]), place[2] - origin[2]
+    return read | ({"camera_forward": forward, "camera_height": height, "camera_pitch": pitch} if height > 0.0 else {})
+
+
+def _origin(body: Body, radius: float) -> NDArray[np.float64]:
+    """The middle of the axle, on the floor, in the root link's frame (3,) [m]."""
+    origin: NDArray[np.float64] = (body.left.centre + body.right.centre) / 2.0 - (0.0, 0.0, radius)
+    return origin
+
+
+def _conform(root: ET.Element, body: Body, radius: float) -> Iterator[str]:
+    """Make the URDF what the bullet plant drives; says what was changed."""
+    yield from _name_axles(root, body)
+    shift = _origin(body, radius)
+    if np.abs(shift).max() > 1e-9:
+        _move(root, shift)
+        yield f"the origin is now the middle of the axle, on the floor: moved by {_text(shift)} m"
+    yield from _complete_links(root)
+    yield "if an episode ends at once, the root link touches the floor: make its casters links of their own"
+
+
+def _name_axles(root: ET.Element, body: Body) -> Iterator[str]:
+    """Call the axles as the plant does, and let them point to the left."""
+    for wheel, name in zip((body.left, body.right), AXLES, strict=True):
+        joint = next(one for one in root.iter("joint") if one.get("name") == wheel.joint)
+        joint.set("name", name)
+        axis = joint.find("axis")
+        if wheel.axis[1] < 0.0 and axis is not None:
+            axis.set("xyz", _text(-float(value) for value in axis.get("xyz", "1 0 0").split()))
+        if wheel.joint != name:
+            yield f"joint {wheel.joint} is now called {name}"
+
+
+def _complete_links(root: ET.Element) -> Iterator[str]:
+    """Take out what nothing draws, and give every link a mass."""
+    left_out = [_drop_meshes(link) for link in root.iter("link")]
+    if any(left_out):
+        yield f"{sum(left_out)} meshes of its looks are left out: nothing draws them"
+    without = [link for link in root.iter("link") if link.find("inertial") is None]
+    for link in without:
+        add_little_mass(link)
+    if without:
+        yield f"links without mass have 1 g now: {', '.join(link.get('name', '') for link in without)}"
+    if root.find("link/collision/geometry/mesh") is not None:
+        yield "EDIT: write boxes, cylinders or spheres for the meshes under <collision>: they are not found here"
+
+
+def _drop_meshes(link: ET.Element) -> int:
+    """Take out what a link looks like where that is a mesh; says how many there were."""
+    meshes = [visual for visual in link.findall("visual") if visual.find("geometry/mesh") is not None]
+    for visual in meshes:
+        link.remove(visual)
+    return len(meshes)
+
+
+def _drop_empty_roots(root: ET.Element, path: Path) -> None:
+    """Take out root links without mass (as base_footprint): PyBullet would give them 1 kg."""
+    while True:
+        children = {child.get("link") for child in root.findall("joint/child")}
+        link = next((one for one in root.findall("link") if one.get("name") not in children), None)
+        if link is None:
+            raise InputError(f"{path}: has no root link: its joints go round in a circle; correct it")
+        below = [one for one in root.findall("joint") if _parent(one) == link.get("name")]
+        if link.find("inertial") is not None or len(below) != 1 or below[0].get("type") != "fixed":
+            return
+        if not np.allclose(origin_of(below[0])[:3, :3], np.eye(3)):
+            raise InputError(f"{path}: joint '{below[0].get('name')}' turns the robot; write its URDF with x forward")
+        root.remove(link)
+        root.remove(below[0])
+
+
+def _move(root: ET.Element, shift: NDArray[np.float64]) -> None:
+    """Move the root link's origin: everything that hangs on it moves the other way."""
+    children = {child.get("link") for child in root.findall("joint/child")}
+    link = next(one for one in root.findall("link") if one.get("name") not in children)
+    parts = [part for kind in ("inertial", "visual", "collision") for part in link.findall(kind)]
+    for element in (*parts, *(one for one in root.findall("joint") if _parent(one) == link.get("name"))):
+        origin = element.find("origin")
+        if origin is None:
+            origin = ET.SubElement(element, "origin")
+        before = np.array([float(value) for value in origin.get("xyz", "0 0 0").split()])
+        origin.set("xyz", _text(before - shift))
+
+
+def _parent(joint: ET.Element) -> str | None:
+    parent = joint.find("parent")
+    return None if parent is None else parent.get("link")
+
+
+def _text(values: Iterator[float] | NDArray[np.float64]) -> str:
+    return " ".join(f"{float(value) + 0.0:.9g}" for value in values)

@@ -1,0 +1,101 @@
+"""`export` writes a model.toml or a study's answer, and says what has no place."""
+
+import json
+
+import pytest
+
+from proxytune.cli.main import main
+
+MODEL = """format = 1
+robot = "duckiebot"
+[effects.trim]
+trim = { value = 0.05, interval = [0.04, 0.06] }
+[effects.dead_band]
+width = { value = 0.06, interval = [0.05, 0.07], unit = "duty" }
+"""
+GEOMETRY = """format = 1
+robot = "nobodys"
+[geometry]
+wheel_radius_m = 0.05
+baseline_m = 0.3
+full_speed_m_s = 1.0
+[effects.wheel_gain]
+left = 0.95
+"""
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(MODEL)
+    return path
+
+
+@pytest.mark.parametrize("form", ["urdf", "mjcf", "ros"])
+def test_every_value_is_told_with_its_place_or_that_it_has_none(model, tmp_path, capsys, form):
+    output = tmp_path / "out" / "robot.txt"
+    arguments = ["export", str(model), "--to", form, "--output", str(output)]
+    assert main([*arguments, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert {
+        "name": "dead_band.width",
+        "value": 0.06,
+        "interval": [0.05, 0.07],
+        "unit": "duty",
+        "place": None,
+    } in document["no_place"]
+    assert [line["interval"] for line in document["written"] if line["name"] == "trim"] == [[0.04, 0.06]]
+    assert "dead_band.width 0.06 duty (0.05 to 0.07): NO PLACE" in output.read_text()
+    assert main(arguments) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "dead_band.width 0.06 duty (0.05 to 0.07): NO PLACE, not in this file" in told
+
+
+def test_the_best_theta_of_a_study_is_exported_with_its_intervals(make_study, tmp_path, capsys):
+    folder = make_study(
+        family=None,
+        agents='["steady", "daredevil"]',
+        metrics='["distance:max"]',
+        starts="1",
+        budget="3",
+        initial="3",
+        engine='"sobol"',
+        domain={"plant": '"planar"', "seconds": "2"},
+    )
+    (folder / "target.csv").write_text("agent,episode,distance\nsteady,0,0.2\ndaredevil,0,0.5\n")
+    assert main(["study", str(folder), "--json"]) == 0
+    best = json.loads(capsys.readouterr().out)["best"]["theta"]
+    arguments = ["export", str(folder), "--to", "ros", "--output", str(tmp_path / "robot.yaml"), "--json"]
+    assert main(arguments) == 0
+    document = json.loads(capsys.readouterr().out)
+    values = {line["name"]: line for line in (*document["written"], *document["no_place"])}
+    assert {name: values[name]["value"] for name in best} == best
+    assert len(values["trim"]["interval"]) == 2
+    assert values["motor_lag.time_constant"]["value"] == 0.2
+
+
+def test_a_study_of_another_simulator_is_refused(finished, tmp_path, capsys):
+    assert main(["export", str(finished), "--to", "ros", "--output", str(tmp_path / "robot.yaml")]) == 2
+    assert "is a study of another simulator" in capsys.readouterr().err
+    assert not (tmp_path / "robot.yaml").exists()
+
+
+def test_a_robot_without_a_folder_has_ros_parameters_but_no_body(tmp_path, capsys):
+    path, output = tmp_path / "model.toml", tmp_path / "robot.out"
+    path.write_text(GEOMETRY)
+    assert main(["export", str(path), "--to", "ros", "--output", str(output)]) == 0
+    assert "left_wheel_radius_multiplier: 0.95" in output.read_text()
+    output.unlink()
+    for form, expected in {"urdf": "has no body", "mjcf": "states no mass"}.items():
+        capsys.readouterr()
+        assert main(["export", str(path), "--to", form, "--output", str(output)]) == 2
+        assert expected in (said := capsys.readouterr().err)
+        assert said.count("\n") == 1
+        assert not output.exists()
+
+
+def test_an_unknown_robot_is_refused_with_where_it_is_looked_for(tmp_path, capsys):
+    path = tmp_path / "model.toml"
+    path.write_text('format = 1\nrobot = "rover"\n')
+    assert main(["export", str(path), "--to", "ros", "--output", str(tmp_path / "out.yaml")]) == 2
+    assert "its robot 'rover' is unknown here; go to the folder that rover lies in" in capsys.readouterr().err

@@ -1,0 +1,112 @@
+"""What a URDF says of its wheels, and that the bullet plant does not drive one that says otherwise than robot.toml."""
+
+import math
+import shutil
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from proxytune.driving.body import check_body, parse_urdf, read_body
+from proxytune.driving.family import lane_following
+from proxytune.driving.robot import read_robot, robot_names
+from proxytune.errors import SettingsError
+from proxytune.settings import Section
+from proxytune.shipped import shipped
+
+ROBOT = read_robot("duckiebot")
+TEXT = ROBOT.urdf.read_text(encoding="utf-8")
+
+
+def body_of(text):
+    return read_body(ET.fromstring(text), Path("robot.urdf"))
+
+
+def test_the_duckiebots_wheels_mass_and_camera_are_read():
+    body = body_of(TEXT)
+    assert (body.left.joint, body.right.joint) == ("axle_left", "axle_right")
+    assert (body.left.radius_m, body.wheel_distance) == pytest.approx((0.0318, 0.1))
+    assert body.left.effort == 0.08
+    assert body.mass_kg == pytest.approx(ROBOT.figures["mass"])
+    assert body.camera[:3, 3] == pytest.approx((0.066, 0.0, 0.108))
+    assert math.degrees(math.asin(-body.camera[2, 0])) == pytest.approx(ROBOT.figures["camera_pitch"], abs=1e-4)
+
+
+def test_turned_wheel_joints_and_fixed_joints_between_are_followed():
+    turned = TEXT.replace('xyz="0 0.05 0.0318"', 'xyz="0 0.05 0.0318" rpy="-1.5707963 0 0"')
+    turned = turned.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>', 1)
+    assert body_of(turned).left.axis == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+
+
+def test_of_more_wheels_those_called_axles_are_driven():
+    third = '<link name="w"/><joint name="rear" type="continuous"><parent link="chassis"/><child link="w"/>'
+    third += '<axis xyz="0 1 0"/></joint></robot>'
+    assert body_of(TEXT.replace("</robot>", third)).left.joint == "axle_left"
+    unnamed = TEXT.replace("axle_", "wheel_joint_").replace("</robot>", third)
+    with pytest.raises(
+        SettingsError, match="found wheel_joint_left, wheel_joint_right, rear; call the two driven joints"
+    ):
+        body_of(unnamed)
+
+
+BAD = {
+    "no file": (None, "cannot be read"),
+    "no XML": ("robot", "is not XML"),
+    "no URDF": ("<sdf/>", "is no URDF: it needs <robot> with links; got <sdf>"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_no_urdf_is_refused_in_a_line(tmp_path, case):
+    text, expected = BAD[case]
+    path = tmp_path / "robot.urdf"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(SettingsError, match=expected) as caught:
+        parse_urdf(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_words_for_numbers_are_refused_in_a_line():
+    with pytest.raises(SettingsError, match="is no sound URDF .*'wide'"):
+        body_of(TEXT.replace("0 0.05 0.0318", "0 wide 0.0318"))
+
+
+CHANGES = {
+    "another radius": ("0.0318", "0.04", r"has the wheel_radius 0.04 m, robot.toml says 0.0318 m; correct the one"),
+    "another distance": ("0 0.05 0.0318", "0 0.06 0.0318", "has the wheel_distance 0.11 m, robot.toml says 0.1 m"),
+    "another name": ("axle_left", "left_wheel_joint", "found left_wheel_joint, axle_right|must be called axle_left"),
+    "an axle to the right": ('<axis xyz="0 1 0"/>', '<axis xyz="0 -1 0"/>', "its axis must point to the left"),
+}
+
+
+@pytest.mark.parametrize("case", CHANGES)
+def test_a_urdf_that_disagrees_with_robot_toml_is_refused(tmp_path, case):
+    before, after, expected = CHANGES[case]
+    path = tmp_path / "robot.urdf"
+    path.write_text(TEXT.replace(before, after))
+    with pytest.raises(SettingsError, match=expected):
+        check_body(replace(ROBOT, urdf=path))
+
+
+def test_a_study_of_such_a_robot_is_refused_before_the_first_episode(tmp_path):
+    shutil.copytree(shipped("robots") / "duckiebot", tmp_path / "mine")
+    described = tmp_path / "mine" / "robot.toml"
+    described.write_text(
+        described.read_text().replace('"duckiebot"', '"mine"').replace("value = 0.0318", "value = 0.05")
+    )
+    section = Section(tmp_path / "study.toml", "domain.", {"robot": "mine"})
+    with pytest.raises(SettingsError, match=r"domain.robot: duckiebot.urdf: has the wheel_radius"):
+        lane_following(section, model=None)
+    planar = Section(tmp_path / "study.toml", "domain.", {"robot": "mine", "plant": "planar"})
+    assert lane_following(planar, model=None).plant == "planar"
+
+
+def test_a_robot_beside_the_studys_folder_is_its_robot_too(tmp_path):
+    shutil.copytree(shipped("robots") / "husky", tmp_path / "mine")
+    described = tmp_path / "mine" / "robot.toml"
+    described.write_text(described.read_text().replace('"husky"', '"mine"'))
+    (tmp_path / "study").mkdir()
+    assert "mine" in robot_names(tmp_path / "study")
+    assert read_robot("mine", tmp_path / "study").figures["wheel_radius"] == 0.165

@@ -66,7 +66,9 @@ def open_study(path: Path) -> Study:
     left_out = (f"the target has no scores of {', '.join(absent)}: left out",) if absent else ()
     cautions = (*left_out, *unnoticed(settings.folder))
     target, objective = read_target(known, family), objective_of(settings)
-    return Study(known, family, target, family.identity, _truth(settings), cautions, objective, _engine(settings))
+    return Study(
+        known, family, target, family.identity, _truth(settings, family), cautions, objective, _engine(settings)
+    )
 
 
 def _engine(settings: StudySettings) -> Engine:
@@ -102,12 +104,14 @@ def _with_scores(settings: StudySettings) -> StudySettings:
     return replace(settings, agents=there)
 
 
-def _truth(settings: StudySettings) -> Theta | None:
+def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:
     if settings.truth is None:
         return None
     if not settings.truth.is_file():
         raise settings.error("truth", f"no such file: {settings.truth}; check the path, or remove it")
-    known = read_model(settings.truth, Catalogue(settings.folder.resolve())).theta
+    # A family with parameters that are no effects reads them itself
+    own = getattr(family, "truth", None)
+    known = own(settings.truth) if own else read_model(settings.truth, Catalogue(settings.folder.resolve())).theta
     return {name: known[name] for name in settings.space.names if name in known}
 
 

@@ -44,6 +44,8 @@ def make_environment(settings: EnvironmentSettings, theta: Mapping[str, float]) 
         made = _make(library, settings, arguments)
     except ProxytuneError:
         raise
+    except ModuleNotFoundError as problem:
+        raise InputError(f"environment '{settings.environment}' needs {problem.name}; install it") from problem
     except Exception as problem:
         raise InputError(f"environment '{settings.environment}' raised {describe(problem)}; correct it") from problem
     if not isinstance(made, library.Env):
@@ -76,7 +78,7 @@ def _set(environment: Any, one: OwnParameter, value: float) -> None:
     except (AttributeError, IndexError, TypeError) as problem:
         raise _unset(one, f"cannot be reached ({describe(problem)}){_hint(environment, one)}") from None
     if isinstance(before, bool | np.bool_) or np.ndim(before) != 0 or not isinstance(before, int | float | np.number):
-        raise _unset(one, f"is {before!r}; name one number")
+        raise _unset(one, f"is {' '.join(repr(before).split())}; name one number")
     name, index = _name_and_index(last)
     if index is None:
         setattr(holder, name, value)

@@ -8,6 +8,7 @@ class Upright(gymnasium.Wrapper):
     """Adds to info whether the pole is within 20° of upright."""
 
     def step(self, action):
+        """What the environment answers, with `upright` in info."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         return observation, reward, terminated, truncated, {**info, "upright": float(observation[0] > 0.94)}
 
@@ -24,6 +25,7 @@ class Swinger:
         self.pump, self.stiffness, self.damping, self.catch, self.energy = pump, stiffness, damping, catch, energy
 
     def predict(self, observation, deterministic=True):
+        """The torque for an observation, as policies of stable-baselines3 answer."""
         cosine, sine, speed = observation
         if cosine > self.catch:
             return [-self.stiffness * np.arctan2(sine, cosine) - self.damping * speed], None

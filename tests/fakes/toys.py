@@ -54,8 +54,8 @@ class Screen(gymnasium.Env):
         return self._seen(), float(self.place == 4) + 0.01 * self.place, False, False, {}
 
     def _seen(self):
-        picture = np.zeros((6, 8, 3), np.uint8)
-        picture[:, self.place] = 255
+        picture = np.full((6, 8, 3), 40, np.uint8)
+        picture[:, self.place] = 200
         return picture
 
 

@@ -1,6 +1,6 @@
 """Drive proxytune's manoeuvres with the robot in MuJoCo, and write what a tracker would see as a log.
 
-    python make_log.py truth.toml LOG
+python make_log.py truth.toml LOG
 """
 
 import sys

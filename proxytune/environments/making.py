@@ -51,9 +51,13 @@ def make_environment(settings: EnvironmentSettings, theta: Mapping[str, float]) 
     if not isinstance(made, library.Env):
         kind = type(made).__name__
         raise InputError(f"environment '{settings.environment}' is a {kind}; it must be a gymnasium.Env")
-    for one, value in values.items():
-        if one.attribute:
-            _set(made, one, value)
+    try:
+        for one, value in values.items():
+            if one.attribute:
+                _set(made, one, value)
+    except SettingsError:
+        made.close()
+        raise
     return made
 
 
@@ -80,10 +84,13 @@ def _set(environment: Any, one: OwnParameter, value: float) -> None:
     if isinstance(before, bool | np.bool_) or np.ndim(before) != 0 or not isinstance(before, int | float | np.number):
         raise _unset(one, f"is {' '.join(repr(before).split())}; name one number")
     name, index = _name_and_index(last)
-    if index is None:
-        setattr(holder, name, value)
-    else:
-        getattr(holder, name)[index] = value
+    try:
+        if index is None:
+            setattr(holder, name, value)
+        else:
+            getattr(holder, name)[index] = value
+    except Exception as problem:
+        raise _unset(one, f"cannot be set ({describe(problem)}); name what it is computed from") from None
 
 
 def _part(holder: Any, step: str) -> Any:
@@ -103,7 +110,8 @@ def _name_and_index(step: str) -> tuple[str, Any]:
 def _hint(environment: Any, one: OwnParameter) -> str:
     """What the attribute is likely to be: wrappers hide those of the environment itself."""
     first = _name_and_index(one.attribute.split(".")[0])[0]
-    return f"; did you mean 'unwrapped.{one.attribute}'?" if hasattr(environment.unwrapped, first) else "; correct it"
+    hidden = first != "unwrapped" and hasattr(environment.unwrapped, first)
+    return f"; did you mean 'unwrapped.{one.attribute}'?" if hidden else "; correct it"
 
 
 def _unset(one: OwnParameter, problem: str) -> SettingsError:

@@ -11,6 +11,7 @@ from toy_families import CART, PENDULUM, SCREEN, domain, family
 from proxytune.environments.making import make_environment
 from proxytune.environments.settings import read_domain
 from proxytune.errors import InputError
+from proxytune.extensions import load
 
 MASS = "low = 0.5, high = 2.0, neutral = 1.0"
 
@@ -55,8 +56,12 @@ MASS = "low = 0.5, high = 2.0, neutral = 1.0"
         ('environment = "toys:no_environment"\nsteps = 3', "is a dict; it must be a gymnasium.Env"),
         (CART + "[arguments]\nsped = 1.0", "domain.environment: environment 'toys:Cart' raised TypeError"),
         (
+            CART + f"[parameters]\nm = {{ attribute = 'unwrapped.wait', {MASS} }}",
+            "attribute 'unwrapped.wait' cannot be reached (AttributeError: 'Cart' object has no attribute 'wait'); correct",
+        ),
+        (
             CART + f"[parameters]\nm = {{ attribute = 'weight', {MASS} }}",
-            "domain.parameters.m: attribute 'weight' cannot",
+            "domain.parameters.m: attribute 'weight' cannot be set (AttributeError: ",
         ),
         (
             PENDULUM.replace("unwrapped.m", "m"),
@@ -78,6 +83,12 @@ def test_what_cannot_be_is_refused_in_one_line(tmp_path, text, line):
     assert line in told.replace("TimeLimit", "OrderEnforcing")
     assert told.startswith(f"{tmp_path / 'study.toml'}: domain.")
     assert "\n" not in told
+
+
+def test_an_environment_with_an_unknown_attribute_is_closed(tmp_path):
+    with pytest.raises(InputError):
+        family(tmp_path, CART + f"[parameters]\nm = {{ attribute = 'wait', {MASS} }}")
+    assert load("toys:Cart", kind="environment", beside=tmp_path).open == 0
 
 
 def test_without_gymnasium_the_user_is_told_what_to_install(tmp_path, monkeypatch):

@@ -30,6 +30,11 @@ class Cart(gymnasium.Env):
         reward = -float(np.abs(self.state).sum()) + self.noise * self.np_random.normal()
         return self._seen(), reward, bool(abs(self.state[0]) > 3.0), False, {"drive": drive, "state": self.state}
 
+    @property
+    def weight(self):
+        """Computed, so it cannot be set."""
+        return 9.81 * self.mass
+
     def close(self):
         type(self).open -= 1
 

@@ -13,8 +13,9 @@ from proxytune.environments.agents import load_agent
 from proxytune.environments.episode import play, score, wrap
 from proxytune.environments.identity import code_meaning, folder_meaning
 from proxytune.environments.making import make_environment
+from proxytune.environments.models import read_values
 from proxytune.environments.parameters import EnvironmentParameters
-from proxytune.environments.settings import EnvironmentSettings, read_domain, read_values
+from proxytune.environments.settings import EnvironmentSettings, read_domain
 from proxytune.environments.signals import figures
 from proxytune.environments.spaces import Spaces, look_at
 from proxytune.errors import EpisodeError, InputError, SettingsError

@@ -12,6 +12,7 @@ MODULES = (
     "episode",
     "family",
     "making",
+    "models",
     "parameters",
     "sensors",
     "settings",

@@ -57,7 +57,7 @@ MASS = "low = 0.5, high = 2.0, neutral = 1.0"
         (CART + "[arguments]\nsped = 1.0", "domain.environment: environment 'toys:Cart' raised TypeError"),
         (
             CART + f"[parameters]\nm = {{ attribute = 'unwrapped.wait', {MASS} }}",
-            "attribute 'unwrapped.wait' cannot be reached (AttributeError: 'Cart' object has no attribute 'wait'); correct",
+            "'unwrapped.wait' cannot be reached (AttributeError: 'Cart' object has no attribute 'wait'); correct it",
         ),
         (
             CART + f"[parameters]\nm = {{ attribute = 'weight', {MASS} }}",

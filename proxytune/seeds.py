@@ -31,6 +31,9 @@ AGAIN = 7
 PROXY_LESSONS, TARGET_LESSONS, EXAM = range(3)
 """What a seed of a learning experiment is for."""
 
+RESET, COURSE, ACTING = 11, 12, 13
+"""Tell what an environment's states, its course and a random agent draw from apart."""
+
 
 class LessonSeeds(NamedTuple):
     """What one lesson is drawn from.
@@ -94,6 +97,21 @@ def exam_seed(study_seed: int, start: int) -> int:
 def lesson_seeds(lessons_seed: int, number: int) -> LessonSeeds:
     """What a lesson, counted from 0, is drawn from."""
     return LessonSeeds(*_words(3, lessons_seed, number))
+
+
+def reset_seed(start: int) -> int:
+    """The seed of the state from which an environment begins at a start: the same in proxy, target and repetitions."""
+    return _word(RESET, start)
+
+
+def course_generator(seed: int, start: int) -> np.random.Generator:
+    """What an environment draws from in an episode after its first state."""
+    return np.random.default_rng((seed, start, COURSE))
+
+
+def acting_seed(seed: int, start: int) -> int:
+    """The seed of an agent that acts at random in an episode."""
+    return _word(seed, start, ACTING)
 
 
 def placement_generator(seed: int, start: int) -> np.random.Generator:

@@ -21,6 +21,8 @@ GOLDEN = {
         seeds.lesson_seeds,
         {(1234567, 0): (1058897929, 2536831675, 2051360301), (1, 8): (2579376181, 1935620157, 385650199)},
     ),
+    "reset": (seeds.reset_seed, {(0,): 1926383459, (7,): 963745374}),
+    "acting": (seeds.acting_seed, {(1, 0): 3132303469, (5, 2): 3404405215}),
 }
 
 
@@ -35,6 +37,7 @@ def test_a_generator_draws_what_it_has_always_drawn():
     assert seeds.message_generator(5, 2).random() == 0.23772096442823154
     assert seeds.expert_generator(5, 0).standard_normal() == -0.8019314252534474
     assert seeds.picture_generator(5, 0).standard_normal() == -0.8019314252534474
+    assert seeds.course_generator(5, 2).standard_normal() == 0.08497980447159015
 
 
 def test_what_shares_a_name_space_is_what_the_module_says():

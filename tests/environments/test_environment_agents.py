@@ -1,0 +1,116 @@
+"""Agents of an environment: functions, what has predict, classes of either, and what is refused."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("gymnasium")
+
+from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
+from toy_families import CART, SCREEN, family
+
+from proxytune.domain import make_episode
+from proxytune.environments.agents import ask_agent, load_agent
+from proxytune.errors import EpisodeError, InputError
+
+
+def run(kin, agent, seed=1):
+    return kin.run(make_episode({}, agent=agent, start=0, seed=seed))
+
+
+@pytest.mark.parametrize(
+    "agent", ["random", "zero", "toys:ahead", "toys:homeward", "toys:Alternating", "toys:Recurrent"]
+)
+def test_every_kind_of_agent_acts_and_acts_alike_again(tmp_path, agent):
+    kin = family(tmp_path, CART)
+    kin.check_agent(agent)
+    assert run(kin, agent) == run(kin, agent)
+
+
+def test_a_state_that_a_policy_answers_with_is_handed_back(tmp_path):
+    family(tmp_path, CART)
+    act = load_agent("toys:Recurrent", tmp_path, None, 0)
+    assert [round(float(act(None)[0]), 1) for _ in range(3)] == [0.0, 0.1, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("agent", "line"),
+    [
+        ("toys:nobody", "toys has no 'nobody'"),
+        ("toys:nothing", "agent 'toys:nothing' is a NoneType; give a function, or what has predict"),
+        ("randm", "agent 'randm' is unknown (your own is written module:attribute); did you mean 'random'?"),
+        ("toys:Cart", "give a function, or what has predict"),
+    ],
+)
+def test_an_agent_that_cannot_act_is_refused(tmp_path, agent, line):
+    with pytest.raises(InputError) as refused:
+        family(tmp_path, CART).check_agent(agent)
+    assert line in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("agent", "line"),
+    [
+        ("toys:fails", "raised RuntimeError: lost the way at step 0"),
+        ("toys:three", "at step 0; an action is (2,) finite numbers"),
+        ("toys:infinite", "at step 0; an action is (2,) finite numbers"),
+        ("toys:words", "answered 'left' at step 0, which is no array of numbers"),
+    ],
+)
+def test_an_answer_that_is_no_action_fails_the_episode(tmp_path, agent, line):
+    with pytest.raises(EpisodeError) as failed:
+        run(family(tmp_path, CART), agent)
+    assert line in str(failed.value)
+
+
+def test_a_discrete_answer_must_be_one_of_the_actions(tmp_path):
+    space = Discrete(3, start=1)
+    assert ask_agent(lambda seen: np.array(2), None, space, 0) == 2
+    with pytest.raises(EpisodeError, match=r"answered 0 at step 4, which is not in Discrete"):
+        ask_agent(lambda seen: 0, None, space, 4)
+
+
+def test_a_box_answer_beyond_the_bounds_is_cut_off():
+    action = ask_agent(lambda seen: [[5.0, -0.5]], None, Box(-1.0, 1.0, (2,), np.float32), 0)
+    assert action.tolist() == [1.0, -0.5]
+
+
+@pytest.mark.parametrize(
+    ("space", "zero"),
+    [
+        (Discrete(3, start=1), 1),
+        (Box(-1.0, 1.0, (2,), np.float32), [0.0, 0.0]),
+        (Box(0.5, 1.0, (1,), np.float32), [0.5]),
+        (MultiBinary(2), [0, 0]),
+        (MultiDiscrete([2, 3]), [0, 0]),
+    ],
+)
+def test_zero_is_the_least_action_that_a_space_has(tmp_path, space, zero):
+    action = load_agent("zero", tmp_path, space, 0)(None)
+    assert np.asarray(action).tolist() == zero
+    assert space.contains(action)
+
+
+def test_an_action_space_without_a_zero_has_no_such_agent(tmp_path):
+    with pytest.raises(InputError, match="have no zero; take another"):
+        load_agent("zero", tmp_path, Dict({"a": Discrete(2)}), 0)
+
+
+def test_a_random_agent_draws_from_its_seed_alone(tmp_path):
+    first, again, other = (load_agent("random", tmp_path, Discrete(1000), seed)(None) for seed in (5, 5, 6))
+    assert first == again != other
+
+
+@pytest.mark.slow
+def test_a_policy_of_stable_baselines3_acts(tmp_path):
+    pytest.importorskip("stable_baselines3")
+    (tmp_path / "trained.py").write_text(
+        "import gymnasium\nfrom stable_baselines3 import PPO\n"
+        'policy = PPO("MlpPolicy", gymnasium.make("CartPole-v1"), seed=1, n_steps=8, device="cpu")\n'
+    )
+    kin = family(tmp_path, 'environment = "CartPole-v1"\nsteps = 20\n')
+    assert run(kin, "trained:policy") == run(kin, "trained:policy")
+    assert 1.0 <= run(kin, "trained:policy")["length"] <= 20.0
+
+
+def test_pictures_and_discrete_actions_run(tmp_path):
+    assert run(family(tmp_path, SCREEN), "toys:left_of_middle")["return"] >= 4.0

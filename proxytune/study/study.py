@@ -67,14 +67,8 @@ def open_study(path: Path) -> Study:
     known, left_out = with_scores(settings)
     cautions = (*left_out, *unnoticed(settings.folder))
     target, objective = read_target(known, family), objective_of(settings)
-<<<<<<< HEAD
-    truth, engine, code = _truth(settings), _engine(settings), code_of(settings)
+    truth, engine, code = _truth(settings, family), _engine(settings), code_of(settings)
     return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
-=======
-    return Study(
-        known, family, target, family.identity, _truth(settings, family), cautions, objective, _engine(settings)
-    )
->>>>>>> 2d1b0fd41ebad36dc7da942f922f2696066165f8
 
 
 def _engine(settings: StudySettings) -> Engine:
@@ -96,46 +90,6 @@ def _engine(settings: StudySettings) -> Engine:
 
 
 def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:
-
-
-def _engine(settings: StudySettings) -> Engine:
-    """The engine that a study names, which is installed and may be named.
-
-    Raises:
-        SettingsError: If it is not.
-    """
-    try:
-        engine = engine_of(settings.engine, settings.folder)
-    except InputError as problem:
-        raise settings.error("engine", str(problem)) from None
-    if not engine.in_studies:
-        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, STUDY_ENGINES)}")
-    reason = why_not_engine(engine, composed=settings.objective != LEARNING)
-    if reason:
-        raise settings.error("engine", reason)
-    return engine
-
-
-<<<<<<< HEAD
-def _truth(settings: StudySettings) -> Theta | None:
-=======
-def _with_scores(settings: StudySettings) -> StudySettings:
-    """The study of those agents that the target has scores of.
-
-    Raises:
-        InputError: If fewer than two are left.
-    """
-    scored = read_scores(settings.target, [metric.name for metric in settings.metrics]).agents
-    there = tuple(agent for agent in settings.agents if agent in scored)
-    missing = tuple(agent for agent in settings.agents if agent not in scored)
-    if len(there) < 2:
-        hint = nearest(missing[0], scored) if len(missing) == 1 else "add them, or take them out of the study"
-        raise InputError(f"{settings.target}: has no scores of {', '.join(missing)}; {hint}")
-    return replace(settings, agents=there)
-
-
-def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:
->>>>>>> 2d1b0fd41ebad36dc7da942f922f2696066165f8
     if settings.truth is None:
         return None
     if not settings.truth.is_file():

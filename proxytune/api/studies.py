@@ -123,7 +123,7 @@ def run_study(path: str | Path, *, progress: bool = False, retry_failed: bool = 
 
     Args:
         path: The study's folder, or its study.toml.
-        progress: Whether to show a bar with the time left, where standard error is a terminal.
+        progress: Whether to show a bar with the time left; where standard error is no terminal, a line per trial.
         retry_failed: Whether to drive every failed episode again; those whose code has changed are in any case.
 
     Raises:

@@ -9,7 +9,7 @@ from joblib import Parallel, delayed
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, check_truths, objective_of
+from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, Arena, check_truths, objective_of
 from proxytune.cli.terminal.answer import Answer
 from proxytune.comparison.analytic import Objective
 from proxytune.comparison.judgement import judging_code
@@ -64,9 +64,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     engines = _engines(arguments)
     _check(arguments)
     _make(output)
-    with locked(output), objective_of(arguments, output, len(engines)) as (objective, budget, initial, jobs):
-        keys = _keys(objective, engines, arguments.seeds, budget, initial)
-        runs = _finish_all(objective, keys, output / FILE_NAME, jobs, _beside(arguments))
+    with locked(output), objective_of(arguments, output, len(engines)) as arena:
+        objective = arena.objective
+        keys = _keys(objective, engines, arguments.seeds, arena.budget, arena.initial)
+        runs = _finish_all(arena, keys, output / FILE_NAME, _beside(arguments))
     grouped = [[runs[key] for key in keys if key.engine == engine.name] for engine in engines]
     summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
     return _answer(objective, summaries, grouped, output)
@@ -122,19 +123,19 @@ def _keys(objective: Objective, engines: Sequence[Engine], seeds: int, budget: i
     ]
 
 
-def _finish_all(
-    objective: Objective, keys: Sequence[RunKey], path: Path, jobs: int, beside: Path
-) -> Mapping[RunKey, Run]:
+def _finish_all(arena: Arena, keys: Sequence[RunKey], path: Path, beside: Path) -> Mapping[RunKey, Run]:
     """All runs, each written as soon as it is finished.
 
     Runs that the file lacks are run now; runs that an older version judged are judged again.
     """
     runs = read_runs(path)
     missing = [key for key in keys if key not in runs or runs[key].judgement.code != judging_code()]
-    with Parallel(n_jobs=min(jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
-        for run in parallel(delayed(_finish)(objective, key, runs.get(key), beside) for key in missing):
+    with Parallel(n_jobs=min(arena.jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
+        ended = parallel(delayed(_finish)(arena.objective, key, runs.get(key), beside) for key in missing)
+        for number, run in enumerate(ended, start=1 + len(keys) - len(missing)):
             _append(path, run)
             runs[run.key] = run
+            arena.finished(f"run {number} of {len(keys)}: {run.key.engine}, seed {run.key.seed}")
     return runs
 
 

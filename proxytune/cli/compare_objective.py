@@ -2,9 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.comparison.analytic import Analytic, Objective
@@ -25,13 +26,30 @@ STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking(),
 BUDGET, INITIAL = 40, 10
 
 
+class Arena(NamedTuple):
+    """What engines are compared on.
+
+    Attributes:
+        objective: What each of them makes small.
+        budget: Evaluations per run.
+        initial: How many of these are the shared design.
+        jobs: How many runs at a time; a study's own episodes run in parallel instead.
+        finished: Hears of each run.
+    """
+
+    objective: Objective
+    budget: int
+    initial: int
+    jobs: int
+    finished: Callable[[str], None]
+
+
 @contextmanager
-def objective_of(
-    arguments: argparse.Namespace, output: Path, engines: int
-) -> Iterator[tuple[Objective, int, int, int]]:
-    """The objective with budget, design and how many runs at a time: a study's own episodes run in parallel instead."""
+def objective_of(arguments: argparse.Namespace, output: Path, engines: int) -> Iterator[Arena]:
+    """The objective with all that a comparison on it needs, and a bar that shows how far it is."""
     if arguments.study in STAND_INS:
-        yield STAND_INS[arguments.study], *_spending(arguments, BUDGET, INITIAL), 2
+        with Bars(engines * arguments.seeds, "runs") as bars:
+            yield Arena(STAND_INS[arguments.study], *_spending(arguments, BUDGET, INITIAL), 2, _counting(bars))
         return
     study = open_study(study_folder(Path(arguments.study)))
     budget, initial = _spending(arguments, study.settings.budget, study.settings.initial)
@@ -40,7 +58,18 @@ def objective_of(
     print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
     with Store.open(output) as store, Bars(episodes) as bars:
         adopt(study, store)
-        yield _on_study(arguments, StudyRun(study, store, bars)), budget, initial, 1
+        yield Arena(_on_study(arguments, StudyRun(study, store, bars)), budget, initial, 1, bars.finished)
+
+
+def _counting(bars: Bars) -> Callable[[str], None]:
+    """Counts runs and tells of each: those of a test problem have no episodes."""
+
+    def finished(what: str) -> None:
+        bars.begin(what, 0)
+        bars.episode()
+        bars.finished(what)
+
+    return finished
 
 
 def check_truths(arguments: argparse.Namespace) -> None:

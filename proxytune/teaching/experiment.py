@@ -148,8 +148,11 @@ def learning_curves(
             pass
     watcher.begin("learning", 0)
     with score_points(setup, missing, jobs) as scored:
-        for _ in scored:
+        for point, score in scored:
             watcher.episode()
+            watcher.finished(
+                f"{point.name}, repetition {point.repetition + 1}, {point.count} target samples: score {score:.3g}"
+            )
     return {name: _curve(setup, [point for point in points if point.name == name]) for name in proxies}
 
 

@@ -34,7 +34,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--to",
         required=True,
         choices=(*FORMATS, *TRIALS),
-        help="URDF, MuJoCo model, ROS 2 parameters; of a study its trials, as Optuna storage or OptimizeResult of skopt",
+        help="URDF, MuJoCo model or ROS 2 parameters; of a study its trials: Optuna storage or skopt's OptimizeResult",
     )
     parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="the file to write")
 

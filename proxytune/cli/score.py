@@ -14,6 +14,8 @@ from proxytune.errors import InputError
 from proxytune.report.scores.document import document_of, document_of_ranking
 from proxytune.report.scores.figures import flipped_pairs, scatter
 from proxytune.report.scores.table import measures, ranking
+from proxytune.report.scores.table_file import write_scores_table
+from proxytune.report.table_files import check_ending
 from proxytune.report.writing import save
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import Assessment, assess, in_common, select_proxy
@@ -64,12 +66,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
     parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")
     parser.add_argument("--output", type=Path, metavar="DIR", help="draw the figures into this folder")
+    parser.add_argument(
+        "--table", type=Path, metavar="FILE", help="also write all measures as .csv or, for LaTeX with booktabs, .tex"
+    )
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score one proxy, or rank several."""
     if arguments.resamples < FEWEST_RESAMPLES or arguments.seed < 0:
         raise InputError(f"--resamples must be at least {FEWEST_RESAMPLES} and --seed at least 0")
+    if arguments.table:
+        check_ending("--table", arguments.table)
     metrics = [Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])
     (target, proxies), left_out = _common(target, proxies) if arguments.common else ((target, proxies), ())
@@ -84,6 +91,9 @@ def run(arguments: argparse.Namespace) -> Answer:
     }
     figures = _draw(assessments, arguments.output) if arguments.output else []
     head = {"target": target_name, "figures": figures, "left_out": list(left_out)}
+    if arguments.table:
+        write_scores_table(assessments, arguments.table)
+        head["table"] = str(arguments.table)
     said = [Text(f"note: {line}") for line in left_out]
     if len(assessments) == 1:
         name, assessment = next(iter(assessments.items()))

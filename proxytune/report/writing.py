@@ -16,8 +16,6 @@ from PIL import Image
 
 from proxytune.errors import RunError
 
-TRUE_TYPE = {"pdf.fonttype": 42, "svg.hashsalt": "proxytune"}
-"""Journals refuse the fonts that Matplotlib's PDF has otherwise; the same figure gives the same SVG."""
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """What is left out of files, so that the same figure gives the same bytes."""
 
@@ -55,7 +53,8 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def _draw(figure: Figure, form: str, draft: Path) -> None:
-    with mpl.rc_context(TRUE_TYPE):
+    """Write a vector file; journals refuse the fonts that Matplotlib's PDF has by default."""
+    with mpl.rc_context({"pdf.fonttype": 42, "svg.hashsalt": "proxytune"}):
         figure.savefig(draft, format=form, metadata=UNDATED[form])
 
 

@@ -1,6 +1,6 @@
 """The trials of a search as other optimisers keep them: an Optuna storage, scikit-optimize's OptimizeResult."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -67,7 +67,7 @@ def write_optuna(history: History, path: Path) -> None:
         # An address has characters that mean something in it; the name of a user's file may have them too.
         draft = Path(folder) / "storage.sqlite3"
         storage = optuna.storages.RDBStorage(f"sqlite:///{draft}")
-        direction = "maximize" if history.maximise else "minimize"
+        direction: Literal["minimize", "maximize"] = "maximize" if history.maximise else "minimize"
         study = optuna.create_study(storage=storage, study_name=history.name, direction=direction)
         study.add_trials([_optuna_trial(optuna, history.space, trial) for trial in history.trials])
         study.set_user_attr("best_trial", history.answer)
@@ -103,7 +103,8 @@ def optimize_result(history: History) -> Any:
     points = [[trial.theta[name] for name in history.space.names] for trial in history.trials]
     measured = [place for place, trial in enumerate(history.trials) if trial.value is not None]
     values = [sign * value for trial in history.trials if (value := trial.value) is not None]
-    return OptimizeResult(
+    found = OptimizeResult()
+    found.update(
         x=points[history.answer],
         fun=values[measured.index(history.answer)],
         x_iters=[points[place] for place in measured],
@@ -113,6 +114,7 @@ def optimize_result(history: History) -> Any:
         random_state=None,
         specs=None,
     )
+    return found
 
 
 def write_skopt(history: History, path: Path) -> None:

@@ -20,6 +20,8 @@ def with_spending(study: Study, *, budget: int | None = None, jobs: int | None =
             raise InputError(f"{name} must be between 1 and {most}, got {value}")
     settings = study.settings
     if budget is not None and settings.objective == LEARNING:
-        raise settings.error("budget", f"a search for '{LEARNING}' has its own; set teaching.budget in this file instead")
+        raise settings.error(
+            "budget", f"a search for '{LEARNING}' has its own; set teaching.budget in this file instead"
+        )
     spending = replace(settings, budget=budget or settings.budget, jobs=jobs or settings.jobs)
     return replace(study, settings=spending)

@@ -130,12 +130,14 @@ def _finish_all(arena: Arena, keys: Sequence[RunKey], path: Path, beside: Path) 
     """
     runs = read_runs(path)
     missing = [key for key in keys if key not in runs or runs[key].judgement.code != judging_code()]
+    arena.bars.begin("", len(keys) - len(missing))
     with Parallel(n_jobs=min(arena.jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
         ended = parallel(delayed(_finish)(arena.objective, key, runs.get(key), beside) for key in missing)
         for number, run in enumerate(ended, start=1 + len(keys) - len(missing)):
             _append(path, run)
             runs[run.key] = run
-            arena.finished(f"run {number} of {len(keys)}: {run.key.engine}, seed {run.key.seed}")
+            arena.bars.episode()
+            arena.bars.finished(f"run {number} of {len(keys)}: {run.key.engine}, seed {run.key.seed}")
     return runs
 
 

@@ -2,7 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -34,42 +34,55 @@ class Arena(NamedTuple):
         budget: Evaluations per run.
         initial: How many of these are the shared design.
         jobs: How many runs at a time; a study's own episodes run in parallel instead.
-        finished: Hears of each run.
+        bars: Shows how many runs are finished.
     """
 
     objective: Objective
     budget: int
     initial: int
     jobs: int
-    finished: Callable[[str], None]
+    bars: Bars
+
+
+class WithinRun:
+    """Shows which seed a run is of and how many episodes there were; the bar itself counts runs."""
+
+    def __init__(self, bars: Bars) -> None:
+        self._bars, self._what, self._episodes = bars, "", 0
+
+    def begin(self, what: str, known: int) -> None:
+        """Show what is being done."""
+        self._what = what
+        self._bars.begin(what, 0)
+
+    def episode(self) -> None:
+        """Count it."""
+        self._episodes += 1
+        self._bars.begin(f"{self._what}, episode {self._episodes}", 0)
+
+    def best(self, score: float) -> None:
+        """Say nothing: each run has its own."""
+
+    def finished(self, what: str) -> None:
+        """Say nothing: a run is told of as a whole."""
 
 
 @contextmanager
 def objective_of(arguments: argparse.Namespace, output: Path, engines: int) -> Iterator[Arena]:
     """The objective with all that a comparison on it needs, and a bar that shows how far it is."""
+    bars = Bars(engines * arguments.seeds, "runs")
     if arguments.study in STAND_INS:
-        with Bars(engines * arguments.seeds, "runs") as bars:
-            yield Arena(STAND_INS[arguments.study], *_spending(arguments, BUDGET, INITIAL), 2, _counting(bars))
+        with bars:
+            yield Arena(STAND_INS[arguments.study], *_spending(arguments, BUDGET, INITIAL), 2, bars)
         return
     study = open_study(study_folder(Path(arguments.study)))
     budget, initial = _spending(arguments, study.settings.budget, study.settings.initial)
     per_run = _episodes_per_run(arguments, study.settings, budget)
     episodes = per_run * arguments.seeds * engines
     print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
-    with Store.open(output) as store, Bars(episodes) as bars:
+    with Store.open(output) as store, bars:
         adopt(study, store)
-        yield Arena(_on_study(arguments, StudyRun(study, store, bars)), budget, initial, 1, bars.finished)
-
-
-def _counting(bars: Bars) -> Callable[[str], None]:
-    """Counts runs and tells of each: those of a test problem have no episodes."""
-
-    def finished(what: str) -> None:
-        bars.begin(what, 0)
-        bars.episode()
-        bars.finished(what)
-
-    return finished
+        yield Arena(_on_study(arguments, StudyRun(study, store, WithinRun(bars))), budget, initial, 1, bars)
 
 
 def check_truths(arguments: argparse.Namespace) -> None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from rich.console import Console
 
-from proxytune import __version__
+import proxytune
 from proxytune.cli.examples import epilog
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
@@ -133,7 +133,7 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
         description="Find out how useful a robot simulator is, tune it to the robot, and learn what it still lacks.",
         epilog=EXIT_STATUS,
     )
-    top.add_argument("--version", action="version", version=f"proxytune {__version__}")
+    top.add_argument("--version", action="version", version=f"proxytune {proxytune.__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     asked = next((word for word in words or () if not word.startswith("-")), "")
     for name, known in COMMANDS.items():

@@ -77,7 +77,12 @@ def test_a_study_is_compared_on_its_own_episodes_which_are_simulated_once(make_s
     assert main([*arguments, "--json"]) == 0
     out, told = capsys.readouterr()
     document = json.loads(out)
-    assert told == f"compare: at most {2 * 2 * 8 * 18} episodes, {8 * 18} in each run\n"
+    first, *runs = told.splitlines()
+    assert first == f"compare: at most {2 * 2 * 8 * 18} episodes, {8 * 18} in each run"
+    assert [line.partition(" s: ")[2] for line in runs] == [
+        f"run {1 + place} of 4: {engine}, seed {1 + place // 2}; {1 + place} of at most 4 runs"
+        for place, engine in enumerate(("gp", "sobol", "gp", "sobol"))
+    ]
     assert (document["objective"], document["budget"]) == ("wobbly", 7)
     assert [row["error"] for row in document["engines"]] == [None, None]
     episodes = journal.read_text().splitlines()
@@ -86,6 +91,7 @@ def test_a_study_is_compared_on_its_own_episodes_which_are_simulated_once(make_s
     assert not (folder / "study.db").exists()
     assert main([*arguments, "--json"]) == 0
     assert journal.read_text().splitlines() == episodes
+    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 def truths(folder, output, *more):

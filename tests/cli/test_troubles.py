@@ -8,7 +8,7 @@ import sqlite3
 import subprocess
 
 import pytest
-from processes import episodes, start, trials
+from processes import besides_progress, episodes, start, trials
 from stopping import Stopping
 
 from proxytune.cli.main import main
@@ -43,6 +43,7 @@ def run(*words, status=0, **how):
     """A command as a process of its own: its one line on standard error, or what it printed where all went well."""
     process = start(*words, **how)
     out, told = process.communicate(timeout=120)
+    told = besides_progress(told)
     assert process.returncode == status, told
     if status == 0:
         return out
@@ -54,6 +55,7 @@ def refused(capsys, status, *words):
     """The one line of a command run in this process."""
     assert main([*map(str, words)]) == status
     out, told = capsys.readouterr()
+    told = besides_progress(told)
     assert (out, told.count("\n")) == ("", 1)
     return told
 

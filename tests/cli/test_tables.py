@@ -43,7 +43,7 @@ def shown(*words):
     return COMMANDS[words[0]].load().run(arguments).text
 
 
-@pytest.mark.parametrize("kind", ["robots", "maps", "agents", "metrics", "engines", "measures"])
+@pytest.mark.parametrize("kind", ["robots", "maps", "effects", "agents", "metrics", "engines", "measures"])
 def test_lists_are_whole(kind):
     assert_whole(shown("list", kind))
 

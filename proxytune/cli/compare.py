@@ -3,9 +3,9 @@
 import argparse
 import json
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
-from joblib import Parallel, delayed
 from rich.console import Group
 from rich.text import Text
 
@@ -19,6 +19,7 @@ from proxytune.errors import InputError, StoreError
 from proxytune.report.compare.document import compare_document, compare_lines, compare_tables
 from proxytune.report.compare.figure import compare_figure
 from proxytune.report.writing import save, write_text
+from proxytune.running.workers import working
 from proxytune.search.engines.engine import Engine
 from proxytune.search.engines.registry import NAMES, STUDY_ENGINES, engine_code, engine_of, why_not
 from proxytune.storage.lock import locked
@@ -130,9 +131,9 @@ def _finish_all(arena: Arena, keys: Sequence[RunKey], path: Path, beside: Path) 
     """
     runs = read_runs(path)
     missing = [key for key in keys if key not in runs or runs[key].judgement.code != judging_code()]
-    arena.bars.begin("", len(keys) - len(missing))
-    with Parallel(n_jobs=min(arena.jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
-        ended = parallel(delayed(_finish)(arena.objective, key, runs.get(key), beside) for key in missing)
+    arena.bars.begin("comparing", len(keys) - len(missing))
+    work, pieces = partial(_finish, arena.objective, beside), [(key, runs.get(key)) for key in missing]
+    with working(work, pieces, arena.jobs) as ended:
         for number, run in enumerate(ended, start=1 + len(keys) - len(missing)):
             _append(path, run)
             runs[run.key] = run
@@ -141,7 +142,8 @@ def _finish_all(arena: Arena, keys: Sequence[RunKey], path: Path, beside: Path) 
     return runs
 
 
-def _finish(objective: Objective, key: RunKey, run: Run | None, beside: Path) -> Run:
+def _finish(objective: Objective, beside: Path, piece: tuple[RunKey, Run | None]) -> Run:
+    key, run = piece
     engine = engine_of(key.engine, beside)
     return judged_again(objective, run, engine) if run else run_engine(objective, key, engine)
 

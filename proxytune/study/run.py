@@ -100,7 +100,7 @@ class StudyTrials:
             watcher.best(objective.sign * min(scores))
         best = f", best so far {objective.sign * min(scores):g}" if scores else ""
         for trial in ended:
-            came = _came_to(trial, objective)
+            came = came_to(trial, objective)
             watcher.finished(f"trial {trial.number} of {settings.budget}: {came}{best}")
 
 
@@ -110,7 +110,7 @@ def _name_trials(trials: Sequence[TrialRecord], budget: int) -> str:
     return f"trial {first} of {budget}" if first == last else f"trials {first} to {last} of {budget}"
 
 
-def _came_to(trial: TrialRecord, objective: Objective) -> str:
+def came_to(trial: TrialRecord, objective: Objective) -> str:
     """What became of a trial, in one phrase."""
     if trial.state == "cut":
         return f"stopped early, {objective.label} at least {trial.bound:g}"

@@ -1,8 +1,10 @@
 import json
+from types import SimpleNamespace
 
 import pytest
 
 from proxytune.cli.compare import _engines, read_runs
+from proxytune.cli.compare_objective import WithinRun
 from proxytune.cli.main import main, parser
 from proxytune.comparison.judgement import judging_code
 from proxytune.search.engines import registry as engines
@@ -198,3 +200,14 @@ def test_a_place_that_cannot_be_written_is_one_line_and_exit_1(tmp_path, capsys)
     (tmp_path / "file").touch()
     assert compare("analytic", *FEW, "--output", tmp_path / "file" / "out") == 1
     assert "cannot be created" in capsys.readouterr().err
+
+
+def test_within_a_run_its_episodes_are_told_and_the_bar_counts_runs():
+    shown = []
+    bars = SimpleNamespace(begin=lambda what, known: shown.append((what, known)))
+    within = WithinRun(bars)
+    within.begin("seed 3", 18)
+    within.episode()
+    within.best(4.0)
+    within.finished("pre-flight 1 of 2")
+    assert shown == [("seed 3", 0), ("seed 3, episode 1", 0)]

@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         resume keep everything finished.
     """
     words = sys.argv[1:] if argv is None else argv
-    arguments = parser(words).parse_args(words)
+    arguments = parser(words).parse_args(words, argparse.Namespace(words=words))
     command = COMMANDS[arguments.command]
     try:
         with sigterm_as_interrupt():

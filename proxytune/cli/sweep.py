@@ -11,8 +11,11 @@ from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.study_folder import study_folder
+from proxytune.cli.terminal.typed import typed
 from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
+from proxytune.report.page import foot_of, html_of
+from proxytune.report.study.page import study_settings
 from proxytune.report.sweep.document import (
     NO_POD,
     curve_csv,
@@ -23,6 +26,7 @@ from proxytune.report.sweep.document import (
     failures,
 )
 from proxytune.report.sweep.figures import bars_figure, panels_figure, sweep_figure
+from proxytune.report.sweep.page import sweep_page
 from proxytune.report.writing import save, write_text
 from proxytune.running.progress import Bars
 from proxytune.space import Theta
@@ -82,8 +86,11 @@ def run(arguments: argparse.Namespace) -> Answer:
                 run_sweep(run, sweep, discrepancy)
         curves = [curve for sweep in sweeps if (curve := curve_of(run, sweep))]
     output = arguments.output or folder / "figures"
-    answer = _answer(curves, run.spent, draw_curves(curves, output), write_curves(curves, output))
-    return _say_base(answer, word, sweeps[0].base)
+    figures = draw_curves(curves, output)
+    held = _held(word, sweeps[0].base)
+    page = _write_page(arguments, study, curves, figures, held)
+    answer = _answer(curves, run.spent, figures, [*write_curves(curves, output), page])
+    return _say_base(answer, word, sweeps[0].base, held)
 
 
 def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
@@ -155,16 +162,34 @@ def _answer(curves: Sequence[Curve], spent: Spent, figures: Sequence[Path], file
     return Answer(document, Group(*parts, Text("\n".join(lines))))
 
 
-def _say_base(answer: Answer, word: str, base: Theta) -> Answer:
-    """The answer with what the other parameters are held at."""
+def _write_page(
+    arguments: argparse.Namespace, study: Study, curves: Sequence[Curve], figures: Sequence[Path], held: str
+) -> Path:
+    """Write the page beside the figures, named as the first of all curves, or as the only one."""
+    drawn = {path.stem: path.read_bytes() for path in figures}
+    together = [path for path in figures if path.stem.startswith("sweep_all")]
+    path = (together or figures)[0].with_suffix(".html")
+    foot = foot_of(typed(arguments), study_settings(study.settings))
+    said = f"{held[0].upper()}{held[1:]}"
+    write_text(path, html_of(sweep_page(study.settings.name, curves, drawn, said, foot)))
+    return path
+
+
+def _held(word: str, base: Theta) -> str:
+    """What the other parameters are held at."""
     values = ", ".join(f"{name}={value:g}" for name, value in sorted(base.items()))
     lines = {
         "best": f"the others are held at the study's best θ: {values}; --at nominal holds the robot's own",
         "nominal": "the others are nominal",
     }
-    line = lines.get(word, f"the others are held at {values}")
-    document = {**answer.document, "at": {"chosen": word if word in lines else "given", "theta": dict(base)}}
-    return Answer(document, Group(answer.text, Text(line)))
+    return lines.get(word, f"the others are held at {values}")
+
+
+def _say_base(answer: Answer, word: str, base: Theta, held: str) -> Answer:
+    """The answer with what the other parameters are held at."""
+    chosen = word if word in ("best", "nominal") else "given"
+    document = {**answer.document, "at": {"chosen": chosen, "theta": dict(base)}}
+    return Answer(document, Group(answer.text, Text(held)))
 
 
 def _base(curve: Curve) -> tuple[tuple[str, float], ...]:

@@ -28,16 +28,16 @@ def compare_page(name: str, summaries: Sequence[EngineSummary], budget: int, fig
     *verdicts, how = compare_lines(summaries)
     picture = Picture("How fast each engine comes near the optimum", figure, CAPTION)
     tables = terminal_tables(Group(*compare_tables(name, summaries, budget)))
-    answer = " ".join(f"{verdict}." for verdict in verdicts) or f"{summaries[0].engine} alone was run."
     parts: list[Picture | Table | Words] = [picture, *tables, Words("How to read the tables", (f"{how}.",))]
-    found = f"{_reached(summaries, budget)}{answer}"
-    return Page(f"Search engines on {name}", found, _next_step(summaries), tuple(parts), foot)
+    answer = _answer(summaries, verdicts, budget)
+    return Page(f"Search engines on {name}", answer, _next_step(summaries), tuple(parts), foot)
 
 
-def _reached(summaries: Sequence[EngineSummary], budget: int) -> str:
-    """Said first where nothing was reached: the rest is then about nothing."""
-    nothing = f"No engine reached the noise floor in {budget} evaluations. "
-    return "" if any(one.reached for one in summaries) else nothing
+def _answer(summaries: Sequence[EngineSummary], verdicts: Sequence[str], budget: int) -> str:
+    """What the terminal says of each engine; where none reached the floor, that says nothing."""
+    if not any(one.reached for one in summaries):
+        return f"No engine reached the noise floor in {budget} evaluations: which is sooner there is not known."
+    return " ".join(f"{verdict}." for verdict in verdicts) or f"{summaries[0].engine} alone was run."
 
 
 def _next_step(summaries: Sequence[EngineSummary]) -> str:

@@ -7,9 +7,9 @@ from proxytune.report.page import Picture
 SAID = {
     "error": (
         "Error of predictions before and after",
-        "Errors on drives kept aside, with 95 % intervals. The closer “after” comes to the green noise floor, the "
-        "less is missing. Whether an effect helps at a length is told by the ratio in the table: its interval "
-        "should stay below 1.",
+        "Errors on drives kept aside, with 95 % intervals. The nearer the model with the effects added is to the green "
+        "noise floor, the less is missing. Whether an effect helps at a length is told by the ratio in the table: its "
+        "interval should stay below 1.",
     ),
     "effect_curve": (
         "What was added, against what was measured",
@@ -51,7 +51,7 @@ SAID = {
     ),
     "camera_error": (
         "Error of the frames before and after",
-        "On frames kept aside. The effects added help where “after” lies lower than “before”.",
+        "On frames kept aside. The effects added help where their points lie below the declared model's.",
     ),
 }
 """Title and caption of each figure, in the order in which they are shown."""

@@ -35,7 +35,8 @@ thead .number { white-space: normal; }
 pre { background: var(--tint); padding: .6rem .9rem; overflow-x: auto; }
 code { font: .92em/1.5 ui-monospace, monospace; }
 pre code { white-space: pre-wrap; }
-nav ol { columns: 16rem; padding-left: 1.8rem; }
+nav ol { columns: 16rem; column-gap: 3rem; padding-left: 1.8rem; }
+nav li { break-inside: avoid; }
 a { color: var(--accent); }
 footer { margin-top: 3rem; border-top: 1px solid var(--line); }
 @media print {

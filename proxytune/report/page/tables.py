@@ -67,6 +67,6 @@ def _of_terminal(table: TerminalTable) -> Table:
 
 
 def _text(cell: RenderableType) -> str:
-    """A cell without markup, on one line."""
+    """A cell without markup, on one line; what it is indented by tells what it belongs to."""
     plain = cell.plain if isinstance(cell, Text) else Text.from_markup(str(cell)).plain
-    return " ".join(plain.split())
+    return plain.replace("\n", " ").rstrip()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from proxytune.report.numbers import listed, probability, short
+from proxytune.report.numbers import listed, short
 from proxytune.usefulness import Assessment, Selection
 from proxytune.usefulness.noise import NoiseFloor
 
@@ -33,13 +33,13 @@ def _answer(assessment: Assessment, proxy: str, target: str) -> str:
     """How low PRPV is, and what that is worth."""
     prpv, inner = assessment.prpv, assessment.prpv_interval
     ends = "" if inner.low is None or inner.high is None else f" ({_ends(inner.low, inner.high)})"
-    score = f"PRPV (proxy relative predictivity value) of {proxy} is {prpv.value}{ends} of at most {prpv.range[1]}"
-    return f"{score} as a proxy of {target}: {_worth(assessment)}."
+    score = f"has a PRPV (proxy relative predictivity value) of {prpv.value}{ends}, of at most {prpv.range[1]}"
+    return f"As a proxy of {target}, {proxy} {score}: {_worth(assessment)}."
 
 
 def _worth(assessment: Assessment) -> str:
     random, floor = assessment.chance, assessment.noise_floor
-    chance = f"{short(random.mean)} ± {short(random.deviation)}, {probability(random.p_value)}"
+    chance = f"{short(random.mean)} ± {short(random.deviation)}, p = {random.p_value:.2g}"
     if random.explains:
         return f"no better than chance ({chance})"
     if assessment.at_noise_floor:

@@ -37,8 +37,9 @@ def sweep_page(study: str, curves: Sequence[Curve], figures: Mapping[str, bytes]
     """
     names = ", ".join(curve.parameter for curve in curves)
     wrong = failures(curves)
-    parts: list[Picture | Table | Words] = [*_pictures(curves, figures)]
-    parts += [table for curve in curves for table in _tables(curve)]
+    parts: list[Picture | Table | Words] = [*_together(curves, figures)]
+    for curve in curves:
+        parts += [*_own(curve, figures), *_tables(curve)]
     parts += [Words("What failed", tuple(wrong))] if wrong else []
     answer = " ".join(f"{_lowest(curve)}." for curve in curves)
     return Page(f"{study}: usefulness along {names}", f"{answer} {held}.", _next_step(curves), tuple(parts), foot)
@@ -65,19 +66,23 @@ def _next_step(curves: Sequence[Curve]) -> str:
 
 def _tables(curve: Curve) -> list[Table]:
     first, *others = terminal_tables(Group(*curve_tables(curve)))
-    named = [replace(one, title=f"{first.title}: other measures") for one in others if one.rows and one.columns[1:]]
-    tables = [first, *named]
-    return [*tables[:-1], replace(tables[-1], notes=tuple(curve_lines(curve)))]
+    measured = replace(first, title=f"Along {curve.parameter}: the paper's measures", notes=tuple(curve_lines(curve)))
+    rest = f"Along {curve.parameter}: other measures"
+    return [measured, *(replace(one, title=rest) for one in others if one.columns[1:])]
 
 
-def _pictures(curves: Sequence[Curve], figures: Mapping[str, bytes]) -> list[Picture]:
-    """The figures of all parameters first."""
-    own = {curve_name(curve): f"Usefulness along {curve.parameter}" for curve in curves}
-    together = [_together(name, image) for name, image in figures.items() if name not in own]
-    return [*together, *(Picture(title, figures[name], CAPTION) for name, title in own.items() if name in figures)]
+def _together(curves: Sequence[Curve], figures: Mapping[str, bytes]) -> list[Picture]:
+    """The figures of all parameters."""
+    own = [curve_name(curve) for curve in curves]
+    return [_of_all(name, image) for name, image in figures.items() if name not in own]
 
 
-def _together(name: str, image: bytes) -> Picture:
+def _of_all(name: str, image: bytes) -> Picture:
     if name.startswith("sweep_bars"):
         return Picture("How much each parameter matters", image, BARS)
     return Picture("All parameters", image, TOGETHER)
+
+
+def _own(curve: Curve, figures: Mapping[str, bytes]) -> list[Picture]:
+    image = figures.get(curve_name(curve))
+    return [Picture(f"Usefulness along {curve.parameter}", image, CAPTION)] if image else []

@@ -34,8 +34,9 @@ def teach_figure(experiment: Experiment) -> Figure:
     for axes in panels[max(0, len(lessons) - columns) : len(lessons)]:
         # Also where the panel below, which would have them, is empty.
         axes.tick_params(labelbottom=True)
-    figure.supxlabel("target samples", fontsize=8)
-    figure.supylabel("score in the target [s]", fontsize=8)
+        axes.set_xlabel("target samples", fontsize=8)
+    for axes in panels[: len(lessons) : columns]:
+        axes.set_ylabel("score [s]", fontsize=8)
     legend_below(figure, *panels[: len(lessons)])
     return figure
 
@@ -43,7 +44,7 @@ def teach_figure(experiment: Experiment) -> Figure:
 def _panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> None:
     _curve(axes, experiment.without, "without a proxy", (GREY, "--", "x"))
     _curve(axes, lesson.curve, "with the proxy", (BLUE, "-", "o"))
-    axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged from here on")
+    axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
     counts = experiment.without.counts
     shown = range(len(counts)) if len(counts) <= 4 else sorted({0, 1, (len(counts) + 1) // 2, len(counts) - 1})
     places = places_of(experiment.without)

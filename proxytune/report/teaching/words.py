@@ -18,12 +18,11 @@ def teach_answer(experiment: Experiment) -> str:
         return f"PLV (proxy learning value) is unknown: without a proxy {last} samples are too few to converge."
     saves, none, unknown = sorted_by_worth(experiment.teachers)
     sentences = [
-        f"Learning in {listed([_said(one) for one in saves])} first saves target samples" if saves else "",
-        f"{listed([_said(one) for one in none])} saves none" if none else "",
-        f"whether {listed([_said(one) for one in unknown])} saves any is open: the interval holds 0" if unknown else "",
+        f"Target samples saved (PLV, proxy learning value, with 95 % interval): {_said(saves) or 'none is shown'}.",
+        f"None saved: {_said(none)}." if none else "",
+        f"Open, since the interval reaches to both sides of 0: {_said(unknown)}." if unknown else "",
     ]
-    said = "; ".join(filter(None, sentences))
-    return f"{said[0].upper()}{said[1:]} (PLV, proxy learning value, in target samples saved, with 95 % intervals)."
+    return " ".join(filter(None, sentences))
 
 
 def sorted_by_worth(teachers: Sequence[TeacherResult]) -> tuple[list[TeacherResult], ...]:
@@ -37,8 +36,8 @@ def _above(plv: Estimate) -> bool:
     return plv.value is not None and plv.low is not None and plv.low > 0.0
 
 
-def _said(lesson: TeacherResult) -> str:
-    return f"{lesson.name} (PLV {count(lesson.worth.plv, UNKNOWN)})" if lesson.worth else lesson.name
+def _said(lessons: Sequence[TeacherResult]) -> str:
+    return "; ".join(f"{one.name}: {count(one.worth.plv, UNKNOWN)}" for one in lessons if one.worth)
 
 
 def teach_next_step(experiment: Experiment) -> str:

@@ -15,6 +15,7 @@ def test_a_sweep_writes_its_curve_as_figure_csv_and_json_and_goes_on_where_it_wa
     assert document["episodes"] == {"run": 72}
     assert sorted(path.name for path in output.iterdir()) == [
         "sweep_trim_delay=0.12.csv",
+        "sweep_trim_delay=0.12.html",
         "sweep_trim_delay=0.12.json",
         "sweep_trim_delay=0.12.png",
     ]
@@ -33,6 +34,7 @@ def test_all_sweeps_every_parameter_of_the_study_and_draws_them_together(make_st
     assert main(["sweep", str(folder), "--parameter", "all", "--points", "2"]) == 0
     names = sorted(path.stem for path in (folder / "figures").glob("*.png"))
     assert names == ["sweep_all", "sweep_bars", "sweep_delay", "sweep_trim"]
+    assert [path.name for path in (folder / "figures").glob("*.html")] == ["sweep_all.html"]
     out = capsys.readouterr().out
     assert "trim: PRPV: lowest" in out
     assert "give --target-model" in out

@@ -12,6 +12,7 @@ from rich.text import Text
 from proxytune.api.studies import StudyReport
 from proxytune.cli.sweep import draw_curves
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.typed import typed
 from proxytune.report.study.document import study_document
 from proxytune.report.study.table import study_table
 from proxytune.scores import Metric
@@ -50,7 +51,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     figures = draw_curves(curves, folder / "figures")
     document: dict[str, Any] = {}
     if result:
-        own_figures, report = StudyReport(result, Spent()).write(folder)
+        own_figures, report = StudyReport(result, Spent()).write(folder, typed(arguments) if metrics else "")
         figures = [*own_figures, *figures]
         document = {**study_document(result), "report": str(report)}
     paths = [str(path) for path in figures]

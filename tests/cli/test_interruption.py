@@ -32,7 +32,9 @@ def ended(process, number, left=KEPT):
     """Stop a command, and see that it ends with its one line and no process left."""
     process.send_signal(number)
     out, told = process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
-    lines = [line for line in told.splitlines() if not re.match(r"compare: at most|\d+ s: ", line)]
+    lines = [
+        line for line in told.splitlines() if not re.match(r"compare: at most|proxytune study: page: |\d+ s: ", line)
+    ]
     word, status = {signal.SIGTERM: ("terminated", 143), signal.SIGINT: ("interrupted", 130)}[number]
     (line,) = lines
     assert line.endswith(f": {word}; {left}")

@@ -43,6 +43,7 @@ def run(*words, status=0, **how):
     """A command as a process of its own: its one line on standard error, or what it printed where all went well."""
     process = start(*words, **how)
     out, told = process.communicate(timeout=120)
+    told = re.sub("proxytune study: page: .*\n", "", told)
     assert process.returncode == status, told
     if status == 0:
         return out
@@ -172,8 +173,9 @@ def test_a_disk_that_fills_up_is_told_and_the_study_goes_on_when_there_is_room(h
 
 
 def drawn(folder):
-    """Figures and report, and whatever else is in the folder but the database."""
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name != "study.db"}
+    """Figures and report, but for its date, and whatever else is in the folder but the database."""
+    files = [path for path in folder.rglob("*") if path.is_file() and path.name != "study.db"]
+    return {path: re.sub(rb"Written [-0-9]+ [0-9:]+", b"", path.read_bytes()) for path in files}
 
 
 @slow

@@ -29,6 +29,7 @@ th, td { text-align: left; vertical-align: top; padding: .25rem 1.1rem .25rem 0;
 thead th { color: var(--soft); vertical-align: bottom; }
 tbody th { font-weight: 600; white-space: pre-wrap; }
 td.prose { min-width: 11rem; }
+table:not(:has(thead)) td { overflow-wrap: anywhere; }
 .number { text-align: right; white-space: nowrap; }
 thead .number { white-space: normal; }
 .unseen { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); white-space: nowrap; }

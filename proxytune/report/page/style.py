@@ -48,8 +48,8 @@ footer { margin-top: 3rem; border-top: 1px solid var(--line); }
   th, td { padding-right: .6rem; }
   td.prose { min-width: 0; }
   .number { white-space: normal; }
-  img { max-height: 8.5cm; width: auto; min-width: 0 !important; }
-  figure, tr, .following { break-inside: avoid; }
+  img { max-height: 7.5cm; width: auto; min-width: 0 !important; }
+  section, figure, tr, .following { break-inside: avoid; }
   h2 { break-after: avoid; }
   thead { display: table-header-group; }
   nav, .under-way { display: none; }

@@ -43,7 +43,7 @@ def read_source(path: Path, wanted: Wanted) -> Source:
         LogError: If it is none of the known forms, or lacks what a log needs.
     """
     if not path.exists():
-        raise LogError(f"{path}: no such file or folder; check the path")
+        raise LogError(f"{path}: no such folder; check the path")
     for form in FORMS:
         if form.recognise(path):
             return _checked(form.read(path, wanted), path)

@@ -65,7 +65,7 @@ def test_the_stronger_right_motor_turns_it_left_and_commands_arrive_late():
 
 def test_the_family_scores_an_episode_alike_again_and_refuses_what_its_model_must_not_hold(tmp_path):
     settings = read_study_settings(ROBOT)
-    whole = bare_family(load_family(settings, ROBOT / "truth.toml"))
+    whole = bare_family(settings, ROBOT / "truth.toml")
     robot = dataclasses.replace(whole, view=dataclasses.replace(whole.view, seconds=2.0))
     episode = make_episode({"latency": 0.1}, agent="daredevil", start=1, seed=3)
     assert robot.run(episode) == robot.run(episode)

@@ -37,6 +37,11 @@ class SideBySide:
     target: RecordedEpisode | None
 
     @property
+    def command_unit(self) -> str:
+        """What commands are given in, empty where that is not known: on our roads wheels are given duties."""
+        return "" if self.road is None else "duty"
+
+    @property
     def sides(self) -> dict[str, RecordedEpisode]:
         """Proxy, and target if there is one, by their names."""
         return {"proxy": self.proxy} if self.target is None else {"proxy": self.proxy, "target": self.target}

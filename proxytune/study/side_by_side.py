@@ -72,18 +72,19 @@ def drive_side_by_side(
     return SideBySide(episode, proxy.metrics, road if isinstance(road, Road) else None, here, there)
 
 
-def load_target(settings: StudySettings, model: Path, option: str) -> DomainFamily:
+def load_target(settings: StudySettings, proxy: DomainFamily, model: Path, option: str) -> DomainFamily:
     """The study's domain as a model.toml describes it.
 
     Args:
         settings: Of the study.
+        proxy: The study's own family.
         model: The model.toml.
         option: What named it, for complaints.
 
     Raises:
         InputError: If there is no such model, or it is of another robot.
     """
-    check_robot(load_family(settings, settings.proxy), model, option)
+    check_robot(proxy, model, option)
     return load_family(settings, model)
 
 
@@ -98,4 +99,6 @@ def check_robot(family: DomainFamily, model: Path, option: str) -> None:
     robot = getattr(family, "robot", None)
     stated = read_settings(model).values.get("robot", robot)
     if robot is not None and stated != robot:
-        raise InputError(f"{option} {model}: is of the robot '{stated}'; give a model of '{robot}', which the study drives")
+        raise InputError(
+            f"{option} {model}: is of the robot '{stated}'; give a model of '{robot}', which the study drives"
+        )

@@ -1,6 +1,7 @@
 """The moving picture of an episode: proxy and target next to each other, frame by frame."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -38,11 +39,17 @@ class Animation:
         moving = np.arange(0.0, max(ends) + 1.0 / FRAME_HZ, 1.0 / FRAME_HZ)
         self.times: Sequence[float] = [*moving.tolist(), *[float(moving[-1])] * round(LINGER_S * FRAME_HZ)]
         figure = Figure(figsize=(SIDE_INCH * len(pair.sides), HEIGHT_INCH), dpi=DPI, layout="constrained")
-        self._canvas = FigureCanvasAgg(figure)
+        # Typed as nothing in particular, as matplotlib states no types of it
+        canvas: Any = FigureCanvasAgg
+        self._canvas = canvas(figure)
         panels = figure.subfigures(1, len(pair.sides), squeeze=False)[0]
         self._views = [_View(panel, pair, side) for panel, side in zip(panels, pair.sides, strict=True)]
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(figure.bbox)
+
+    def samples(self) -> list[NDArray[np.uint8]]:
+        """Three frames that show every colour: of the beginning, the middle and the end."""
+        return [self.frame(self.times[place]) for place in (0, len(self.times) // 2, -1)]
 
     def frame(self, time: float) -> NDArray[np.uint8]:
         """What is seen at a time [s], (rows, columns, 3)."""
@@ -57,7 +64,7 @@ class _View:
 
     def __init__(self, figure: SubFigure, pair: SideBySide, side: str) -> None:
         self._episode = pair.sides[side]
-        upper, lower = figure.subfigures(2, 1, height_ratios=(3.4, 1.9))
+        upper, lower = figure.subfigures(2, 1, height_ratios=(3.4, 1.9), squeeze=False)[:, 0]
         map_axes = upper.subplots()
         draw_map(map_axes, pair.road, [episode.places for episode in pair.sides.values()])
         map_axes.set_title(side, color=COLOURS[side], fontsize=11, fontweight="bold", loc="left")
@@ -65,7 +72,7 @@ class _View:
         self._camera: AxesImage | None = None
         commanded = lower
         if self._episode.pictures is not None:
-            camera, commanded = lower.subfigures(1, 2, width_ratios=(2.1, 1.3))
+            camera, commanded = lower.subfigures(1, 2, width_ratios=(2.1, 1.3), squeeze=False)[0]
             self._camera = _camera(camera, self._episode.pictures[0])
         self._bars = _bars(commanded, pair, side)
 
@@ -122,7 +129,7 @@ def _bars(figure: SubFigure, pair: SideBySide, side: str) -> Mapping[str, Line2D
     axes.set_xticks(range(len(channels)), [plain(channel) for channel in channels])
     axes.set_ylabel(f"command [{pair.command_unit}]" if pair.command_unit else "command", fontsize=8, labelpad=1)
     dress(axes)
-    look = {"color": COLOURS[side], "linewidth": 14, "solid_capstyle": "butt", "animated": True}
+    look: dict[str, Any] = {"color": COLOURS[side], "linewidth": 14, "solid_capstyle": "butt", "animated": True}
     return {channel: axes.plot([place] * 2, [0.0, 0.0], **look)[0] for place, channel in enumerate(channels)}
 
 

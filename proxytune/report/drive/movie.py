@@ -1,6 +1,6 @@
 """Frames as a file: a GIF by Pillow, an MP4 by ffmpeg."""
 
-import importlib.util
+import importlib
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ from proxytune.errors import InputError
 from proxytune.report.writing import write_movie
 
 Frame = NDArray[np.uint8]
-COLOURS = 128
+COLOURS = 64
 """In a GIF's palette, which all of its frames share: what does not move is then not stored again."""
 
 DPI = 100.0
@@ -51,14 +51,13 @@ def ffmpeg() -> str:
     Raises:
         InputError: If there is none.
     """
-    found = shutil.which(matplotlib.rcParams["animation.ffmpeg_path"])
+    found = shutil.which(str(matplotlib.rcParams["animation.ffmpeg_path"]))
     if found:
         return found
-    if importlib.util.find_spec("imageio_ffmpeg") is None:
-        raise InputError("an .mp4 takes ffmpeg: install it (pip install imageio-ffmpeg will do), or write a .gif")
-    import imageio_ffmpeg
-
-    return str(imageio_ffmpeg.get_ffmpeg_exe())
+    try:
+        return str(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe())
+    except (ModuleNotFoundError, RuntimeError):
+        raise InputError("an .mp4 takes ffmpeg: pip install imageio-ffmpeg, or write a .gif") from None
 
 
 def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:

@@ -1,5 +1,7 @@
 """A robot's way on the map: its path with the direction, where it starts and where it ends."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -9,6 +11,9 @@ from proxytune.study.side_by_side import SideBySide
 
 ARROWS, LEAST_M = 6, 0.5
 """About so many arrows on a path, and at least so far apart [m]."""
+
+NEAR_M = 0.15
+"""Ends as near as this are written above and below each other [m]."""
 
 WIDTHS = {"proxy": 1.0, "target": 2.2}
 """The target is drawn wider and below, so that both are seen where they agree."""
@@ -20,11 +25,16 @@ def draw_paths(axes: Axes, pair: SideBySide) -> None:
         _draw_path(axes, pair.sides[side].places, side)
     _draw_start(axes, pair.proxy.places)
     ends = {side: episode.places[-1] for side, episode in pair.sides.items()}
-    lowest = min(ends, key=lambda side: float(ends[side][1]))
+    meet = len(ends) > 1 and np.hypot(*np.subtract(*ends.values())) < NEAR_M
     for side, end in ends.items():
-        axes.plot(*end, "s", color=COLOURS[side], markersize=4.5, markeredgecolor="white", markeredgewidth=0.7)
-        below = side == lowest and len(ends) > 1
-        _write(axes, end, f"{side} ends", below=below, colour=COLOURS[side])
+        look: dict[str, Any] = {
+            "color": COLOURS[side],
+            "markeredgecolor": "white",
+            "markeredgewidth": 0.7,
+            "clip_on": False,
+        }
+        axes.plot(*end, "s", markersize=4.5, **look)
+        _write(axes, end, f"{side} ends", COLOURS[side], away=meet and side == "target")
 
 
 def draw_parting(axes: Axes, pair: SideBySide) -> None:
@@ -37,7 +47,7 @@ def draw_parting(axes: Axes, pair: SideBySide) -> None:
 def _draw_path(axes: Axes, places: NDArray[np.float64], side: str) -> None:
     (line,) = axes.plot(*places.T, color=COLOURS[side], linewidth=WIDTHS[side], solid_capstyle="round")
     if side == "target":
-        line.set_path_effects(CASING)
+        line.set_path_effects(list(CASING))
     for row in arrow_rows(places):
         # Along the path, not along the heading: a robot may drive backwards
         step = places[row] - places[row - 1]
@@ -61,21 +71,22 @@ def arrow_rows(places: NDArray[np.float64]) -> list[int]:
 
 def _draw_start(axes: Axes, places: NDArray[np.float64]) -> None:
     axes.plot(*places[0], "o", color="white", markersize=6, markeredgecolor="black", markeredgewidth=1.0)
-    _write(axes, places[0], "start", below=True, colour="black")
+    _write(axes, places[0], "start", "black")
 
 
-def _write(axes: Axes, place: NDArray[np.float64], text: str, *, below: bool, colour: str) -> None:
-    """Write beside a place, towards the middle of the map."""
-    left, right = axes.get_xlim()
-    inwards = -1 if place[0] > (left + right) / 2.0 else 1
+def _write(axes: Axes, place: NDArray[np.float64], text: str, colour: str, *, away: bool = False) -> None:
+    """Write beside a place, towards the middle of the map, or above and below the other way round."""
+    middle = np.mean([axes.get_xlim(), axes.get_ylim()], axis=1)
+    right, above = (1 if place[0] < middle[0] else -1), (1 if (place[1] < middle[1]) != away else -1)
     axes.annotate(
         text,
         (float(place[0]), float(place[1])),
-        xytext=(5 * inwards, -4 if below else 4),
+        xytext=(5 * right, 4 * above),
         textcoords="offset points",
-        ha="left" if inwards > 0 else "right",
-        va="top" if below else "bottom",
+        ha="left" if right > 0 else "right",
+        va="bottom" if above > 0 else "top",
         color=colour,
         fontsize=7,
         path_effects=HALO,
+        annotation_clip=False,
     )

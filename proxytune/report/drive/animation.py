@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from proxytune.report.drive.path import draw_start
 from proxytune.report.drive.scene import COLOURS, HALO, draw_map
 from proxytune.report.style import dress, plain
 from proxytune.study.side_by_side import SideBySide
@@ -67,6 +68,7 @@ class _View:
         upper, lower = figure.subfigures(2, 1, height_ratios=(3.4, 1.9), squeeze=False)[:, 0]
         map_axes = upper.subplots()
         draw_map(map_axes, pair.road, [episode.places for episode in pair.sides.values()])
+        draw_start(map_axes, self._episode.places)
         map_axes.set_title(side, color=COLOURS[side], fontsize=11, fontweight="bold", loc="left")
         self._path, self._robot, self._clock = _on_map(map_axes, COLOURS[side])
         self._camera: AxesImage | None = None
@@ -103,7 +105,7 @@ class _View:
 def _on_map(axes: Axes, colour: str) -> tuple[Line2D, Line2D, Text]:
     """The path so far, the robot, and the time."""
     (path,) = axes.plot([], [], color=colour, linewidth=1.8, solid_capstyle="round", animated=True)
-    (robot,) = axes.plot([], [], color=colour, markersize=13, markeredgecolor="white", animated=True)
+    (robot,) = axes.plot([], [], color=colour, markersize=13, markeredgecolor="white", clip_on=False, animated=True)
     clock = axes.text(
         0.98, 0.97, "", transform=axes.transAxes, ha="right", va="top", fontsize=10, path_effects=HALO, animated=True
     )
@@ -123,11 +125,13 @@ def _bars(figure: SubFigure, pair: SideBySide, side: str) -> Mapping[str, Line2D
     if not channels:
         return {}
     axes = figure.subplots()
-    most = max(float(np.abs(e.commands[channel]).max()) for e in pair.sides.values() for channel in channels)
-    axes.set(xlim=(-0.6, len(channels) - 0.4), ylim=(-max(most, 1e-9), max(most, 1e-9)))
+    issued = np.concatenate([e.commands[channel] for e in pair.sides.values() for channel in channels])
+    low, high = min(0.0, float(issued.min())), max(0.0, float(issued.max()))
+    axes.set(xlim=(-0.6, len(channels) - 0.4), ylim=(low, high if high > low else 1.0))
+    axes.locator_params(axis="y", nbins=5)
     axes.axhline(0.0, color="black", linewidth=0.8)
     axes.set_xticks(range(len(channels)), [plain(channel) for channel in channels])
-    axes.set_ylabel(f"command [{pair.command_unit}]" if pair.command_unit else "command", fontsize=8, labelpad=1)
+    axes.set_ylabel(f"command [{pair.command_unit}]" if pair.command_unit else "command", fontsize=8, labelpad=2)
     dress(axes)
     look: dict[str, Any] = {"color": COLOURS[side], "linewidth": 14, "solid_capstyle": "butt", "animated": True}
     return {channel: axes.plot([place] * 2, [0.0, 0.0], **look)[0] for place, channel in enumerate(channels)}

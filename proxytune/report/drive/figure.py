@@ -28,7 +28,7 @@ def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
     """
     aspect = map_aspect(pair.road, [episode.places for episode in pair.sides.values()])
     parts: list[tuple[float, Callable[[SubFigure], None]]] = [
-        (0.85 * COLUMN * aspect + 0.3 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
+        (0.85 * COLUMN * aspect + 0.35 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
     ]
     if channels := pair.proxy.channels:
         parts.append((CHANNEL_INCH * len(channels) + 0.3, functools.partial(_draw_commands, pair)))
@@ -51,7 +51,7 @@ def _draw_map(pair: SideBySide, metrics: Sequence[str], figure: SubFigure) -> No
         values = [f"{plain(name)} {short(episode.metrics[name])} {pair.units[name]}".strip() for name in metrics]
         axes.annotate(
             f"{side}: {', '.join(values)}",
-            (0.0, 1.0), xytext=(0, 3 + 9 * line), xycoords="axes fraction", textcoords="offset points",
+            (0.0, 1.0), xytext=(0, 6 + 9 * line), xycoords="axes fraction", textcoords="offset points",
             color=COLOURS[side], fontsize=7,
         )  # fmt: skip
 

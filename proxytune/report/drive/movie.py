@@ -1,7 +1,10 @@
 """Frames as a file: a GIF by Pillow, an MP4 by ffmpeg."""
 
+import contextlib
 import importlib
+import logging
 import shutil
+import subprocess
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from proxytune.errors import InputError
+from proxytune.errors import InputError, RunError
 from proxytune.report.writing import write_movie
 
 Frame = NDArray[np.uint8]
@@ -34,7 +37,8 @@ def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], fra
     Raises:
         RunError: If it cannot be written.
     """
-    palette = Image.fromarray(np.concatenate(list(samples))).quantize(COLOURS, dither=Image.Dither.NONE)
+    # Without k-means the white of the ground turns grey where pictures have many colours
+    palette = Image.fromarray(np.concatenate(list(samples))).quantize(COLOURS, kmeans=2, dither=Image.Dither.NONE)
     pictures = _with_palette(frames, palette)
     first = next(pictures)
     how = {"save_all": True, "append_images": pictures, "duration": round(1000.0 / frame_hz), "loop": 0}
@@ -67,8 +71,24 @@ def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:
         InputError: If ffmpeg is missing.
         RunError: If it cannot be written.
     """
-    with matplotlib.rc_context({"animation.ffmpeg_path": ffmpeg()}):
-        write_movie(path, lambda draft: _encode(draft, iter(frames), frame_hz))
+    with matplotlib.rc_context({"animation.ffmpeg_path": ffmpeg()}), _quiet():
+        try:
+            write_movie(path, lambda draft: _encode(draft, iter(frames), frame_hz))
+        except subprocess.CalledProcessError as problem:
+            said = f"{problem.stderr}".strip().splitlines()[-1:] or [f"exit status {problem.returncode}"]
+            raise RunError(f"{path}: ffmpeg cannot encode it ({said[0]}); write a .gif instead") from None
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Without matplotlib's account of what ffmpeg said: we say it in one line."""
+    log = logging.getLogger("matplotlib.animation")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 def _encode(path: Path, frames: Iterator[Frame], frame_hz: float) -> None:

@@ -23,7 +23,7 @@ def draw_paths(axes: Axes, pair: SideBySide) -> None:
     """Draw every side's path, the common start, and what each end is."""
     for side in reversed(pair.sides):
         _draw_path(axes, pair.sides[side].places, side)
-    _draw_start(axes, pair.proxy.places)
+    draw_start(axes, pair.proxy.places)
     ends = {side: episode.places[-1] for side, episode in pair.sides.items()}
     meet = len(ends) > 1 and np.hypot(*np.subtract(*ends.values())) < NEAR_M
     for side, end in ends.items():
@@ -69,7 +69,8 @@ def arrow_rows(places: NDArray[np.float64]) -> list[int]:
     return [int(row) for row in np.searchsorted(driven, wanted)]
 
 
-def _draw_start(axes: Axes, places: NDArray[np.float64]) -> None:
+def draw_start(axes: Axes, places: NDArray[np.float64]) -> None:
+    """Mark where a path (times, 2) starts."""
     axes.plot(*places[0], "o", color="white", markersize=6, markeredgecolor="black", markeredgewidth=1.0)
     _write(axes, places[0], "start", "black")
 

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from proxytune.report.drive.path import draw_start
-from proxytune.report.drive.scene import COLOURS, HALO, draw_map
+from proxytune.report.drive.scene import COLOURS, draw_map
 from proxytune.report.style import dress, plain
 from proxytune.study.side_by_side import SideBySide
 from proxytune.study.single_episode import RecordedEpisode
@@ -106,9 +106,7 @@ def _on_map(axes: Axes, colour: str) -> tuple[Line2D, Line2D, Text]:
     """The path so far, the robot, and the time."""
     (path,) = axes.plot([], [], color=colour, linewidth=1.8, solid_capstyle="round", animated=True)
     (robot,) = axes.plot([], [], color=colour, markersize=13, markeredgecolor="white", clip_on=False, animated=True)
-    clock = axes.text(
-        0.98, 0.97, "", transform=axes.transAxes, ha="right", va="top", fontsize=10, path_effects=HALO, animated=True
-    )
+    clock = axes.text(1.0, 1.02, "", transform=axes.transAxes, ha="right", va="bottom", fontsize=10, animated=True)
     return path, robot, clock
 
 

@@ -6,35 +6,35 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from proxytune.report.drive.labels import corners_of
 from proxytune.report.drive.scene import CASING, COLOURS, HALO
 from proxytune.study.side_by_side import SideBySide
 
 ARROWS, LEAST_M = 6, 0.5
 """About so many arrows on a path, and at least so far apart [m]."""
 
-NEAR_M = 0.15
-"""Ends as near as this are written above and below each other [m]."""
+EVERY = 6
+"""Of so many points of a path one is looked at when words are placed."""
 
 WIDTHS = {"proxy": 1.0, "target": 2.2}
 """The target is drawn wider and below, so that both are seen where they agree."""
 
 
 def draw_paths(axes: Axes, pair: SideBySide) -> None:
-    """Draw every side's path, the common start, and what each end is."""
+    """Draw every side's path, the common start, and where each ends."""
     for side in reversed(pair.sides):
         _draw_path(axes, pair.sides[side].places, side)
     draw_start(axes, pair.proxy.places)
-    ends = {side: episode.places[-1] for side, episode in pair.sides.items()}
-    meet = len(ends) > 1 and np.hypot(*np.subtract(*ends.values())) < NEAR_M
-    for side, end in ends.items():
-        look: dict[str, Any] = {
-            "color": COLOURS[side],
-            "markeredgecolor": "white",
-            "markeredgewidth": 0.7,
-            "clip_on": False,
-        }
-        axes.plot(*end, "s", markersize=4.5, **look)
-        _write(axes, end, f"{side} ends", COLOURS[side], away=meet and side == "target")
+    edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.7, "clip_on": False, "zorder": 4}
+    marks = {"start": ("black", pair.proxy.places[0])}
+    for side, episode in pair.sides.items():
+        marks[f"{side} ends"] = (COLOURS[side], episode.places[-1])
+        axes.plot(*episode.places[-1], "s", color=COLOURS[side], markersize=4.5, **edge)
+    paths = np.concatenate([episode.places[::EVERY] for episode in pair.sides.values()])
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+    corners = corners_of(np.array([place for _, place in marks.values()]), paths, low, high)
+    for (text, (colour, place)), corner in zip(marks.items(), corners, strict=True):
+        _write(axes, place, text, colour, corner)
 
 
 def draw_parting(axes: Axes, pair: SideBySide) -> None:
@@ -71,21 +71,18 @@ def arrow_rows(places: NDArray[np.float64]) -> list[int]:
 
 def draw_start(axes: Axes, places: NDArray[np.float64]) -> None:
     """Mark where a path (times, 2) starts."""
-    axes.plot(*places[0], "o", color="white", markersize=6, markeredgecolor="black", markeredgewidth=1.0)
-    _write(axes, places[0], "start", "black")
+    edge: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 1.0, "zorder": 4}
+    axes.plot(*places[0], "o", color="white", markersize=6, **edge)
 
 
-def _write(axes: Axes, place: NDArray[np.float64], text: str, colour: str, *, away: bool = False) -> None:
-    """Write beside a place, towards the middle of the map, or above and below the other way round."""
-    middle = np.mean([axes.get_xlim(), axes.get_ylim()], axis=1)
-    right, above = (1 if place[0] < middle[0] else -1), (1 if (place[1] < middle[1]) != away else -1)
+def _write(axes: Axes, place: NDArray[np.float64], text: str, colour: str, corner: tuple[int, int]) -> None:
     axes.annotate(
         text,
         (float(place[0]), float(place[1])),
-        xytext=(5 * right, 4 * above),
+        xytext=(5 * corner[0], 4 * corner[1]),
         textcoords="offset points",
-        ha="left" if right > 0 else "right",
-        va="bottom" if above > 0 else "top",
+        ha="left" if corner[0] > 0 else "right",
+        va="bottom" if corner[1] > 0 else "top",
         color=colour,
         fontsize=7,
         path_effects=HALO,

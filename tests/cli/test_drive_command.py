@@ -111,6 +111,14 @@ def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tm
     assert not (tmp_path / "walk.png").exists()
 
 
+def test_a_family_that_records_nothing_is_told_so_before_anything_is_driven(make_study, tmp_path, capsys):
+    folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
+    assert "nothing can be drawn" in complaint(capsys, folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
+    assert not (tmp_path / "journal").exists()
+    document(capsys, folder, "--agent", "agent0")
+    assert (tmp_path / "journal").exists()
+
+
 BAD = {
     "an unknown agent": (["--agent", "wry"], "agent 'wry' is unknown (your own is written module:attribute)"),
     "no such start": (["--start", "10"], "start 10: the family has 10; give 0 to 9"),

@@ -14,6 +14,7 @@ from proxytune.errors import InputError
 from proxytune.report.drive.document import episode_document, episode_table, parting
 from proxytune.report.drive.pictures import NO_PLACES, check_output, write_episode
 from proxytune.seeds import episode_seed
+from proxytune.space import Theta
 from proxytune.study.family import load_family
 from proxytune.study.settings import StudySettings, read_study_settings
 from proxytune.study.side_by_side import SideBySide, drive_side_by_side, load_target
@@ -51,21 +52,26 @@ def run(arguments: argparse.Namespace) -> Answer:
     model, option = (arguments.against, "--against") if arguments.against else (settings.truth, "truth")
     target = load_target(settings, family, model, option) if model else None
     chosen = choose_theta(arguments.theta, settings, family, "--theta")
-    check_episode(family, arguments.agent, chosen.theta, arguments.start)
     seed = settings.seed if arguments.seed is None else arguments.seed
-    derived = episode_seed(seed, arguments.start)
-    episode = make_episode(chosen.theta, agent=arguments.agent, start=arguments.start, seed=derived)
-    with Console(stderr=True).status("driving"):
-        pair = drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
+    pair = _drive(family, target, arguments, chosen.theta, seed)
     compared = [metric.name for metric in settings.metrics]
     if arguments.output:
         write_episode(pair, compared, arguments.output)
     files = {"against": str(model) if model else None, "output": str(arguments.output) if arguments.output else None}
     document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files}
-    about = [_say_episode(pair, settings, seed), _say_theta(chosen), _say_target(model)]
-    below = [line for line in (parting(pair), files["output"]) if line]
-    table = episode_table(pair, compared)
-    return Answer(document, Group(Text("\n".join([*about, ""])), table, Text("\n".join(["", *below]))))
+    about = [_say_episode(pair, settings, seed), _say_theta(chosen), _say_target(model), ""]
+    below = ["", *(line for line in (parting(pair), files["output"]) if line)]
+    return Answer(document, Group(Text("\n".join(about)), episode_table(pair, compared), Text("\n".join(below))))
+
+
+def _drive(
+    family: DomainFamily, target: DomainFamily | None, arguments: argparse.Namespace, theta: Theta, seed: int
+) -> SideBySide:
+    agent, start = arguments.agent, arguments.start
+    check_episode(family, agent, theta, start)
+    episode = make_episode(theta, agent=agent, start=start, seed=episode_seed(seed, start))
+    with Console(stderr=True).status("driving"):
+        return drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
 
 
 def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:

@@ -56,8 +56,8 @@ def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTab
         return chosen.arrange(agents=settings.agents, episodes=driven), ()
     beyond = [label for label in driven if label not in own]
     line = (
-        f"the target's episodes {own[0]} to {own[-1]} are taken for this study's starts, and {len(beyond)} of others are "
-        "left out; raise starts to use them, or label episodes otherwise if they are no starts"
+        f"the target's episodes {own[0]} to {own[-1]} are taken for this study's starts, and {len(beyond)} of others "
+        "are left out; raise starts to use them, or label episodes otherwise if they are no starts"
     )
     return chosen.arrange(agents=settings.agents, episodes=own), (line,) if beyond else ()
 

@@ -43,6 +43,7 @@ COMMANDS: dict[str, Command] = {
         "measure PLV (proxy learning value): how much a simulator saves in training",
         resumes=True,
     ),
+    "drive": Command("drive", "show an episode, the proxy beside the target: metrics, a picture or an animation"),
     "import": Command("importing", "make a log of a ROS bag, a CSV, a TUM trajectory or arrays, and say what is in it"),
     "measure": Command("measure", "drive a study's agents in the domain of a model file and write their scores"),
     "record": Command("record", "drive the domain of a model file through manoeuvres and write the log"),

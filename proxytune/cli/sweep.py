@@ -11,8 +11,9 @@ from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.study_folder import study_folder
+from proxytune.cli.terminal.theta import read_theta
 from proxytune.cli.terminal.typed import typed
-from proxytune.effects import SHIPPED, Catalogue, read_model
+from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.report.page import foot_of, html_of
 from proxytune.report.study.page import study_settings
@@ -118,30 +119,10 @@ def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
     return written
 
 
-def read_base(text: str | None, catalogue: Catalogue = SHIPPED) -> Theta:
-    """The values of the other parameters, from NAME=VALUE pairs or a model.toml; none for `nominal`.
-
-    Raises:
-        InputError: If it is neither.
-    """
-    if text is None or text == "nominal":
-        return {}
-    if text.endswith(".toml"):
-        return read_model(Path(text), catalogue).theta
-    pairs = [pair.partition("=") for pair in text.split(",")]
-    try:
-        base = {name.strip(): float(value) for name, _, value in pairs}
-    except ValueError:
-        raise InputError(f"--at {text}: write NAME=VALUE,NAME=VALUE, best, nominal or a model.toml") from None
-    if len(base) < len(pairs):
-        raise InputError(f"--at {text}: names a parameter twice; give each once")
-    return base
-
-
 def _plan(study: Study, arguments: argparse.Namespace, word: str) -> list[SweepRecord]:
     if not 2 <= arguments.points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {arguments.points}")
-    base = best_theta(study) if word == "best" else read_base(word, Catalogue(study.settings.folder.resolve()))
+    base = best_theta(study) if word == "best" else read_theta(word, Catalogue(study.settings.folder.resolve()), "--at")
     check_base(study, base)
     names = study.settings.space.names if arguments.parameter == "all" else (arguments.parameter,)
     return [plan_sweep(sweep_interval(study, name), base, arguments.points) for name in names]

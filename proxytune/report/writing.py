@@ -40,6 +40,15 @@ def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
     _whole(path, "the picture ", lambda draft: Image.fromarray(picture).save(draft, format="png"))
 
 
+def write_movie(path: Path, write: Callable[[Path], object]) -> None:
+    """Write a moving picture by what can encode it, its folder made where missing; an interrupted write leaves the old.
+
+    Raises:
+        RunError: If the file cannot be written.
+    """
+    _whole(path, "the animation ", write)
+
+
 def _whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:

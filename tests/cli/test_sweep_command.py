@@ -3,7 +3,7 @@ import json
 import pytest
 
 from proxytune.cli.main import main
-from proxytune.cli.sweep import read_base
+from proxytune.cli.terminal.theta import read_theta
 from proxytune.errors import InputError
 
 
@@ -97,10 +97,10 @@ def test_a_study_that_was_changed_since_has_no_best_theta_but_nominal_values(fin
 
 
 def test_a_base_is_read_from_pairs_or_from_a_model(tmp_path):
-    assert read_base(None) == {}
-    assert read_base("trim=0.1, delay=2e-1") == {"trim": 0.1, "delay": 0.2}
+    assert read_theta(None) == {}
+    assert read_theta("trim=0.1, delay=2e-1") == {"trim": 0.1, "delay": 0.2}
     (tmp_path / "model.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.05\n')
-    assert read_base(str(tmp_path / "model.toml")) == {"trim": 0.05}
+    assert read_theta(str(tmp_path / "model.toml")) == {"trim": 0.05}
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_base_is_read_from_pairs_or_from_a_model(tmp_path):
 )
 def test_a_base_that_is_neither_is_refused(text, expected):
     with pytest.raises(InputError, match=expected):
-        read_base(text)
+        read_theta(text)
 
 
 BAD = {

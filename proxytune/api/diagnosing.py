@@ -19,7 +19,9 @@ from proxytune.errors import InputError
 from proxytune.importing.opening import open_log
 from proxytune.logs import Log
 from proxytune.report.diagnosis.camera.document import noise_floor
+from proxytune.report.diagnosis.page import diagnosis_page
 from proxytune.report.diagnosis.whole import model_file, whole_document, whole_figures, whole_headline, whole_notes
+from proxytune.report.page import foot_of, html_of
 from proxytune.report.writing import save, write_text
 
 IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: ", "--test": "test"}
@@ -101,8 +103,12 @@ class DiagnosisReport:
         """What `diagnose --json` prints of it."""
         return whole_document(self.found)
 
-    def write(self, folder: str | Path) -> list[Path]:
-        """Write diagnosis.json, model.toml, which `predict` and a study's `proxy` read, and the figures; their paths.
+    def write(self, folder: str | Path, command: str = "") -> list[Path]:
+        """Write diagnosis.json, model.toml, which `predict` and a study's `proxy` read, figures and page; their paths.
+
+        Args:
+            folder: Where to.
+            command: What the page's foot says makes it again.
 
         Raises:
             RunError: If a file cannot be written.
@@ -114,7 +120,10 @@ class DiagnosisReport:
         figures = {home / f"{name}.png": figure for name, figure in self.figures().items()}
         for path, figure in figures.items():
             save(figure, path)
-        return [home / "diagnosis.json", home / "model.toml", *figures]
+        drawn = {path.stem: path.read_bytes() for path in figures}
+        foot = foot_of(command, [("log", self.found.log), ("robot", self.found.robot.name)])
+        write_text(home / "report.html", html_of(diagnosis_page(self.found, drawn, foot)))
+        return [home / "diagnosis.json", home / "model.toml", *figures, home / "report.html"]
 
 
 def diagnose(

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import pandas as pd
 from matplotlib.figure import Figure
 
+from proxytune.report.page import html_of
 from proxytune.report.study.convergence import convergence
 from proxytune.report.study.document import study_document
 from proxytune.report.study.finding import finding_of
 from proxytune.report.study.importance_figure import importance_figure
-from proxytune.report.study.page import page
+from proxytune.report.study.page import study_page
 from proxytune.report.study.profiles_figure import profiles_figure
 from proxytune.report.study.search_figures import evaluations_figure
 from proxytune.report.study.verdict import sentence
@@ -115,8 +116,12 @@ class StudyReport:
         """What `study --json` prints of it."""
         return study_document(self.result)
 
-    def write(self, folder: str | Path | None = None) -> ReportFiles:
+    def write(self, folder: str | Path | None = None, command: str = "") -> ReportFiles:
         """Write the figures and report.html, into the study's folder unless another is given.
+
+        Args:
+            folder: Where to.
+            command: What the page's foot says makes it again; `study` where nothing is given.
 
         Raises:
             RunError: If a file cannot be written.
@@ -126,7 +131,8 @@ class StudyReport:
         for path, figure in zip(paths, self.figures().values(), strict=True):
             save(figure, path)
         report = home / "report.html"
-        write_text(report, page(self.result, paths))
+        figures = {path.stem: path.read_bytes() for path in paths}
+        write_text(report, html_of(study_page(self.result, figures, command)))
         return ReportFiles(paths, report)
 
 

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, Arena, check_truths, objective_of
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.typed import typed
 from proxytune.comparison.analytic import Objective
 from proxytune.comparison.judgement import judging_code
 from proxytune.comparison.runs import Run, RunKey, judged_again, run_document, run_engine, run_from
@@ -18,6 +19,8 @@ from proxytune.comparison.summary import EngineSummary, summarise
 from proxytune.errors import InputError, StoreError
 from proxytune.report.compare.document import compare_document, compare_lines, compare_tables
 from proxytune.report.compare.figure import compare_figure
+from proxytune.report.compare.page import compare_page
+from proxytune.report.page import foot_of, html_of
 from proxytune.report.writing import save, write_text
 from proxytune.running.workers import working
 from proxytune.search.engines.engine import Engine
@@ -71,19 +74,27 @@ def run(arguments: argparse.Namespace) -> Answer:
         runs = _finish_all(arena, keys, output / FILE_NAME, _beside(arguments))
     grouped = [[runs[key] for key in keys if key.engine == engine.name] for engine in engines]
     summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
-    return _answer(objective, summaries, grouped, output)
+    return _answer(objective, summaries, grouped, output, typed(arguments))
 
 
 def _answer(
-    objective: Objective, summaries: Sequence[EngineSummary], grouped: Sequence[Sequence[Run]], output: Path
+    objective: Objective,
+    summaries: Sequence[EngineSummary],
+    grouped: Sequence[Sequence[Run]],
+    output: Path,
+    command: str,
 ) -> Answer:
     budget, figure = grouped[0][0].key.budget, output / "compare.png"
     save(compare_figure(grouped, objective.tolerance), figure)
     document = compare_document(objective.name, summaries, budget, objective.tolerance)
     write_text(output / "compare.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
-    lines = [*compare_lines(summaries), f"figure: {figure}"]
+    page, foot = output / "report.html", foot_of(command, [("budget", str(budget))])
+    write_text(page, html_of(compare_page(objective.name, summaries, budget, figure.read_bytes(), foot)))
+    lines = [*compare_lines(summaries), f"figure: {figure}", f"report: {page}"]
     tables = compare_tables(objective.name, summaries, budget)
-    return Answer({**document, "figures": [str(figure)]}, Group(*tables, *(Text(line) for line in lines)))
+    return Answer(
+        {**document, "figures": [str(figure)], "report": str(page)}, Group(*tables, *(Text(line) for line in lines))
+    )
 
 
 def _engines(arguments: argparse.Namespace) -> list[Engine]:

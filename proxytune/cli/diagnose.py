@@ -12,6 +12,7 @@ from proxytune.api.diagnosing import DiagnosisReport
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
 from proxytune.cli.terminal.steps import Steps
+from proxytune.cli.terminal.typed import typed
 from proxytune.diagnosis.log_diagnosis import diagnose_log
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.effects import Catalogue
@@ -93,7 +94,7 @@ def _diagnosed(arguments: argparse.Namespace, log: Log, test: Log | None, import
         folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
         step("drawing")
         report = DiagnosisReport(found)
-        files = [str(path) for path in report.write(folder)]
+        files = [str(path) for path in report.write(folder, typed(arguments))]
     lines = [*(f"{arguments.log.name}: {note}" for note in imported), *files]
     document = report.document() | {"files": files} | ({"imported": list(imported)} if imported else {})
     return Answer(document, Group(whole_tables_and_notes(found), Text("\n".join(lines))))

@@ -4,13 +4,18 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.live_page import renewed_page
+from proxytune.report.page import foot_of, html_of
+from proxytune.report.study.page import study_command, study_settings
+from proxytune.report.teaching.page import plv_page
 from proxytune.report.teaching.plv_document import plv_document, plv_table
 from proxytune.report.teaching.plv_figure import plv_figure
-from proxytune.report.writing import save
+from proxytune.report.writing import save, write_text
 from proxytune.running.progress import Bars
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
+from proxytune.study.settings import LEARNING
 from proxytune.study.study import Study
 from proxytune.teaching.box import search_space
 from proxytune.teaching.experiment import count_points, load_setup
@@ -25,9 +30,13 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str,
     search_space(settings, widths, {})
     space = search_space(settings, widths, by_prpv() if setup.settings.narrow else {})
     points = count_points(setup, setup.settings.budget)
-    with locked(folder), Store.open(folder) as store, Bars(points, "points of learning curves") as bars:
+    watching = renewed_page(settings, LEARNING, Bars(points, "points of learning curves"))
+    with locked(folder), Store.open(folder) as store, watching as bars:
         search = PlvSearch(settings, setup, store, space, bars)
         result = search.run(make_proposer(study.engine, settings.initial))
     figure = folder / "figures" / "plv.png"
     save(plv_figure(result), figure)
-    return Answer({**plv_document(result), "figure": str(figure)}, plv_table(result, {"figure": figure}))
+    page, foot = folder / "report.html", foot_of(study_command(settings), study_settings(settings))
+    write_text(page, html_of(plv_page(result, figure.read_bytes(), foot)))
+    document = {**plv_document(result), "figure": str(figure), "report": str(page)}
+    return Answer(document, plv_table(result, {"figure": figure, "report": page}))

@@ -76,6 +76,7 @@ COMMANDS: dict[str, Command] = {
         kept="every finished point of a learning curve is kept",
         draws=True,
     ),
+    "drive": Command("drive", "show an episode, the proxy beside the target: metrics, a picture or an animation"),
     "import": Command("importing", "make a log of a ROS bag, a CSV, a TUM trajectory or arrays, and say what is in it"),
     "measure": Command("measure", "drive a study's agents in the domain of a model file and write their scores"),
     "record": Command(
@@ -175,7 +176,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         says what is kept.
     """
     words = sys.argv[1:] if argv is None else argv
-    arguments = parser(words).parse_args(words)
+    arguments = parser(words).parse_args(words, argparse.Namespace(words=words))
     command = COMMANDS[arguments.command]
     try:
         with sigterm_as_interrupt(), _figures(getattr(arguments, "format", ())):

@@ -12,6 +12,7 @@ from rich.text import Text
 from proxytune.api.studies import StudyReport
 from proxytune.cli.sweep import draw_curves
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.typed import typed
 from proxytune.report.study.document import study_document
 from proxytune.report.study.table import study_table
 from proxytune.report.study.table_files import write_tables
@@ -55,7 +56,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())
-        own_figures, report = found.write(folder)
+        own_figures, report = found.write(folder, typed(arguments) if metrics else "")
         figures = [*own_figures, *figures]
         tables = [str(path) for path in write_tables(result, found.trials(), folder / "figures")]
         document = {**study_document(result), "report": str(report), "tables": tables}

@@ -4,21 +4,26 @@ import argparse
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Group
 from rich.text import Text
 
 from proxytune.cli.score_tables import read_sides
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.typed import typed
 from proxytune.errors import InputError
+from proxytune.report.page import foot_of, html_of
 from proxytune.report.scores.document import document_of, document_of_ranking
 from proxytune.report.scores.figures import flipped_pairs, scatter
+from proxytune.report.scores.page import Drawn, score_page
 from proxytune.report.scores.table import measures, ranking
 from proxytune.report.scores.table_file import write_scores_table
+from proxytune.report.scores.words import score_answer
 from proxytune.report.table_files import check_ending
-from proxytune.report.writing import save
+from proxytune.report.writing import save, write_text
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import Assessment, assess, in_common, select_proxy
+from proxytune.usefulness import Assessment, Selection, assess, in_common, select_proxy
 
 FEWEST_RESAMPLES = 100
 
@@ -89,19 +94,28 @@ def run(arguments: argparse.Namespace) -> Answer:
         name: assess(proxy=proxy, target=target, metrics=metrics, beta=beta, **sampling)
         for name, proxy in proxies.items()
     }
-    figures = _draw(assessments, arguments.output) if arguments.output else []
-    head = {"target": target_name, "figures": figures, "left_out": list(left_out)}
+    selection = None
+    if len(assessments) > 1:
+        selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
+    written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
     if arguments.table:
         write_scores_table(assessments, arguments.table)
-        head["table"] = str(arguments.table)
-    said = [Text(f"note: {line}") for line in left_out]
-    if len(assessments) == 1:
-        name, assessment = next(iter(assessments.items()))
-        table = measures(assessment, proxy=name, target=target_name)
-        return Answer({"proxy": name, **head, **document_of(assessment)}, Group(table, *said))
-    selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
-    ranked = ranking(assessments, selection, target=target_name)
-    return Answer(head | document_of_ranking(assessments, selection), Group(ranked, *said))
+        written["table"] = str(arguments.table)
+    document = {"target": target_name, **written, "left_out": list(left_out)}
+    return _answer(document, assessments, selection)
+
+
+def _answer(document: dict[str, Any], assessments: Mapping[str, Assessment], selection: Selection | None) -> Answer:
+    """What is printed: the sentence, the table and the notes."""
+    target = document["target"]
+    first = Text(score_answer(assessments, selection, target=target) + "\n")
+    said = [Text(f"note: {line}") for line in document["left_out"]]
+    if selection is None:
+        ((name, assessment),) = assessments.items()
+        shown = measures(assessment, proxy=name, target=target)
+        return Answer({"proxy": name, **document, **document_of(assessment)}, Group(first, shown, *said))
+    ranked = ranking(assessments, selection, target=target)
+    return Answer(document | document_of_ranking(assessments, selection), Group(first, ranked, *said))
 
 
 def _common(
@@ -123,12 +137,26 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
     return weights or None
 
 
-def _draw(assessments: dict[str, Assessment], folder: Path) -> list[str]:
-    figures = []
+def _write(
+    arguments: argparse.Namespace, assessments: Mapping[str, Assessment], selection: Selection | None, target: str
+) -> dict[str, Any]:
+    """Draw the figures and write the page; their paths."""
+    drawn = _draw(assessments, arguments.output)
+    figures = [Drawn(kind, proxy, path.read_bytes()) for path, (kind, proxy) in drawn.items()]
+    settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
+    foot = foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
+    page = arguments.output / "report.html"
+    write_text(page, html_of(score_page(assessments, selection, figures, foot, target=target)))
+    return {"figures": [str(path) for path in drawn], "report": str(page)}
+
+
+def _draw(assessments: Mapping[str, Assessment], folder: Path) -> dict[Path, tuple[str, str]]:
+    """Draw the figures; the kind of each and the proxy that it is of, by its path."""
+    drawn = {}
     for name, assessment in assessments.items():
         suffix = "" if len(assessments) == 1 else "_" + re.sub(r"[^\w.-]+", "_", name)
         for kind, figure in (("scatter", scatter(assessment)), ("flipped_pairs", flipped_pairs(assessment.prpv))):
             path = folder / f"{kind}{suffix}.png"
             save(figure, path)
-            figures.append(str(path))
-    return figures
+            drawn[path] = (kind, name)
+    return drawn

@@ -9,6 +9,7 @@ from typing import Any
 from proxytune.api.studies import StudyReport, most_episodes, run_opened
 from proxytune.cli.learning_value import search_by_plv
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.live_page import renewed_page
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.report.study.table import study_table
 from proxytune.running.progress import Bars
@@ -53,7 +54,8 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def _search(study: Study, retry_failed: bool) -> StudyReport:
-    return run_opened(study, Bars(most_episodes(study.settings)), _warn, retry_failed)
+    watching = renewed_page(study.settings, study.objective.name, Bars(most_episodes(study.settings)))
+    return run_opened(study, watching, _warn, retry_failed)
 
 
 def _warn(line: str) -> None:

@@ -11,8 +11,12 @@ from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.study_folder import study_folder
-from proxytune.effects import SHIPPED, Catalogue, read_model
+from proxytune.cli.terminal.theta import read_theta
+from proxytune.cli.terminal.typed import typed
+from proxytune.effects import Catalogue
 from proxytune.errors import InputError
+from proxytune.report.page import foot_of, html_of
+from proxytune.report.study.page import study_settings
 from proxytune.report.sweep.document import (
     NO_POD,
     curve_csv,
@@ -23,6 +27,7 @@ from proxytune.report.sweep.document import (
     failures,
 )
 from proxytune.report.sweep.figures import bars_figure, panels_figure, sweep_figure
+from proxytune.report.sweep.page import sweep_page
 from proxytune.report.writing import save, write_text
 from proxytune.running.progress import Bars
 from proxytune.space import Theta
@@ -82,8 +87,11 @@ def run(arguments: argparse.Namespace) -> Answer:
                 run_sweep(run, sweep, discrepancy)
         curves = [curve for sweep in sweeps if (curve := curve_of(run, sweep))]
     output = arguments.output or folder / "figures"
-    answer = _answer(curves, run.spent, draw_curves(curves, output), write_curves(curves, output))
-    return _say_base(answer, word, sweeps[0].base)
+    figures = draw_curves(curves, output)
+    held = _held(word, sweeps[0].base)
+    page = _write_page(arguments, study, curves, figures, held)
+    answer = _answer(curves, run.spent, figures, [*write_curves(curves, output), page])
+    return _say_base(answer, word, sweeps[0].base, held)
 
 
 def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
@@ -111,30 +119,10 @@ def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
     return written
 
 
-def read_base(text: str | None, catalogue: Catalogue = SHIPPED) -> Theta:
-    """The values of the other parameters, from NAME=VALUE pairs or a model.toml; none for `nominal`.
-
-    Raises:
-        InputError: If it is neither.
-    """
-    if text is None or text == "nominal":
-        return {}
-    if text.endswith(".toml"):
-        return read_model(Path(text), catalogue).theta
-    pairs = [pair.partition("=") for pair in text.split(",")]
-    try:
-        base = {name.strip(): float(value) for name, _, value in pairs}
-    except ValueError:
-        raise InputError(f"--at {text}: write NAME=VALUE,NAME=VALUE, best, nominal or a model.toml") from None
-    if len(base) < len(pairs):
-        raise InputError(f"--at {text}: names a parameter twice; give each once")
-    return base
-
-
 def _plan(study: Study, arguments: argparse.Namespace, word: str) -> list[SweepRecord]:
     if not 2 <= arguments.points <= MOST_POINTS:
         raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {arguments.points}")
-    base = best_theta(study) if word == "best" else read_base(word, Catalogue(study.settings.folder.resolve()))
+    base = best_theta(study) if word == "best" else read_theta(word, Catalogue(study.settings.folder.resolve()), "--at")
     check_base(study, base)
     names = study.settings.space.names if arguments.parameter == "all" else (arguments.parameter,)
     return [plan_sweep(sweep_interval(study, name), base, arguments.points) for name in names]
@@ -155,16 +143,34 @@ def _answer(curves: Sequence[Curve], spent: Spent, figures: Sequence[Path], file
     return Answer(document, Group(*parts, Text("\n".join(lines))))
 
 
-def _say_base(answer: Answer, word: str, base: Theta) -> Answer:
-    """The answer with what the other parameters are held at."""
+def _write_page(
+    arguments: argparse.Namespace, study: Study, curves: Sequence[Curve], figures: Sequence[Path], held: str
+) -> Path:
+    """Write the page beside the figures, named as the first of all curves, or as the only one."""
+    drawn = {path.stem: path.read_bytes() for path in figures}
+    together = [path for path in figures if path.stem.startswith("sweep_all")]
+    path = (together or figures)[0].with_suffix(".html")
+    foot = foot_of(typed(arguments), study_settings(study.settings))
+    said = f"{held[0].upper()}{held[1:]}"
+    write_text(path, html_of(sweep_page(study.settings.name, curves, drawn, said, foot)))
+    return path
+
+
+def _held(word: str, base: Theta) -> str:
+    """What the other parameters are held at."""
     values = ", ".join(f"{name}={value:g}" for name, value in sorted(base.items()))
     lines = {
         "best": f"the others are held at the study's best θ: {values}; --at nominal holds the robot's own",
         "nominal": "the others are nominal",
     }
-    line = lines.get(word, f"the others are held at {values}")
-    document = {**answer.document, "at": {"chosen": word if word in lines else "given", "theta": dict(base)}}
-    return Answer(document, Group(answer.text, Text(line)))
+    return lines.get(word, f"the others are held at {values}")
+
+
+def _say_base(answer: Answer, word: str, base: Theta, held: str) -> Answer:
+    """The answer with what the other parameters are held at."""
+    chosen = word if word in ("best", "nominal") else "given"
+    document = {**answer.document, "at": {"chosen": chosen, "theta": dict(base)}}
+    return Answer(document, Group(answer.text, Text(held)))
 
 
 def _base(curve: Curve) -> tuple[tuple[str, float], ...]:

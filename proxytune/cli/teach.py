@@ -3,12 +3,20 @@
 import argparse
 from pathlib import Path
 
+from rich.console import Group
+from rich.text import Text
+
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.study_folder import study_folder
+from proxytune.cli.terminal.typed import typed
+from proxytune.report.page import foot_of, html_of
+from proxytune.report.study.page import study_settings
 from proxytune.report.teaching.document import teach_document
 from proxytune.report.teaching.figure import teach_figure
+from proxytune.report.teaching.page import teach_page
 from proxytune.report.teaching.table import teach_table
-from proxytune.report.writing import save
+from proxytune.report.teaching.words import teach_answer
+from proxytune.report.writing import save, write_text
 from proxytune.running.progress import Bars
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
@@ -41,5 +49,8 @@ def run(arguments: argparse.Namespace) -> Answer:
             prpv = predictivity(StudyRun(study, store, bars), proxies)
     figure = folder / "figures" / "teach.png"
     save(teach_figure(experiment), figure)
-    document = {**teach_document(experiment, prpv), "figure": str(figure)}
-    return Answer(document, teach_table(experiment, prpv, {"figure": figure}))
+    page, foot = figure.with_suffix(".html"), foot_of(typed(arguments), study_settings(study.settings))
+    write_text(page, html_of(teach_page(experiment, prpv, figure.read_bytes(), foot)))
+    document = {**teach_document(experiment, prpv), "figure": str(figure), "report": str(page)}
+    shown = teach_table(experiment, prpv, {"figure": figure, "report": page})
+    return Answer(document, Group(Text(f"{teach_answer(experiment)}\n"), shown))

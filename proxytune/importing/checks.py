@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from proxytune.errors import LogError
+from proxytune.importing.orientation import MOST_LACKING
 from proxytune.importing.source import Commands, Drive, Floats, Poses
 
 FURTHEST_BACK_S = 0.5
@@ -40,11 +41,26 @@ def checked_drive(drive: Drive, where: str) -> tuple[Drive, list[str]]:
 
 def _ordered_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:
     """Poses by time, the first of several with one stamp."""
+    poses, lacking = _whole_poses(poses, about)
     kept, notes = _order(poses.times, "poses", about, last=False)
+    notes = lacking + notes
     if len(kept) < 2:
         raise LogError(f"{about}: only {len(kept)} of its poses have a time of their own; a drive needs two or more")
     parts = (poses.times, poses.places, poses.headings, poses.tilts)
     return Poses(*(part[kept] for part in parts)), notes
+
+
+def _whole_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:
+    """Poses without those that lack a number or an orientation."""
+    parts = (poses.times, poses.places, poses.headings, poses.tilts)
+    whole = np.asarray(np.isfinite(np.column_stack(parts)).all(axis=1))
+    lacking = int((~whole).sum())
+    if lacking > MOST_LACKING * len(whole):
+        number = int(np.argmin(whole)) + 1
+        what = f"{lacking} of its {len(whole)} poses, first number {number}, are no pose"
+        raise LogError(f"{about}: {what}; record it again")
+    notes = [f"{lacking} poses without a place or an orientation were left out"] if lacking else []
+    return Poses(*(part[whole] for part in parts)), notes
 
 
 def _ordered_commands(commands: Commands, about: str) -> tuple[Commands, list[str]]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from proxytune.errors import LogError
 from proxytune.importing.checks import checked_drive
+from proxytune.importing.plausibility import check_units
 from proxytune.importing.ros import is_bag, read_bag
 from proxytune.importing.source import Source
 from proxytune.importing.survey import clock_notes, survey
@@ -43,7 +44,7 @@ def read_source(path: Path, wanted: Wanted) -> Source:
         LogError: If it is none of the known forms, or lacks what a log needs.
     """
     if not path.exists():
-        raise LogError(f"{path}: no such file or folder; check the path")
+        raise LogError(f"{path}: no such folder; check the path")
     for form in FORMS:
         if form.recognise(path):
             return _checked(form.read(path, wanted), path)
@@ -54,6 +55,7 @@ def _checked(source: Source, path: Path) -> Source:
     drives, notes = [], list(source.notes)
     for drive in source.drives:
         one, found = checked_drive(drive, str(path))
+        check_units(one, str(path))
         drives.append(one)
         notes += found
     kinds = {drive.commands.kind if drive.commands else "none" for drive in drives}

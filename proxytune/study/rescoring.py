@@ -29,7 +29,7 @@ def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:
         if names.count(name) > 1:
             raise InputError(f"--metric {name}: is given twice; give each metric once")
     settings = replace(study.settings, metrics=tuple(metrics))
-    return replace(study, settings=settings, target=read_target(settings, study.family))
+    return replace(study, settings=settings, target=read_target(settings, study.family)[0])
 
 
 def rescored(run: StudyRun, metrics: Sequence[Metric]) -> StudyResult:

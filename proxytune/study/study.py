@@ -65,8 +65,8 @@ def open_study(path: Path) -> Study:
     settings = read_study_settings(path)
     family = load_family(settings, settings.proxy)
     known, left_out = with_scores(settings)
-    cautions = (*left_out, *unnoticed(settings.folder))
-    target, objective = read_target(known, family), objective_of(settings)
+    target, unused = read_target(known, family)
+    cautions, objective = (*left_out, *unused, *unnoticed(settings.folder)), objective_of(settings)
     truth, engine, code = _truth(settings, family), _engine(settings), code_of(settings)
     return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
 

@@ -38,8 +38,10 @@ def _remedy(missing: Sequence[str], beyond: Sequence[str]) -> str:
     return f"its agents are {', '.join(beyond)[:80]}; give yours these names by a table [agents] in study.toml: {one}"
 
 
-def read_target(settings: StudySettings, family: DomainFamily) -> ScoreTable:
+def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTable, tuple[str, ...]]:
     """The target's scores of the study's agents, from the study's own starts where it has all of these.
+
+    What else it has of them is left out then, which a line says.
 
     Raises:
         InputError: If the table lacks a metric, or has a value that is not finite.
@@ -50,7 +52,14 @@ def read_target(settings: StudySettings, family: DomainFamily) -> ScoreTable:
     driven = [label for column, label in enumerate(chosen.episodes) if chosen.driven[:, column].any()]
     wanted = {str(start) for start in range(settings.starts)}
     own = [label for label in driven if start_of(label) in wanted]
-    return chosen.arrange(agents=settings.agents, episodes=own if set(starts_of(own)) == wanted else driven)
+    if set(starts_of(own)) != wanted:
+        return chosen.arrange(agents=settings.agents, episodes=driven), ()
+    beyond = [label for label in driven if label not in own]
+    line = (
+        f"the target's episodes {own[0]} to {own[-1]} are taken for this study's starts, and {len(beyond)} of others "
+        "are left out; raise starts to use them, or label episodes otherwise if they are no starts"
+    )
+    return chosen.arrange(agents=settings.agents, episodes=own), (line,) if beyond else ()
 
 
 def _others(settings: StudySettings, family: DomainFamily, compared: Sequence[str]) -> list[str]:

@@ -18,8 +18,8 @@ def has_answer(study: Study) -> bool:
         return any(trial.state == "finished" for trial in store.trials(study.objective.name))
 
 
-def best_theta(study: Study) -> Theta:
-    """The best θ that the study has found so far.
+def best_theta(study: Study, option: str = "--at") -> Theta:
+    """The best θ that the study has found so far; the option that asks for it is named in complaints.
 
     Raises:
         InputError: If no trial is finished, or the study was changed since.
@@ -31,5 +31,5 @@ def best_theta(study: Study) -> Theta:
         try:
             run = StudyRun(as_stored(study, store), store)
         except SettingsError as problem:
-            raise InputError(f"{problem}; or hold other values: --at nominal") from None
+            raise InputError(f"{problem}; or hold other values: {option} nominal") from None
         return dict(result_of(run).best.trial.theta)

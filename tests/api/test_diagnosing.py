@@ -55,6 +55,7 @@ def test_what_is_found_is_drawn_and_written_as_the_command_does(report, tmp_path
         "diagnosis.json",
         "model.toml",
         *(f"{name}.png" for name in report.figures()),
+        "report.html",
     ]
     assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report.document()))
     assert read_model(paths[1]).theta["yaw_scrub"] == pytest.approx(report.parameters().value["yaw_scrub"])

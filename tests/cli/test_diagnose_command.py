@@ -127,6 +127,11 @@ def test_what_is_printed_is_what_is_written(document, home):
     figures = [Path(name) for name in files if name.endswith(".png")]
     assert len(figures) >= 3
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in figures)
+    page = (home / "out" / "report.html").read_text(encoding="utf-8")
+    assert '<p class="answer">planted: explained: with the effects added, only noise is left.</p>' in page
+    assert page.count("<img ") == len(figures)
+    assert "python -m proxytune diagnose " in page.split("<footer>")[1]
+    assert "--json" not in page
 
 
 def test_the_model_reads_back_with_what_was_found(document, home):

@@ -75,7 +75,7 @@ def test_a_wrong_option_is_one_line(capsys, table, words, says):
 
 
 def test_a_source_that_is_none_is_one_line(capsys, tmp_path):
-    assert "no such file or folder" in complaint(capsys, str(tmp_path / "none"))
+    assert "no such folder" in complaint(capsys, str(tmp_path / "none"))
 
 
 def test_an_output_that_is_there_is_left_alone(capsys, table, tmp_path):

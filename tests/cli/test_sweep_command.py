@@ -3,7 +3,7 @@ import json
 import pytest
 
 from proxytune.cli.main import main
-from proxytune.cli.sweep import read_base
+from proxytune.cli.terminal.theta import read_theta
 from proxytune.errors import InputError
 
 
@@ -15,6 +15,7 @@ def test_a_sweep_writes_its_curve_as_figure_csv_and_json_and_goes_on_where_it_wa
     assert document["episodes"] == {"run": 72}
     assert sorted(path.name for path in output.iterdir()) == [
         "sweep_trim_delay=0.12.csv",
+        "sweep_trim_delay=0.12.html",
         "sweep_trim_delay=0.12.json",
         "sweep_trim_delay=0.12.png",
     ]
@@ -33,6 +34,7 @@ def test_all_sweeps_every_parameter_of_the_study_and_draws_them_together(make_st
     assert main(["sweep", str(folder), "--parameter", "all", "--points", "2"]) == 0
     names = sorted(path.stem for path in (folder / "figures").glob("*.png"))
     assert names == ["sweep_all", "sweep_bars", "sweep_delay", "sweep_trim"]
+    assert [path.name for path in (folder / "figures").glob("*.html")] == ["sweep_all.html"]
     out = capsys.readouterr().out
     assert "trim: PRPV: lowest" in out
     assert "give --target-model" in out
@@ -95,10 +97,10 @@ def test_a_study_that_was_changed_since_has_no_best_theta_but_nominal_values(fin
 
 
 def test_a_base_is_read_from_pairs_or_from_a_model(tmp_path):
-    assert read_base(None) == {}
-    assert read_base("trim=0.1, delay=2e-1") == {"trim": 0.1, "delay": 0.2}
+    assert read_theta(None) == {}
+    assert read_theta("trim=0.1, delay=2e-1") == {"trim": 0.1, "delay": 0.2}
     (tmp_path / "model.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.05\n')
-    assert read_base(str(tmp_path / "model.toml")) == {"trim": 0.05}
+    assert read_theta(str(tmp_path / "model.toml")) == {"trim": 0.05}
 
 
 @pytest.mark.parametrize(
@@ -112,7 +114,7 @@ def test_a_base_is_read_from_pairs_or_from_a_model(tmp_path):
 )
 def test_a_base_that_is_neither_is_refused(text, expected):
     with pytest.raises(InputError, match=expected):
-        read_base(text)
+        read_theta(text)
 
 
 BAD = {

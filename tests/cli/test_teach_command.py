@@ -25,6 +25,8 @@ def test_teach_prints_one_document_with_the_promised_keys(make_study, capsys):
     assert document["proxies"]["wide"]["prpv"] is None
     assert isinstance(right["prpv"], float | int)
     assert (folder / "figures" / "teach.png").stat().st_size > 1000
+    assert document["report"] == str(folder / "figures" / "teach.html")
+    assert "Target samples saved (PLV" in (folder / "figures" / "teach.html").read_text()
 
 
 def test_people_see_table_1_and_when_a_learner_counts_as_converged(make_study, capsys):
@@ -55,6 +57,10 @@ def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
     assert document["narrowed_by_prpv"] is False
     assert document["searched"] == {"trim": [-0.3, 0.3]}
     assert (folder / "figures" / "plv.png").stat().st_size > 1000
+    page = (folder / "report.html").read_text()
+    assert document["report"] == str(folder / "report.html")
+    assert "Of 3 proxies tried, trim" in page
+    assert "refresh" not in page
 
 
 def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, capsys):

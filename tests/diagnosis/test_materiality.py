@@ -3,16 +3,18 @@
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 sys.path.append(str(Path(__file__).parent))
 
 from planted import DECLARED, NOISE, TRUTH, planted_drives
 
-from proxytune.diagnosis.horizon.windows import Ratio
+from proxytune.diagnosis.horizon.windows import Ratio, cut, pose_errors
 from proxytune.diagnosis.model.fitting import evaluate
+from proxytune.diagnosis.model.innovations import Noise
 from proxytune.diagnosis.naming.findings import AdoptedEffect, Findings, Variant, without_effect
-from proxytune.diagnosis.naming.materiality import WeighedEffect, drop_immaterial, worth
+from proxytune.diagnosis.naming.materiality import WeighedEffect, _drawn_squares, drop_immaterial, worth
 from proxytune.diagnosis.rules import RULES
 
 SCRUB, SLIP = (("yaw_scrub",),), (("lateral_slip",),)
@@ -119,3 +121,15 @@ def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_witho
     assert not weighed(0.9, 0.75, 1.02).harmful
     assert not weighed(0.97, 0.95, 0.99).harmful
     assert not weighed(1.2, 1.1, 1.3).harmful
+
+
+@pytest.mark.parametrize("size", [0.05, 0.1])
+def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them(size):
+    calm = planted_drives(TRUTH, episodes=6, seconds=20.0, noise=Noise((1e-6, 1e-6, 1e-6), (0.005, 0.01)))
+    jittery = Variant({**TRUTH, "delay": TRUTH["delay"] - size / 2.0, "delay_jitter": size}, DECLARED)
+    windows = cut(calm, 2.0)
+    errors = pose_errors(calm, jittery.theta, windows)[:, 0]
+    drawn = np.sqrt(_drawn_squares(calm, jittery, windows, 1).mean())
+    assert drawn > 0.4 * np.sqrt(np.mean(errors**2)), "by their size alone they would matter"
+    kept = drop_immaterial(found(calm, jittery.theta, adopted("delay_jitter", names=("delay_jitter",))), 1)
+    assert kept.adopted == ()

@@ -42,7 +42,7 @@ def test_another_log_may_be_tested_on():
 
 @pytest.mark.parametrize(("episodes", "seconds"), [(1, 30.0), (3, 10.0), (6, 6.0)])
 def test_too_little_motion_is_refused_with_how_much_is_needed(episodes, seconds):
-    with pytest.raises(LogError, match=r"^planted: only \d+ s of measured motion to .*at least 20 s"):
+    with pytest.raises(LogError, match=r"^planted: only [0-9.]+ s of measured motion to .*at least 20 s"):
         split(planted_log(TRUTH, episodes=episodes, seconds=seconds), ROBOT, None)
 
 

@@ -17,7 +17,7 @@ from proxytune.driving.robot import read_robot
 from proxytune.errors import InputError
 from proxytune.extensions import load
 from proxytune.logs import read_log
-from proxytune.study.family import load_family
+from proxytune.study.family import bare_family, load_family
 from proxytune.study.settings import read_study_settings
 
 STUDY = Path(__file__).resolve().parent.parent.parent / "studies" / "mujoco_target"
@@ -65,7 +65,7 @@ def test_the_stronger_right_motor_turns_it_left_and_commands_arrive_late():
 
 def test_the_family_scores_an_episode_alike_again_and_refuses_what_its_model_must_not_hold(tmp_path):
     settings = read_study_settings(ROBOT)
-    whole = load_family(settings, ROBOT / "truth.toml")
+    whole = bare_family(settings, ROBOT / "truth.toml")
     robot = dataclasses.replace(whole, view=dataclasses.replace(whole.view, seconds=2.0))
     episode = make_episode({"latency": 0.1}, agent="daredevil", start=1, seed=3)
     assert robot.run(episode) == robot.run(episode)

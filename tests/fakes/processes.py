@@ -28,9 +28,9 @@ def start(*words, **how):
 
 
 def besides_progress(told):
-    """What a command says on standard error, without its lines of progress."""
+    """What a command says on standard error, without its lines of progress and where the page is."""
     lines = told.splitlines(keepends=True)
-    return "".join(line for line in lines if not re.match(r"compare: at most|\d+ s: ", line))
+    return "".join(line for line in lines if not re.match(r"compare: at most|proxytune study: page: |\d+ s: ", line))
 
 
 def finished_episodes(folder):

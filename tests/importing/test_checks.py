@@ -93,3 +93,21 @@ def test_a_drive_along_a_wall_on_a_flat_floor_is_not_taken_for_another_axis():
     places = np.column_stack((GRID, np.zeros(len(GRID)), 0.01 * np.sin(GRID)))
     _, notes = checked_drive(replace(given, poses=replace(given.poses, places=places)), "bag")
     assert notes == []
+
+
+def test_a_few_poses_without_a_number_are_drop_outs():
+    given = drive(GRID, GRID)
+    headings = given.poses.headings.copy()
+    headings[[3, 50, 51]] = np.nan
+    kept, notes = checked_drive(replace(given, poses=replace(given.poses, headings=headings)), "bag")
+    assert len(kept.poses.times) == len(GRID) - 3
+    assert notes == ["drive run: 3 poses without a place or an orientation were left out"]
+
+
+def test_many_poses_without_a_number_are_refused():
+    given = drive(GRID, GRID)
+    places = given.poses.places.copy()
+    places[20:60] = np.nan
+    assert "40 of its 200 poses, first number 21, are no pose" in complaint(
+        replace(given, poses=replace(given.poses, places=places))
+    )

@@ -60,7 +60,7 @@ def test_what_is_imported_is_there_only_while_the_log_is_open(forms):
     [
         ("empty.bag", b"", "cannot be read"),
         ("noise.bin", bytes(range(256)), "is no recording that is known; give a ROS bag"),
-        ("missing", None, "no such file or folder"),
+        ("missing", None, "no such folder"),
     ],
 )
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path, name, content, says):

@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from proxytune.report.page import html_of
 from proxytune.report.study.document import study_document
 from proxytune.report.study.importance_figure import importance_figure
-from proxytune.report.study.page import page
+from proxytune.report.study.page import study_page
 from proxytune.report.study.search_rows import importance_row
 from proxytune.search.knowledge.importance import Importance
 from proxytune.storage.store import Store
@@ -43,4 +44,5 @@ def test_the_document_the_table_and_the_page_say_the_same(result):
     }
     label, shares = importance_row(result)
     assert shares.endswith(": trim 0.75 (0.50 to 1.00), delay 0.25 (0.10 to 0.40)")
-    assert f"<td>{label}</td><td>{shares}</td>" in page(result, [])
+    text = html_of(study_page(result, {}))
+    assert f'<th scope="row">{label}</th><td class="prose">{shares}</td>' in text

@@ -7,9 +7,10 @@ import pytest
 from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
 
+from proxytune.report.page import html_of
 from proxytune.report.study.document import study_document
 from proxytune.report.study.finding import finding_of
-from proxytune.report.study.page import page
+from proxytune.report.study.page import study_page
 from proxytune.report.study.search_rows import cut_rows, failure_rows, search_rows
 from proxytune.report.study.table import INFORMATION, SEARCH, THETA, USEFULNESS, study_table
 from proxytune.report.study.usefulness_table import floor_rows, misfit_row, usefulness_notes, usefulness_rows
@@ -213,7 +214,7 @@ def test_what_was_cut_off_and_saved_is_told(result):
         "prpv_estimate": 17.5,
         "agents": ["agent0", "agent2"],
     }
-    assert "<td>stopped early, at least 12</td>" in page(found, [])
+    assert "<td>stopped early, at least 12</td>" in html_of(study_page(found, {}))
     assert found.episodes == result.episodes - 12
 
 

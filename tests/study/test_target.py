@@ -69,3 +69,12 @@ def test_where_no_name_agrees_a_table_of_names_is_the_remedy(make_study, rows):
     write(folder, real=[HEAD, *(row.replace("agent", "a") for row in rows)])
     with pytest.raises(InputError, match=r"its agents are a0, a1.*by a table \[agents\] in study.toml: a0 = 'agent0'"):
         open_study(folder)
+
+
+def test_episodes_that_are_no_starts_of_the_study_are_left_out_and_that_is_said(make_study, rows):
+    folder = make_study(target='"real.csv"')
+    write(folder, real=[HEAD, *rows, *(f"agent{number},17,1,2" for number in range(6))])
+    study = open_study(folder)
+    assert "17" not in study.target.episodes
+    (line,) = [one for one in study.cautions if "taken for this study's starts" in one]
+    assert "and 1 of others are left out; raise starts to use them" in line

@@ -9,6 +9,7 @@ import pandas as pd
 
 from proxytune.diagnosis.horizon.windows import SHORTEST
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, gather
+from proxytune.diagnosis.measured.instants import as_measured, path_between
 from proxytune.diagnosis.model.replay import window_paths
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
@@ -38,8 +39,8 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
         raise LogError(f"{log.name}: no measured pose to start a window from")
     ticks = round(whole.tick_hz / log.rate_hz)
     windows = _windows(whole, log.episodes, starts, ticks)
-    walked = window_paths(windows, theta, np.arange(len(windows.first)), reach * ticks)[:, ::ticks]
-    poses = _place_at(windows.poses[:, 0], walked)
+    walked = window_paths(windows, theta, np.arange(len(windows.first)), reach * ticks)
+    poses = _place_at(windows.poses[:, 0], *_at_samples(walked, log.episodes, starts, ticks))
     cuts = np.cumsum([len(rows) for rows in starts])[:-1]
     parts = zip(log.episodes, starts, np.split(poses, cuts), strict=True)
     return pd.concat([_rows(*part) for part in parts if len(part[1])], ignore_index=True)
@@ -50,24 +51,28 @@ def _rows(episode: LogEpisode, starts: Whole, poses: Floats) -> pd.DataFrame:
     covered = starts[:, None] + np.arange(poses.shape[1])
     inside = covered < len(episode.times)
     known = np.minimum(covered, len(episode.times) - 1)
-    stamps = episode.times
+    after = as_measured(episode)[1]
+    stamps = episode.times + after
     if episode.measured is not None:
-        stamps = np.full(len(episode.times), np.nan)
+        inside &= np.isin(known, episode.measured.rows)
         stamps[episode.measured.rows] = episode.measured.times
-        inside &= np.isfinite(stamps[known])
-        poses = _moved(poses, stamps[known] - episode.times[known], 1.0 / float(np.diff(episode.times[:2])[0]))
     start = np.broadcast_to(stamps[starts, None], covered.shape)
     times = stamps[known]
     columns = {"start_time": start, "time": times, "x": poses[..., 0], "y": poses[..., 1], "heading": poses[..., 2]}
     return pd.DataFrame({"episode": episode.name} | {name: values[inside] for name, values in columns.items()})
 
 
-def _moved(poses: Floats, seconds: Floats, rate_hz: float) -> Floats:
-    """Predicted poses (W, rows, 3) as they are some seconds (W, rows) after or before their samples."""
-    steps = np.diff(poses, axis=1)
-    ahead, behind = np.concatenate((steps, steps[:, -1:]), axis=1), np.concatenate((steps[:, :1], steps), axis=1)
-    share = (seconds * rate_hz)[..., None]
-    return np.asarray(poses + share * np.where(share > 0.0, ahead, behind))
+def _at_samples(
+    walked: Floats, episodes: Sequence[LogEpisode], starts: Sequence[Whole], ticks: int
+) -> tuple[Floats, Floats]:
+    """Windows' paths at their samples (W, rows, 3), and at their beginnings (W, 3), when those were measured."""
+    rows = np.arange((walked.shape[1] - 1) // ticks + 1)
+    after = [as_measured(e)[1] * ticks / float(np.diff(e.times[:2])[0]) for e in episodes]
+    late = np.concatenate(
+        [one[np.minimum(s[:, None] + rows, len(one) - 1)] for one, s in zip(after, starts, strict=True)]
+    )
+    window = np.arange(len(walked))
+    return path_between(walked, window[:, None], rows * ticks + late), path_between(walked, window, late[:, 0])
 
 
 def _starts(episode: LogEpisode, reach: int) -> Whole:
@@ -83,18 +88,18 @@ def _starts(episode: LogEpisode, reach: int) -> Whole:
 
 def _windows(whole: Drives, episodes: Sequence[LogEpisode], starts: Sequence[Whole], ticks: int) -> Drives:
     """Drives whose increments are the windows' beginnings alone."""
-    poses = np.concatenate([episode.poses[rows] for episode, rows in zip(episodes, starts, strict=True)])
+    poses = np.concatenate([as_measured(one)[0][rows] for one, rows in zip(episodes, starts, strict=True)])
     first = np.concatenate(starts) * ticks
     number = np.repeat(np.arange(len(episodes)), [len(rows) for rows in starts])
     both = np.repeat(poses[:, None], 2, axis=1)
     return replace(whole, episode=number, first=first, last=first, poses=both, block=np.zeros_like(first))
 
 
-def _place_at(start: Floats, walked: Floats) -> Floats:
-    """Paths (W, rows, 3) from the origin, put where they start (W, 3)."""
-    turn = start[:, None, 2] - walked[:, :1, 2]
+def _place_at(start: Floats, walked: Floats, origin: Floats) -> Floats:
+    """Paths (W, rows, 3) put where they start (W, 3); their own beginnings are the origins (W, 3)."""
+    turn = start[:, None, 2] - origin[:, None, 2]
     cosine, sine = np.cos(turn), np.sin(turn)
-    moved = walked[..., :2] - walked[:, :1, :2]
+    moved = walked[..., :2] - origin[:, None, :2]
     x = start[:, None, 0] + cosine * moved[..., 0] - sine * moved[..., 1]
     y = start[:, None, 1] + sine * moved[..., 0] + cosine * moved[..., 1]
     return np.stack((x, y, walked[..., 2] + turn), axis=-1)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.diagnosis.horizon.windows import Windows, cut, select_windows
+from proxytune.diagnosis.horizon.windows import Windows, cut, length_of, motion_in, select_windows
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, relative
 from proxytune.diagnosis.model.replay import tracked_paths, window_features, window_twists
 from proxytune.driving.planar import integrate
@@ -58,11 +58,11 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
     windows = choose_windows(drives)
     begin, window = windows.begin, windows.window
     tick = drives.last[windows.increment] - drives.first[begin][window]
-    length = int(tick.max())
+    length = length_of(drives, windows)
     named = {name: value for name, value in theta.items() if not is_learnt(name)}
     twists = window_twists(drives, theta, begin, length)
     walked = tracked_paths(drives, theta, twists)
-    predicted = relative(walked[window, 0], walked[window, tick])
+    predicted = motion_in(drives, walked, windows)
     measured = relative(drives.poses[begin[window], 0], drives.poses[windows.increment, 1])
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
     features = window_features(drives, named, offered, begin, length)

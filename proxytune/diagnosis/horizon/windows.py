@@ -57,10 +57,24 @@ def blocks_of(drives: Drives, windows: Windows) -> Whole:
 
 def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """The model's motion since each window's beginning less the measured one (M, 3): [m], [m], [rad]."""
-    begin = windows.begin
-    tick = drives.last[windows.increment] - drives.first[begin][windows.window]
-    walked = window_paths(drives, theta, begin, int(tick.max()))
-    return relative(walked[windows.window, 0], walked[windows.window, tick]) - measured_motion(drives, windows)
+    walked = window_paths(drives, theta, windows.begin, length_of(drives, windows))
+    return motion_in(drives, walked, windows) - measured_motion(drives, windows)
+
+
+def length_of(drives: Drives, windows: Windows) -> int:
+    """Ticks that the longest window takes."""
+    ticks = drives.last[windows.increment] - drives.first[windows.begin][windows.window]
+    return int(ticks.max()) + (drives.after is not None)
+
+
+def motion_in(drives: Drives, walked: Floats, windows: Windows) -> Floats:
+    """Motion along windows' own paths (W, length + 1, 3) since each window's beginning (M, 3)."""
+    begin = windows.begin[windows.window]
+    start = drives.first[begin]
+    return relative(
+        drives.along(walked, windows.window, begin, start, end=False),
+        drives.along(walked, windows.window, windows.increment, start, end=True),
+    )
 
 
 def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
@@ -77,8 +91,8 @@ def motion_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
     """Motion along such paths since each window's beginning (M, 3)."""
     begin = windows.begin[windows.window]
     return relative(
-        walked[drives.episode[begin], drives.first[begin]],
-        walked[drives.episode[windows.increment], drives.last[windows.increment]],
+        drives.along(walked, drives.episode[begin], begin, end=False),
+        drives.along(walked, drives.episode[windows.increment], windows.increment, end=True),
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from proxytune.diagnosis.measured.commands import commands_a_second, commands_of
+from proxytune.diagnosis.measured.instants import ends_of, path_between
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode
@@ -48,6 +49,8 @@ class Drives:
         block: Which of the blocks, the units that are left out in turn, it belongs to (N,).
         travel: How far the robot moved meanwhile, noise averaged out (N, 2): [m], [rad].
         wheels: Measured wheel speeds at each tick as fractions of full speed (E, T, 2), or None.
+        after: How long after the ticks `first` and `last` its poses were measured, or before (N, 2) [ticks]; None
+            where poses lie on ticks.
     """
 
     robot: Robot
@@ -65,6 +68,7 @@ class Drives:
     block: Whole
     travel: Floats
     wheels: Floats | None
+    after: Floats | None = None
 
     @cached_property
     def measured(self) -> Floats:
@@ -99,13 +103,29 @@ class Drives:
         """How long the increments last together [s]."""
         return float((self.last - self.first).sum() / self.tick_hz)
 
+    def along(self, walked: Floats, path: Whole, increment: Whole, begin: Whole | int = 0, *, end: bool) -> Floats:
+        """Where paths (P, T + 1, 3) are when the poses of increments were measured (M, 3).
+
+        Args:
+            walked: Paths by their ticks.
+            path: Which path each increment belongs to (M,).
+            increment: The increments (M,).
+            begin: The tick at which its path begins (M,).
+            end: Whether it is the pose at the increment's end.
+        """
+        tick = (self.last if end else self.first)[increment] - begin
+        if self.after is None:
+            return np.asarray(walked[path, tick])
+        return path_between(walked, path, tick + self.after[increment, int(end)])
+
     def only(self, chosen: NDArray[np.bool_]) -> "Drives":
         """The same drives with some of their increments."""
         kept = np.flatnonzero(chosen)
         follows = np.concatenate(([False], np.diff(kept) == 1))
         _, block = np.unique(self.block[kept], return_inverse=True)
         parts = {name: getattr(self, name)[kept] for name in ("episode", "first", "last", "poses", "travel")}
-        return replace(self, **parts, linked=self.linked[kept] & follows, block=block)
+        after = None if self.after is None else self.after[kept]
+        return replace(self, **parts, linked=self.linked[kept] & follows, block=block, after=after)
 
 
 def relative(origin: Floats, pose: Floats) -> Floats:
@@ -132,9 +152,7 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
     number = np.repeat(np.arange(len(episodes)), [max(0, len(s) - 1) for s in samples])
     if len(rows) == 0:
         raise LogError(f"{log.name}: no two measured poses in a row; nothing can be learnt from it")
-    poses = np.concatenate(
-        [np.stack((e.poses[s[:-1]], e.poses[s[1:]]), 1) for e, s in zip(episodes, samples, strict=True)]
-    )
+    poses, after = ends_of(episodes, samples)
     linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))
     drives = Drives(
         robot=robot,
@@ -152,6 +170,7 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
         block=number,
         travel=_travel(number, poses, rows, log.rate_hz),
         wheels=_wheels(robot, episodes, ticks, length),
+        after=after * tick_hz if after.any() else None,
     )
     return drives.only(rows[:, 1] - rows[:, 0] <= GAP_S * log.rate_hz)
 

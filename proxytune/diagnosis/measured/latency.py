@@ -81,7 +81,8 @@ def measured_speeds(drives: Drives) -> Speeds:
     begin = begin[run[begin] == run[begin + count - 1]]
     end = begin + count - 1
     gone = np.concatenate((np.zeros((1, 2)), np.cumsum(drives.measured[:, [0, 2]], axis=0)))
-    seconds = (drives.last[end] - drives.first[begin]) / drives.tick_hz
+    later = 0.0 if drives.after is None else drives.after[end, 1] - drives.after[begin, 0]
+    seconds = (drives.last[end] - drives.first[begin] + later) / drives.tick_hz
     values = (gone[end + 1] - gone[begin]) / seconds[:, None]
     return Speeds(drives.episode[begin], drives.first[begin], drives.last[end], values)
 

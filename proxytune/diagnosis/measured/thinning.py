@@ -41,7 +41,8 @@ def join_increments(drives: Drives, times: int) -> Drives:
     whole = drives.only(np.isin(np.arange(len(run)), begins))
     poses = np.stack((drives.poses[begins, 0], drives.poses[ends, 1]), axis=1)
     travel = np.add.reduceat(drives.travel, begins)
-    return replace(whole, last=drives.last[ends], poses=poses, travel=travel, linked=drives.linked[begins])
+    after = None if drives.after is None else np.stack((drives.after[begins, 0], drives.after[ends, 1]), axis=1)
+    return replace(whole, last=drives.last[ends], poses=poses, travel=travel, linked=drives.linked[begins], after=after)
 
 
 def _choose_stretches(block: Whole, share: float, least: int) -> NDArray[np.bool_]:

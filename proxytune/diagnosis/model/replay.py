@@ -65,7 +65,9 @@ def increments(drives: Drives, theta: Theta) -> Floats:
 
 def increments_along(drives: Drives, walked: Floats) -> Floats:
     """The increments of paths (E, T + 1, 3) between the measured poses."""
-    return relative(walked[drives.episode, drives.first], walked[drives.episode, drives.last])
+    every = np.arange(len(drives.episode))
+    begins, ends = (drives.along(walked, drives.episode, every, end=end) for end in (False, True))
+    return relative(begins, ends)
 
 
 def increments_of_twists(drives: Drives, theta: Theta, twists: Floats) -> Floats:

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.diagnosis.horizon.floor import noise_floor, pose_noise
 from proxytune.diagnosis.horizon.polish import compare_errors, fit_windows, held_out_squares, horizons
-from proxytune.diagnosis.horizon.windows import Ratio, Windows, blocks_of, cut, motion_along, pose_errors, ratio
+from proxytune.diagnosis.horizon.windows import Ratio, Windows, blocks_of, cut, motion_along, pose_errors, ratio, rmse
 from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.model.fitting import fit
 from proxytune.diagnosis.model.replay import drawn_paths, paths
@@ -90,7 +91,9 @@ def _weigh_effects(
             theta, free = without_effect(variant, effect, drives.rate_hz)
             worth = compare_errors(drives, held_out_squares(drives, theta, free, length), whole)
         else:
-            worth = _worth_of_draws(drives, variant, effect, whole, seed)
+            # Blocks left out add errors of the fit, which are no draws.
+            squares = {h: pose_errors(drives, variant.theta, cut(drives, h))[:, 0] ** 2 for h in whole}
+            worth = _worth_of_draws(drives, variant, effect, squares, seed)
         found.append(WeighedEffect(effect, worth))
     return found
 
@@ -128,14 +131,23 @@ def _worth_of_draws(
     """What a random effect is worth: it moves no mean, so what counts is how much of the error its draws make up.
 
     With s the distance of drawn and expected replays and e the error, the error without the draws would be √(e² − s²).
+    It cannot be below what the noise of poses makes alone: draws that would leave less are not in the data.
     """
-    found = {}
+    found, noise = {}, pose_noise(drives, variant.theta)
     for horizon, squares in whole.items():
         windows = cut(drives, horizon)
-        share = ratio(_drawn_squares(drives, variant, windows, seed), squares, blocks_of(drives, windows))
-        value, low, high = (_ratio_without_draws(end) for end in (share.value, *share.interval))
+        blocks, floor = blocks_of(drives, windows), noise_floor(drives, windows, noise)[0]
+        share = ratio(_drawn_squares(drives, variant, windows, seed), squares, blocks)
+        error = rmse(squares, blocks)
+        ends = zip((share.value, *share.interval), (error.value, *error.interval), strict=True)
+        value, low, high = (_ratio_without_draws(min(one, _room(most, floor))) for one, most in ends)
         found[horizon] = Ratio(value, (low, high))
     return found
+
+
+def _room(error: float, floor: float) -> float:
+    """The share of an error that is not the noise of poses."""
+    return float(np.sqrt(max(0.0, 1.0 - (floor / error) ** 2))) if error > 0.0 else 0.0
 
 
 def _ratio_without_draws(share: float) -> float:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from proxytune.errors import LogError
-from proxytune.importing.orientation import headings_and_tilts
+from proxytune.importing.orientation import complaint, headings_and_tilts, no_rotation
 from proxytune.importing.ros.stamps import choose_times
 from proxytune.importing.ros.transforms import Transform, chain_of
 from proxytune.importing.source import Floats, Poses
@@ -51,7 +51,9 @@ def _check(transform: Transform, where: str) -> None:
     if not finite.all():
         number = int(np.argmin(finite)) + 1
         raise LogError(f"{where}: transform {transform.name}: number {number} is not finite; name another by --poses")
-    headings_and_tilts(transform.values[:, 3:], f"{where}: transform {transform.name}")
+    wrong = no_rotation(transform.values[:, 3:])
+    if wrong.any():
+        raise complaint(transform.values[:, 3:], wrong, f"{where}: transform {transform.name}")
 
 
 def _note(name: str, chain: list[Transform], left_out: int) -> str:

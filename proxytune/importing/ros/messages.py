@@ -15,20 +15,21 @@ from proxytune.importing.source import Commands, Floats, Poses
 Row = tuple[float, ...]
 
 
-def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row]) -> tuple[Stamps, Floats]:
+def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool = True) -> tuple[Stamps, Floats]:
     """The stamps of a topic's messages, and a row of numbers of each (N, columns).
 
     Args:
         bag: An open bag.
         topic: Name of the topic.
         row_of: Makes a row of a message; a LogError of its own is completed by topic and number.
+        finite: Whether all numbers must be finite.
 
     Raises:
-        LogError: If a message cannot be read, makes no row, or holds a number that is not finite.
+        LogError: If a message cannot be read, makes no row, or holds a number that is not finite where it must.
     """
     headers, receives, rows = [], [], []
     for number, (receive_ns, message) in enumerate(bag.messages(topic), start=1):
-        rows.append(_row(message, row_of, f"{bag.path}: {topic}, message {number}"))
+        rows.append(_row(message, row_of, f"{bag.path}: {topic}, message {number}", finite=finite))
         receives.append(receive_ns)
         headers.append(header_ns(message))
     if not rows:
@@ -56,7 +57,7 @@ def read_poses(bag: Bag, topic: str, stamps: str) -> tuple[Poses, tuple[str, ...
         frames[frame_of(message)] = None
         return pose_of(message)
 
-    both, rows = collect(bag, topic, row_of)
+    both, rows = collect(bag, topic, row_of, finite=False)
     where = f"{bag.path}: {topic}"
     if len(frames) > 1:
         raise LogError(f"{where}: mixes poses of {' and '.join(sorted(frames))}; record each on a topic of its own")
@@ -133,12 +134,12 @@ COMMANDS: Mapping[str, Callable[[Any], Row]] = {
 }
 
 
-def _row(message: Any, row_of: Callable[[Any], Row], where: str) -> Row:
+def _row(message: Any, row_of: Callable[[Any], Row], where: str, *, finite: bool) -> Row:
     try:
         row = row_of(message)
     except LogError as problem:
         raise LogError(f"{where}: {problem}") from None
-    if not all(map(math.isfinite, row)):
+    if finite and not all(map(math.isfinite, row)):
         values = ", ".join(f"{value:g}" for value in row)
         raise LogError(f"{where}: holds a number that is not finite ({values}); leave such messages out of the bag")
     return row

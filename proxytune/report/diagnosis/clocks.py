@@ -26,7 +26,7 @@ def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -
     """What is wrong with the clocks and what to do; where a delay was fitted, that an offset looks the same."""
     notes = [note for own in clocks for note in (*_whole(own), *_drives(own), *_jumps(own))]
     notes = [f"clocks of {log}: {note}" for note in notes]
-    declared = clocks[0].declared_s
+    declared = next((own.declared_s for own in clocks), None)
     if declared is not None:
         notes.append(
             f"poses of {log} are stamped {declared:.3g} s later than commands, as it declares; that was taken out"

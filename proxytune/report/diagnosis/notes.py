@@ -41,7 +41,7 @@ def notes(diagnosis: Diagnosis) -> list[str]:
     lines += learnt_notes(diagnosis.learning)
     if diagnosis.could_not_be_seen:
         lines.append(f"these drives could not have shown: {', '.join(diagnosis.could_not_be_seen)}")
-    return lines + _say_manoeuvre(diagnosis)
+    return lines + next_drives(diagnosis)
 
 
 def per_cent(one: Ratio) -> tuple[float, tuple[float, float]]:
@@ -116,7 +116,8 @@ def _cautions(diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
-def _say_manoeuvre(diagnosis: Diagnosis) -> list[str]:
+def next_drives(diagnosis: Diagnosis) -> list[str]:
+    """What to drive next, a line each; nothing where there is nothing to tell apart."""
     next_drive = diagnosis.manoeuvre
     if next_drive is None:
         return []

@@ -1,111 +1,42 @@
-"""report.html: a study on one page that needs nothing else."""
+"""A study as a page: what was found, what to do next, and all that it stands on."""
 
-import base64
-import html
-from collections.abc import Sequence
-from pathlib import Path
-from string import Template
+import shlex
+from collections.abc import Mapping
 
+from proxytune.report.page import Page, Picture, Table, Words, foot_of
+from proxytune.report.study.captions import pictures
 from proxytune.report.study.finding import finding_of
 from proxytune.report.study.information_table import INFORMATION_COLUMNS, information_rows
 from proxytune.report.study.search_rows import search_rows
 from proxytune.report.study.table import INFORMATION, SEARCH, THETA, USEFULNESS
 from proxytune.report.study.theta_table import theta_columns, theta_notes, theta_rows
+from proxytune.report.study.trials_table import trials_table
 from proxytune.report.study.usefulness_table import USEFULNESS_COLUMNS, usefulness_notes, usefulness_rows
-from proxytune.report.study.verdict import sentence
-from proxytune.storage.records import TrialRecord
+from proxytune.report.study.verdict import answer, next_step
 from proxytune.study.result import StudyResult
-
-PAGE = Template("""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width">
-<title>$title</title>
-<style>
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { text-align: left; padding: .15rem 1rem .15rem 0; border-bottom: 1px solid #ddd; }
-img { max-width: 100%; }
-.verdict { font-size: 1.2em; }
-.scroll { overflow-x: auto; }
-</style>
-</head>
-<body>
-<h1>$title</h1>
-<p class="verdict">$sentence</p>
-$groups
-$figures
-<p>$meaning</p>
-<h2>Trials</h2>
-<div class="scroll">$trials</div>
-<h2>Settings</h2>
-<div class="scroll">$settings</div>
-</body>
-</html>
-""")
+from proxytune.study.settings import StudySettings
 
 
-def page(result: StudyResult, figures: Sequence[Path]) -> str:
-    """The page, with these PNG figures in it.
+def study_page(result: StudyResult, figures: Mapping[str, bytes], command: str = "") -> Page:
+    """A study as a page.
 
-    Raises:
-        OSError: If a figure cannot be read.
+    Args:
+        result: What it has found.
+        figures: PNG files by the name of the figure, those that there are.
+        command: What was typed; the study's own command where nothing is given.
     """
-    settings = result.study.settings
-    return PAGE.substitute(
-        title=html.escape(settings.name),
-        sentence=html.escape(sentence(finding_of(result))),
-        groups=_groups(result),
-        meaning=html.escape(_meaning(result)),
-        figures="".join(_image(path) for path in figures),
-        trials=_table(("trial", *settings.space.names, "PRPV", "PPV", "failed episodes"), _trials(result)),
-        settings=_table(("key", "value"), _settings(result)),
-    )
+    finding, settings = finding_of(result), result.study.settings
+    foot = foot_of(command or study_command(settings), study_settings(settings))
+    return Page(settings.name, answer(finding), next_step(finding), _parts(result, figures), foot)
 
 
-def _groups(result: StudyResult) -> str:
-    """What the terminal shows below the sentence, under the same heads."""
-    informed = information_rows(result)
-    usefulness = _table(USEFULNESS_COLUMNS, usefulness_rows(result))
-    return "".join((
-        _group(THETA, _table(theta_columns(result), theta_rows(result)), theta_notes(result)),
-        _group(USEFULNESS, usefulness, usefulness_notes(result)),
-        _group(INFORMATION, _table(INFORMATION_COLUMNS, informed)) if informed else "",
-        _group(SEARCH, _table((), search_rows(result))),
-    ))  # fmt: skip
+def study_command(settings: StudySettings) -> str:
+    """The command that runs a study."""
+    return f"python -m proxytune study {shlex.quote(str(settings.folder))}"
 
 
-def _group(title: str, table: str, notes: Sequence[str] = ()) -> str:
-    items = "".join(f"<li>{html.escape(note)}</li>" for note in notes)
-    return f'<h2>{html.escape(title)}</h2><div class="scroll">{table}</div>' + (f"<ul>{items}</ul>" if items else "")
-
-
-def _meaning(result: StudyResult) -> str:
-    agents = len(result.study.settings.agents)
-    return (
-        "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
-        f"{agents} agents proxy and target disagree which is the better. The best θ is the visited one of lowest "
-        "expected PRPV, given all trials and fresh episodes. The 95 % interval holds the values that agree with every "
-        "agent's every metric on the target; “by PRPV alone” those whose PRPV is as low as the best, within noise."
-    )
-
-
-def _trials(result: StudyResult) -> list[tuple[str, ...]]:
-    return [_trial_row(trial, result.study.settings.space.names) for trial in result.trials]
-
-
-def _trial_row(trial: TrialRecord, names: tuple[str, ...]) -> tuple[str, ...]:
-    theta = (f"{trial.theta[name]:.4g}" for name in names)
-    prpv = "failed" if trial.prpv is None else f"{trial.prpv:g}"
-    if trial.bound is not None:
-        prpv = f"stopped early, at least {trial.bound:g}"
-    ppv = "" if trial.ppv is None else f"{trial.ppv:.3g}"
-    return (str(trial.number), *theta, prpv, ppv, str(trial.failed_episodes))
-
-
-def _settings(result: StudyResult) -> list[tuple[str, str]]:
-    settings = result.study.settings
+def study_settings(settings: StudySettings) -> list[tuple[str, str]]:
+    """What study.toml says, as names and values."""
     return [
         ("domain family", settings.family),
         ("proxy", settings.proxy.name if settings.proxy else "the family's nominal model"),
@@ -118,13 +49,32 @@ def _settings(result: StudyResult) -> list[tuple[str, str]]:
     ]
 
 
-def _image(path: Path) -> str:
-    data = base64.b64encode(path.read_bytes()).decode("ascii")
-    return f'<p><img alt="{html.escape(path.stem)}" src="data:image/png;base64,{data}"></p>'
+def _parts(result: StudyResult, figures: Mapping[str, bytes]) -> tuple[Picture | Table | Words, ...]:
+    """What the terminal shows below the sentence, under the same heads, with the figures beside what they are of."""
+    drawn, informed = pictures(result, figures), information_rows(result)
+    theta = Table(THETA, theta_columns(result), tuple(theta_rows(result)), tuple(theta_notes(result)))
+    usefulness = Table(USEFULNESS, USEFULNESS_COLUMNS, tuple(usefulness_rows(result)), tuple(usefulness_notes(result)))
+    information = Table(INFORMATION, INFORMATION_COLUMNS, tuple(informed)) if informed else None
+    parts = (
+        theta,
+        drawn.get("profiles"),
+        usefulness,
+        drawn.get("convergence"),
+        information,
+        drawn.get("importance"),
+        drawn.get("evaluations"),
+        Table(SEARCH, (), tuple(search_rows(result))),
+        Words("What PRPV and the intervals are", (_meaning(result),)),
+        trials_table(result.trials, result.study.settings.space.names),
+    )
+    return tuple(part for part in parts if part is not None)
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    cells = "".join(f"<th>{html.escape(name)}</th>" for name in head)
-    top = f"<tr>{cells}</tr>" if cells else ""
-    body = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table>{top}{body}</table>"
+def _meaning(result: StudyResult) -> str:
+    agents = len(result.study.settings.agents)
+    return (
+        "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
+        f"{agents} agents proxy and target disagree which is the better. The best θ is the visited one of lowest "
+        "expected PRPV, given all trials and fresh episodes. The 95 % interval holds the values that agree with every "
+        "agent's every metric on the target; “by PRPV alone” those whose PRPV is as low as the best, within noise."
+    )

@@ -10,7 +10,17 @@ MOST_NAMED = 5
 
 def sentence(finding: Finding) -> str:
     """What was found, how good the proxy is there, and what to do next."""
-    return f"{_say_theta(finding)} {_say_usefulness(finding)} Next: {_say_next_step(finding)}."
+    return f"{answer(finding)} Next: {next_step(finding)}"
+
+
+def answer(finding: Finding) -> str:
+    """What was found, and how good the proxy is there."""
+    return f"{_say_theta(finding)} {_say_usefulness(finding)}"
+
+
+def next_step(finding: Finding) -> str:
+    """What to do next."""
+    return f"{_say_next_step(finding)}."
 
 
 def _say_theta(finding: Finding) -> str:

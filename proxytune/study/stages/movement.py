@@ -52,9 +52,11 @@ class Movement:
         name, box = self.interval.name, f"[{self.interval.low:g}, {self.interval.high:g}]"
         if not self.pairs:
             return f"pre-flight: '{name}' cannot be tested: every agent fails somewhere in {box}; narrow its box"
-        what = "nothing at all" if self.dead else "no metric beyond noise"
-        remedy = "remove it from [parameters], add agents that depend on it, or widen its box"
-        return f"pre-flight: '{name}' changes {what} across {box}; {remedy}"
+        if self.dead:
+            remedy = "remove it from [parameters], add agents that depend on it, or widen its box"
+            return f"pre-flight: '{name}' changes nothing at all across {box}; {remedy}"
+        remedy = "add agents that depend on it, starts or metrics, or widen its box"
+        return f"pre-flight: '{name}' is not shown to change a metric across {box} by {self.pairs} pairs; {remedy}"
 
 
 def judge(interval: Interval, names: Sequence[str], values: Array) -> Movement:

@@ -89,15 +89,24 @@ def test_joints_that_are_not_one_left_and_one_right_are_refused(tmp_path, names)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_number_that_is_not_finite_is_told_by_message(tmp_path, bad):
+def test_a_command_that_is_not_finite_is_told_by_message(tmp_path, bad):
     def fields(number):
-        return with_header(pose=bags.pose((bad if number == 2 else 0.0, 0.0, 0.0)))(number)
+        return {"linear": bags.xyz((bad if number == 2 else 0.0, 0.0, 0.0)), "angular": bags.xyz((0, 0, 0))}
 
     with (
-        written(tmp_path, bags.POSE, fields) as bag,
+        written(tmp_path, bags.TWIST, fields) as bag,
         pytest.raises(LogError, match="run.bag: /topic, message 3: holds a number that is not finite"),
     ):
-        read_poses(bag, "/topic", "header")
+        read_commands(bag, "/topic", "twist", "header")
+
+
+def test_a_pose_that_is_not_finite_is_kept_for_the_checks_to_leave_out(tmp_path):
+    def fields(number):
+        return with_header(pose=bags.pose((np.nan if number == 2 else 0.0, 0.0, 0.0)))(number)
+
+    with written(tmp_path, bags.POSE, fields) as bag:
+        poses, _ = read_poses(bag, "/topic", "header")
+    assert np.flatnonzero(np.isnan(poses.places[:, 0])).tolist() == [2]
 
 
 def test_an_orientation_of_zeros_is_no_heading(tmp_path):

@@ -1,0 +1,102 @@
+"""`drive`: one episode to look at, in the proxy and beside it in the target, under the same seed."""
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console, Group
+from rich.text import Text
+
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.study_folder import study_folder
+from proxytune.cli.terminal.theta import ChosenTheta, choose_theta
+from proxytune.domain import DomainFamily, make_episode
+from proxytune.errors import InputError
+from proxytune.report.drive.document import episode_document, episode_table, parting
+from proxytune.report.drive.pictures import NO_PLACES, check_output, write_episode
+from proxytune.seeds import episode_seed
+from proxytune.space import Theta
+from proxytune.study.family import load_family
+from proxytune.study.settings import StudySettings, read_study_settings
+from proxytune.study.side_by_side import SideBySide, drive_side_by_side, load_target
+from proxytune.study.single_episode import can_record, check_episode
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the study, the episode, the target and the picture."""
+    parser.add_argument("path", type=Path, metavar="PATH", help="a study's folder")
+    parser.add_argument("--agent", required=True, metavar="NAME", help="who drives; any agent of the domain family")
+    parser.add_argument(
+        "--theta",
+        metavar="best|nominal|MODEL|NAME=VALUE,…",
+        help="θ of the proxy: the study's best, the robot's own, a model.toml's, or given"
+        " [best once a trial is finished, else nominal]",
+    )
+    parser.add_argument(
+        "--against", type=Path, metavar="MODEL", help="the target's model.toml [the study's `truth`, if it names one]"
+    )
+    parser.add_argument("--start", type=int, default=0, metavar="N", help="starting condition, from 0 [0]")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of everything random [the study's]")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="picture to write: .png shows the whole episode, .gif and .mp4 move [none]",
+    )
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Drive the episode on every side, and draw it if that is asked for."""
+    settings = read_study_settings(study_folder(arguments.path))
+    family = load_family(settings, settings.proxy)
+    _check(arguments, family)
+    model, option = (arguments.against, "--against") if arguments.against else (settings.truth, "truth")
+    target = load_target(settings, family, model, option) if model else None
+    chosen = choose_theta(arguments.theta, settings, family, "--theta")
+    seed = settings.seed if arguments.seed is None else arguments.seed
+    pair = _drive(family, target, arguments, chosen.theta, seed)
+    compared = [metric.name for metric in settings.metrics]
+    if arguments.output:
+        write_episode(pair, compared, arguments.output)
+    files = {"against": str(model) if model else None, "output": str(arguments.output) if arguments.output else None}
+    document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files}
+    about = [_say_episode(pair, settings, seed), _say_theta(chosen), _say_target(model), ""]
+    below = ["", *(line for line in (parting(pair), files["output"]) if line)]
+    return Answer(document, Group(Text("\n".join(about)), episode_table(pair, compared), Text("\n".join(below))))
+
+
+def _drive(
+    family: DomainFamily, target: DomainFamily | None, arguments: argparse.Namespace, theta: Theta, seed: int
+) -> SideBySide:
+    agent, start = arguments.agent, arguments.start
+    check_episode(family, agent, theta, start)
+    episode = make_episode(theta, agent=agent, start=start, seed=episode_seed(seed, start))
+    with Console(stderr=True).status("driving"):
+        return drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
+
+
+def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:
+    """Refuse what cannot be done before anything is simulated."""
+    if arguments.seed is not None and arguments.seed < 0:
+        raise InputError(f"--seed must be at least 0, got {arguments.seed}")
+    if arguments.output:
+        check_output(arguments.output)
+        if not can_record(family):
+            raise InputError(f"--output {arguments.output}: {NO_PLACES}; leave the option out to see its metrics")
+
+
+def _say_episode(pair: SideBySide, settings: StudySettings, seed: int) -> str:
+    agent, start = pair.episode.agent, pair.episode.start
+    own = agent in settings.agents and start < settings.starts and seed == settings.seed
+    return f"{agent} from start {start} under seed {seed}, as in {'every' if own else 'no'} trial of this study"
+
+
+def _say_theta(chosen: ChosenTheta) -> str:
+    values = ", ".join(f"{name}={value:.4g}" for name, value in sorted(chosen.theta.items()))
+    words = {"best": "proxy: the study's best θ", "nominal": "proxy: the nominal θ", "given": "proxy: the θ given"}
+    return f"{words[chosen.origin]}{': ' if values else ''}{values}"
+
+
+def _say_target(model: Path | None) -> str:
+    if model is None:
+        return "target: none to drive in, as study.toml names no `truth`; --against MODEL gives one"
+    return f"target: {model}, under the same seed"

@@ -1,0 +1,39 @@
+"""An experiment in teaching, and a search by PLV, as pages."""
+
+from collections.abc import Mapping
+
+from proxytune.report.page import Foot, Page, Picture, Table, Words, terminal_tables
+from proxytune.report.teaching.plv_document import plv_table
+from proxytune.report.teaching.table import COLUMNS, PLV_MEANING, convergence_lines, table_rows
+from proxytune.report.teaching.words import plv_answer, plv_next_step, teach_answer, teach_next_step
+from proxytune.teaching.experiment import Experiment
+from proxytune.teaching.search import PlvStudy
+
+CURVES = (
+    "One panel per proxy, against the learner without one (grey). A proxy saves samples where its curve comes to the "
+    "dotted line sooner and stays above it; where the bands (95 %, over seeds) overlap, no difference is shown. The "
+    "point on the left is the score before any target sample."
+)
+TRIALS = (
+    "PLV of each proxy tried, with its 95 % interval; crosses have not converged. Above 0 samples are saved. Where "
+    "intervals overlap, the order of the proxies is not known."
+)
+
+
+def teach_page(experiment: Experiment, prpv: Mapping[str, float | None], figure: bytes, foot: Foot) -> Page:
+    """A learning experiment as a page: the paper's table 1 and the curves."""
+    lines = (PLV_MEANING, *convergence_lines(experiment))
+    rows = tuple(table_rows(experiment, prpv))
+    picture = Picture("What each proxy saves, curve by curve", figure, CURVES)
+    table = Table("PLV of each proxy (the paper's table 1)", COLUMNS, rows, lines)
+    name = f"{experiment.settings.name}: proxies as teachers"
+    return Page(name, teach_answer(experiment), teach_next_step(experiment), (table, picture), foot)
+
+
+def plv_page(study: PlvStudy, figure: bytes, foot: Foot) -> Page:
+    """A search by PLV as a page."""
+    (table,) = terminal_tables(plv_table(study, {}))
+    proxies = Table("Proxies tried, the best first", table.columns, table.rows)
+    stopped = Words("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
+    picture = Picture("PLV of the proxies tried", figure, TRIALS)
+    return Page(study.settings.name, plv_answer(study), plv_next_step(study), (picture, proxies, stopped), foot)

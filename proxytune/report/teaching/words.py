@@ -1,0 +1,72 @@
+"""What an experiment in teaching has shown, in sentences that claim no more than the intervals allow."""
+
+from collections.abc import Sequence
+
+from proxytune.learning.plv import Estimate
+from proxytune.report.numbers import listed
+from proxytune.report.teaching.table import UNKNOWN, count
+from proxytune.teaching.experiment import Experiment, TeacherResult
+from proxytune.teaching.search import PlvStudy
+
+SEARCH = '`study` with objective = "plv" looks for'
+
+
+def teach_answer(experiment: Experiment) -> str:
+    """Which proxies save target samples, which save none, and of which that is open."""
+    if not experiment.settled:
+        last = experiment.without.counts[-1]
+        return f"PLV (proxy learning value) is unknown: without a proxy {last} samples are too few to converge."
+    saves, none, unknown = sorted_by_worth(experiment.teachers)
+    sentences = [
+        f"Target samples saved (PLV, proxy learning value, with 95 % interval): {_said(saves) or 'none is shown'}.",
+        f"None saved: {_said(none)}." if none else "",
+        f"Open, since the interval reaches to both sides of 0: {_said(unknown)}." if unknown else "",
+    ]
+    return " ".join(filter(None, sentences))
+
+
+def sorted_by_worth(teachers: Sequence[TeacherResult]) -> tuple[list[TeacherResult], ...]:
+    """The proxies whose whole interval of PLV lies above 0, those of which none of it does, and the others."""
+    saves = [one for one in teachers if one.worth and _above(one.worth.plv)]
+    none = [one for one in teachers if one.worth and one.worth.plv.high is not None and one.worth.plv.high <= 0.0]
+    return saves, none, [one for one in teachers if one not in (*saves, *none)]
+
+
+def _above(plv: Estimate) -> bool:
+    return plv.value is not None and plv.low is not None and plv.low > 0.0
+
+
+def _said(lessons: Sequence[TeacherResult]) -> str:
+    return "; ".join(f"{one.name}: {count(one.worth.plv, UNKNOWN)}" for one in lessons if one.worth)
+
+
+def teach_next_step(experiment: Experiment) -> str:
+    """The step that brings most."""
+    if not experiment.settled:
+        return "raise teaching.target_samples until the learner without a proxy converges."
+    saves, _, unknown = sorted_by_worth(experiment.teachers)
+    if unknown:
+        seeds = len(experiment.without.scores)
+        more = f"raise teaching.seeds from {seeds} to {2 * seeds}, which narrows the intervals"
+        return f"{more}: {listed([one.name for one in unknown])} cannot be judged yet."
+    if saves:
+        return f"train in a proxy that saves samples, then on target samples; {SEARCH} a better one."
+    return f"train without these proxies; {SEARCH} one that saves samples."
+
+
+def plv_answer(study: PlvStudy) -> str:
+    """The proxy of highest PLV, and whether it is shown to save anything."""
+    best, plv = study.best, study.best.worth.plv
+    theta = ", ".join(f"{name} {value:.4g}" for name, value in best.theta.items())
+    worth = "it saves target samples" if _above(plv) else "that it saves any is not shown: the interval holds 0"
+    return (
+        f"Of {len(study.trials)} proxies tried, {theta} has the highest PLV (proxy learning value): "
+        f"{count(plv, UNKNOWN)} target samples saved; {worth}."
+    )
+
+
+def plv_next_step(study: PlvStudy) -> str:
+    """The step that brings most."""
+    if _above(study.best.worth.plv):
+        return "train in this proxy, then on target samples; proxies whose intervals overlap with its may be as good."
+    return "raise teaching.seeds, which narrows the intervals, or teaching.budget, which tries more proxies."

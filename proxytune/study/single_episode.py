@@ -1,0 +1,138 @@
+"""One episode of a domain family, to look at: its scores, and what moved, was commanded and was seen."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.domain import DomainFamily, Episode, Recording
+from proxytune.errors import EpisodeError, InputError, ProxytuneError
+from proxytune.extensions import describe
+from proxytune.running.episodes import run_episode
+from proxytune.settings import nearest
+from proxytune.space import Theta
+from proxytune.study.evaluation import failure_of
+
+Columns = Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedEpisode:
+    """What became of one episode.
+
+    Attributes:
+        metrics: Its scores, by name.
+        poses: Columns by name: `time` [s] and, of a robot on a floor, x, y [m] and heading [rad]; none where the family
+            keeps no poses.
+        commands: Columns by name: `time` [s] and a channel each; none likewise.
+        pictures: What the camera saw before each command, (commands, rows, columns, 3); None where nobody asked for
+            pictures, or the family cannot give them.
+    """
+
+    metrics: Mapping[str, float]
+    poses: Columns
+    commands: Columns
+    pictures: NDArray[np.uint8] | None = None
+
+    @property
+    def has_places(self) -> bool:
+        """Whether it is known where the robot was."""
+        return {"time", "x", "y"} <= set(self.poses)
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """Where the robot was at each time of `poses`, (times, 2): x, y [m]."""
+        return np.column_stack((self.poses["x"], self.poses["y"]))
+
+    @property
+    def seconds(self) -> float:
+        """When it ended [s]."""
+        return float(self.poses["time"][-1])
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the commands' channels."""
+        return tuple(name for name in self.commands if name != "time")
+
+
+def check_episode(family: DomainFamily, agent: str, theta: Theta, start: int) -> None:
+    """Refuse what the family does not have.
+
+    Raises:
+        InputError: With what it has.
+    """
+    try:
+        family.check_agent(agent)
+    except ProxytuneError:
+        raise
+    except Exception as problem:
+        raise InputError(f"agent '{agent}': check_agent of the domain family raised {describe(problem)}") from problem
+    if not 0 <= start < family.starts:
+        raise InputError(f"start {start}: the family has {family.starts}; give 0 to {family.starts - 1}")
+    for name, value in theta.items():
+        known = family.parameters.get(name)
+        if known is None:
+            raise InputError(f"θ: unknown parameter '{name}'; {nearest(name, family.parameters)}")
+        if not known.low <= value <= known.high:
+            raise InputError(f"θ: {name} must lie within [{known.low:g}, {known.high:g}], got {value:g}")
+
+
+def can_record(family: DomainFamily) -> bool:
+    """Whether a family keeps more of an episode than its scores (`domain.Recorder`)."""
+    return hasattr(family, "record")
+
+
+def record_episode(family: DomainFamily, episode: Episode, *, filmed: bool = False) -> RecordedEpisode:
+    """Run an episode and keep all that the family shows of it.
+
+    Args:
+        family: Where it runs.
+        episode: Which one.
+        filmed: Whether pictures are wanted. A family with `replay` gives them: the recorded commands are driven again,
+            which takes as long as the episode.
+
+    Raises:
+        EpisodeError: If the agent or the domain fails, or columns of its recording do not belong together.
+    """
+    recorder: Any = _Recorder(family, filmed)
+    outcome = run_episode(recorder, episode)
+    if outcome.metrics is None:
+        raise EpisodeError(failure_of(outcome))
+    return RecordedEpisode(outcome.metrics, recorder.kept.poses, recorder.kept.commands, recorder.pictures)
+
+
+class _Recorder:
+    """What running an episode asks of a family, answered by one that records it if it can."""
+
+    def __init__(self, family: Any, filmed: bool) -> None:
+        self._family, self._filmed = family, filmed
+        self.metrics: Mapping[str, str] = family.metrics
+        self.kept = Recording({}, {}, {})
+        self.pictures: NDArray[np.uint8] | None = None
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        """Run the episode, and keep its recording and pictures."""
+        if not can_record(self._family):
+            return self._family.run(episode)  # type: ignore[no-any-return]
+        self.kept = self._family.record(episode)
+        _check_columns("poses", self.kept.poses)
+        _check_columns("commands", self.kept.commands)
+        if self._filmed and hasattr(self._family, "replay"):
+            self.pictures = _pictures(self._family, episode, self.kept.commands)
+        return self.kept.metrics
+
+
+def _check_columns(what: str, columns: Columns) -> None:
+    lengths = {len(column) for column in columns.values()}
+    if columns and ("time" not in columns or len(lengths) > 1 or not min(lengths)):
+        raise EpisodeError(f"record of the domain family: {what} need a column `time` and as many rows in every column")
+
+
+def _pictures(family: Any, episode: Episode, commands: Columns) -> NDArray[np.uint8] | None:
+    """The picture before each command; None if the answer has no pictures of red, green and blue."""
+    issued = np.column_stack([column for name, column in commands.items() if name != "time"])
+    pictures = np.asarray(family.replay(episode, issued).pictures)
+    coloured = pictures.dtype == np.uint8 and pictures.ndim == 4 and pictures.shape[-1] == 3
+    return pictures if coloured and len(pictures) == len(issued) else None

@@ -1,0 +1,152 @@
+"""`drive`: what it says and writes, and each bad input in one line."""
+
+import json
+
+import pytest
+from PIL import Image
+
+from proxytune.cli.main import main
+
+DOMAIN = {"robot": '"duckiebot"', "plant": '"planar"', "seconds": "2.0"}
+FAMILY = '"proxytune.driving.family:lane_following"'
+MODEL = 'format = 1\nrobot = "{}"\n[effects.trim]\ntrim = {}\n'
+TARGET = "agent,episode,distance,survival_time\n" + "".join(f"{a},{e},1,1\n" for a in ("steady", "wary") for e in "012")
+
+
+@pytest.fixture(scope="module")
+def lane(make_studies):
+    """A study of lane following that names the truth."""
+    folder = make_studies("lane", domain=DOMAIN, family=FAMILY, agents='["steady", "wary"]', truth='"truth.toml"')
+    (folder / "truth.toml").write_text(MODEL.format("duckiebot", 0.2))
+    (folder / "other.toml").write_text(MODEL.format("irobot_create", 0.2))
+    (folder / "target.csv").write_text(TARGET)
+    return folder
+
+
+def document(capsys, *words):
+    capsys.readouterr()
+    assert main(["drive", *map(str, words), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def complaint(capsys, *words):
+    capsys.readouterr()
+    assert main(["drive", *map(str, words)]) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    return line
+
+
+def test_the_document_has_both_scores_and_when_they_part(lane, capsys):
+    answer = document(capsys, lane, "--agent", "steady", "--theta", "trim=-0.2")
+    keys = ["agent", "start", "seed", "theta", "proxy", "target", "parted_s", "theta_from", "against", "output"]
+    assert list(answer) == keys
+    assert (answer["agent"], answer["start"], answer["seed"], answer["theta"]) == ("steady", 0, 1, {"trim": -0.2})
+    assert answer["proxy"]["metrics"]["distance"] != answer["target"]["metrics"]["distance"]
+    assert 0.0 < answer["parted_s"] < 2.0
+    assert (answer["theta_from"], answer["against"], answer["output"]) == ("given", str(lane / "truth.toml"), None)
+
+
+def test_the_proxy_at_the_target_s_own_values_does_not_part_from_it(lane, capsys):
+    answer = document(capsys, lane, "--agent", "steady", "--theta", lane / "truth.toml", "--start", "2", "--seed", "7")
+    assert answer["proxy"] == answer["target"]
+    assert (answer["parted_s"], answer["start"], answer["seed"]) == (None, 2, 7)
+
+
+def test_people_see_which_episode_it_is_both_scores_and_when_they_part(lane, capsys):
+    assert main(["drive", str(lane), "--agent", "steady", "--theta", "trim=-0.2"]) == 0
+    shown = capsys.readouterr().out
+    assert "steady from start 0 under seed 1, as in every trial of this study" in shown
+    assert "proxy: the θ given: trim=-0.2" in shown
+    assert "distance [m]" in shown
+    assert "first more than 5 cm apart at" in shown
+    assert main(["drive", str(lane), "--agent", "brisk"]) == 0
+    assert "brisk from start 0 under seed 1, as in no trial of this study" in capsys.readouterr().out
+
+
+def test_before_a_trial_is_finished_the_nominal_theta_drives(lane, capsys):
+    answer = document(capsys, lane, "--agent", "steady")
+    assert (answer["theta_from"], answer["theta"]) == ("nominal", {})
+
+
+def test_after_a_trial_the_best_theta_drives_unless_nominal_is_asked_for(finished, capsys):
+    best = document(capsys, finished, "--agent", "agent0")
+    assert best["theta_from"] == "best"
+    assert set(best["theta"]) == {"trim", "delay"}
+    assert document(capsys, finished, "--agent", "agent0", "--theta", "nominal")["theta"] == {}
+
+
+def test_a_study_without_a_truth_has_no_target_until_one_is_given(make_study, tmp_path, capsys):
+    folder = make_study(domain=DOMAIN, family=FAMILY, agents='["steady", "wary"]')
+    alone = document(capsys, folder, "--agent", "steady")
+    assert (alone["target"], alone["parted_s"], alone["against"]) == (None, None, None)
+    (tmp_path / "model.toml").write_text(MODEL.format("duckiebot", 0.2))
+    assert document(capsys, folder, "--agent", "steady", "--against", tmp_path / "model.toml")["target"] is not None
+
+
+@pytest.mark.parametrize(("ending", "frames"), [("png", 1), ("gif", 2)])
+def test_a_picture_is_written_and_named(lane, tmp_path, capsys, ending, frames):
+    path = tmp_path / "new" / f"episode.{ending}"
+    assert document(capsys, lane, "--agent", "steady", "--output", path)["output"] == str(path)
+    with Image.open(path) as picture:
+        assert picture.format == ending.upper()
+        assert getattr(picture, "n_frames", 1) >= frames
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_another_simulator_s_robot_is_drawn_where_it_records_places(make_study, tmp_path, capsys):
+    folder = make_study(family='"walking:walking"')
+    (tmp_path / "model.toml").write_text("trim = 0.2\n")
+    words = ["--agent", "agent0", "--against", tmp_path / "model.toml", "--output", tmp_path / "walk.png"]
+    assert document(capsys, folder, *words)["parted_s"] == pytest.approx(0.3)
+    assert (tmp_path / "walk.png").exists()
+
+
+@pytest.mark.parametrize("family", ["wobbly:wobbly", "walking:walking"])
+def test_where_there_are_no_places_there_are_metrics_and_one_line(make_study, tmp_path, capsys, family):
+    domain = {"columns": '"z"'} if family.startswith("walking") else {}
+    folder = make_study(family=f'"{family}"', domain=domain)
+    assert document(capsys, folder, "--agent", "agent0")["proxy"]["metrics"]["distance"] > 0.0
+    line = complaint(capsys, folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
+    assert "nothing can be drawn, as this study's domain family records no x and y; leave the option out" in line
+    assert not (tmp_path / "walk.png").exists()
+
+
+def test_a_family_that_records_nothing_is_told_so_before_anything_is_driven(make_study, tmp_path, capsys):
+    folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
+    assert "nothing can be drawn" in complaint(capsys, folder, "--agent", "agent0", "--output", tmp_path / "walk.png")
+    assert not (tmp_path / "journal").exists()
+    document(capsys, folder, "--agent", "agent0")
+    assert (tmp_path / "journal").exists()
+
+
+BAD = {
+    "an unknown agent": (["--agent", "wry"], "agent 'wry' is unknown (your own is written module:attribute)"),
+    "no such start": (["--start", "10"], "start 10: the family has 10; give 0 to 9"),
+    "a negative seed": (["--seed", "-1"], "--seed must be at least 0, got -1"),
+    "an unknown format": (["--output", "a.bmp"], "unknown format '.bmp'; end the name in .png, .gif or .mp4"),
+    "a folder that is a file": (["--output", f"{__file__}/a.png"], "cannot be written there; choose another place"),
+    "an unknown parameter": (["--theta", "trimm=0"], "θ: unknown parameter 'trimm'; did you mean 'trim'"),
+    "a value out of bounds": (["--theta", "trim=7"], "θ: trim must lie within"),
+    "a θ that is none": (["--theta", "well"], "--theta well: write NAME=VALUE,NAME=VALUE, best, nominal or a model"),
+    "a best θ before any trial": (["--theta", "best"], "has no finished trial; run it first"),
+    "no such model": (["--against", "no.toml"], "--against no.toml: no such file; check the path"),
+}
+
+
+@pytest.mark.parametrize("fault", BAD)
+def test_bad_input_is_told_in_one_line(lane, capsys, fault):
+    words, line = BAD[fault]
+    assert line in complaint(capsys, lane, "--agent", "steady", *words)
+
+
+@pytest.mark.parametrize("option", ["--against", "--theta"])
+def test_a_model_of_another_robot_is_refused(lane, capsys, option):
+    line = complaint(capsys, lane, "--agent", "steady", option, lane / "other.toml")
+    assert f"{option} {lane / 'other.toml'}: is of the robot 'irobot_create'; give a model of 'duckiebot'" in line
+
+
+def test_a_movie_without_its_writer_is_refused_before_anything_is_driven(lane, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
+    line = complaint(capsys, lane, "--agent", "steady", "--output", tmp_path / "a.mp4")
+    assert line == "proxytune drive: an .mp4 takes ffmpeg: pip install imageio-ffmpeg, or write a .gif"

@@ -1,0 +1,92 @@
+"""The page of `teach` claims no more than the intervals allow."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from proxytune.learning.lessons import Distribution
+from proxytune.learning.plv import Convergence, Curve, Teaching
+from proxytune.learning.plv import Estimate as Worth
+from proxytune.report.page import foot_of, html_of
+from proxytune.report.teaching.figure import places_of, teach_figure
+from proxytune.report.teaching.page import teach_page
+from proxytune.report.teaching.words import sorted_by_worth, teach_answer, teach_next_step
+from proxytune.report.writing import save
+from proxytune.teaching.experiment import Experiment, TeacherResult
+
+NOTHING = Worth(None, None, None)
+COUNTS = (0, 50, 100, 200, 400)
+EVIL = "<script>alert(1)</script>"
+
+
+def lesson(name, plv):
+    worth = Teaching(Worth(400, 200, 400), Worth(100, 50, 400), plv, NOTHING, NOTHING)
+    scores = np.linspace(10.0, 50.0, 5) + np.arange(3)[:, None]
+    return TeacherResult(name, Distribution({}), Curve(COUNTS, scores), worth)
+
+
+LESSONS = (
+    lesson("sure", Worth(300, 100, 350)),
+    lesson("harmful", Worth(None, None, 0)),
+    lesson("wide", Worth(300, -100, 400)),
+    lesson("reaching", Worth(200, None, 400)),
+    lesson(EVIL, Worth(0, 0, 0)),
+)
+
+
+def experiment(lessons=LESSONS, settled=True):
+    without = Curve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
+    settings = SimpleNamespace(name=EVIL)
+    return Experiment(settings, 60.0, without, Convergence(50.0, 5.0), settled, lessons)
+
+
+def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so():
+    saves, none, unknown = sorted_by_worth(LESSONS)
+    assert [one.name for one in saves] == ["sure"]
+    assert [one.name for one in none] == ["harmful", EVIL]
+    assert [one.name for one in unknown] == ["wide", "reaching"]
+
+
+def test_the_answer_names_each_proxy_with_its_interval_where_it_belongs():
+    answer = teach_answer(experiment())
+    shown, rest = answer.split(" None saved: ")
+    assert "sure: 300 (100 to 350)" in shown
+    assert "wide" not in shown
+    assert rest.index("harmful") < rest.index("Open, since") < rest.index("wide: 300 (-100 to 400)")
+    assert "none is shown" in teach_answer(experiment(LESSONS[2:3]))
+
+
+def test_the_next_step_is_more_seeds_while_something_is_open():
+    assert "raise teaching.seeds from 3 to 6" in teach_next_step(experiment())
+    assert "train in a proxy that saves" in teach_next_step(experiment(LESSONS[:2]))
+    assert "train without these proxies" in teach_next_step(experiment(LESSONS[1:2]))
+
+
+def test_without_convergence_plv_is_unknown_and_more_samples_are_next():
+    assert "is unknown: without a proxy 400 samples are too few" in teach_answer(experiment(settled=False))
+    assert "raise teaching.target_samples" in teach_next_step(experiment(settled=False))
+
+
+def test_each_proxy_has_a_panel_of_its_own_against_no_proxy():
+    figure = teach_figure(experiment())
+    panels = [axes for axes in figure.axes if axes.get_visible()]
+    assert [axes.get_title() for axes in panels] == [one.name for one in LESSONS]
+    for axes, one in zip(panels, LESSONS, strict=True):
+        curves = {line.get_label(): line for line in axes.lines}
+        assert {"with the proxy", "without a proxy", "converged"} <= curves.keys()
+        assert list(curves["with the proxy"].get_ydata()) == pytest.approx(list(one.curve.mean[1:]))
+    assert figure.get_figwidth() * 25.4 <= 86.0
+
+
+def test_the_zero_shot_score_stands_apart_from_the_counts():
+    assert places_of(LESSONS[0].curve) == [0.0, 1.5, 2.5, 3.5, 4.5]
+
+
+def test_the_page_has_table_1_and_takes_no_name_for_markup(tmp_path):
+    save(teach_figure(experiment()), tmp_path / "teach.png")
+    page = teach_page(experiment(), {"sure": 3.0}, (tmp_path / "teach.png").read_bytes(), foot_of("teach"))
+    text = html_of(page)
+    assert "<script" not in text
+    assert '<th scope="row">sure</th><td class="number">3</td>' in text
+    assert "converged: the mean score is at least 45.0 of 60" in text

@@ -38,6 +38,7 @@ class Compared:
         unit: Its unit; empty where it has none.
         before: Without what was found.
         after: With it; None where nothing was found.
+        most: The largest that it can be; None where there is no such value.
     """
 
     key: str
@@ -45,6 +46,7 @@ class Compared:
     unit: str
     before: Level
     after: Level | None
+    most: int | None = None
 
     @property
     def falls(self) -> bool:
@@ -63,9 +65,8 @@ def prpv_level(assessment: Assessment) -> Level:
 
 def compare_prpv(key: str, title: str, before: Assessment, after: Assessment | None) -> Compared:
     """PRPV of the tuned proxies."""
-    most = before.prpv.range[1]
     levels = prpv_level(before), None if after is None else prpv_level(after)
-    return Compared(key, f"PRPV of {title}, of at most {most}", "", *levels)
+    return Compared(key, f"PRPV of {title}", "", *levels, most=before.prpv.range[1])
 
 
 def compare_errors(diagnosis: Mapping[str, Any]) -> list[Compared]:

@@ -119,7 +119,7 @@ def _lines(name: str, table: Mapping[str, Any]) -> list[str]:
 
 def _key(key: str) -> str:
     """A key, in quotes where TOML needs them."""
-    return key if re.fullmatch("[A-Za-z0-9_-]+", key) else json.dumps(key, ensure_ascii=False)
+    return key if re.fullmatch("[A-Za-z0-9_-]+", key) else _text(key)
 
 
 def _value(value: Any) -> str:
@@ -127,4 +127,9 @@ def _value(value: Any) -> str:
         return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items()) + " }"
-    return json.dumps(value, ensure_ascii=False)
+    return _text(value) if isinstance(value, str) else json.dumps(value)
+
+
+def _text(text: str) -> str:
+    # JSON's escapes are TOML's, which has one more.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -95,7 +95,7 @@ def table_rows(rows: list[Compared]) -> list[tuple[str, ...]]:
     """The table's cells as COLUMNS says."""
     return [
         (
-            row.title,
+            f"{row.title}, 0 to {row.most}" if row.most else row.title,
             level_text(row.before, row.unit),
             level_text(row.after, row.unit),
             "; ".join(dict.fromkeys(floor_text(level, row.unit) for level in (row.before, row.after) if level)),
@@ -138,12 +138,13 @@ def _found(closed: Closed) -> list[Picture]:
 
 
 def _following(closed: Closed) -> str:
-    last = closed.after or closed.before
-    return following(closed.diagnosis, last.sentence, "loop/diagnosed/model.toml" if closed.after else "")
+    last, model = closed.after or closed.before, closed.loop.home / "diagnosed" / "model.toml"
+    return following(closed.diagnosis, last.sentence, str(model) if closed.after else "", last.theta)
 
 
 def _row(row: Compared) -> dict[str, Any]:
-    return {"before": asdict(row.before), "after": None if row.after is None else asdict(row.after), "unit": row.unit}
+    levels = {"before": asdict(row.before), "after": None if row.after is None else asdict(row.after)}
+    return levels | ({"most": row.most} if row.most else {"unit": row.unit})
 
 
 def _text(value: Any) -> str:

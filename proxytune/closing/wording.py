@@ -6,6 +6,11 @@ from typing import Any
 from proxytune.closing.comparison import Compared, Level
 from proxytune.report.numbers import listed, short
 from proxytune.report.style import plain
+from proxytune.space import Theta
+
+MOST_NAMED = 5
+OPEN = ("partly explained", "unexplained", "cannot be told")
+"""Verdicts after which more is to be found."""
 
 NEXT = " Next: "
 """What the sentence of a study has before its last part."""
@@ -28,25 +33,35 @@ def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
     else:
         lacked = f"The simulator lacked what no named effect explains (verdict: {verdict}); curves stand in for it."
     chosen = {row.key: row for row in rows}
-    error = chosen.get("error_on_bullet") or chosen.get("error")
-    worth = [_change(row) for row in (chosen["prpv"], chosen.get("held_out"), error) if row]
-    return f"{lacked} With it, {'; '.join(worth)}."
+    moved = chosen.get("error_on_bullet") or chosen.get("error")
+    shown = (chosen["prpv"], chosen.get("held_out"), moved, chosen.get("markings_error"))
+    return f"{lacked} With it, {'; '.join(_change(row) for row in shown if row)}."
 
 
-def following(diagnosis: Mapping[str, Any], studied: str, model: str) -> str:
+def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:
     """What to do next.
 
     Args:
         diagnosis: What `diagnose --json` prints.
         studied: The sentence of the last study that was run.
         model: Where the model that was found lies; empty where nothing was found.
+        theta: The best θ of that study.
     """
-    step = studied.rpartition(NEXT)[2]
-    drive = diagnosis.get("next_manoeuvre")
-    if drive and diagnosis["verdict"] not in ("explained", "nothing missing"):
+    drive, step = diagnosis.get("next_manoeuvre"), studied.rpartition(NEXT)[2]
+    if drive and diagnosis["verdict"] in OPEN:
         return f"Log {drive['name']} ({drive['description']}), and close the loop with that log."
-    use = f"Use {model}, whose motion is from the log; leave to PRPV what logs cannot see. " if model else ""
-    return f"{use}{step[:1].upper()}{step[1:]}"
+    if not model:
+        return _log_more(diagnosis) if "diagnose" in step else f"{step[:1].upper()}{step[1:]}"
+    known = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
+    rest = [f"{plain(name)} {value:.4g}" for name, value in theta.items() if name not in known]
+    left = f"; what the log does not show is known from scores alone: {listed(rest)}" if rest else ""
+    return f"Run your simulator with {model}, which was fitted to the log{left}."
+
+
+def _log_more(diagnosis: Mapping[str, Any]) -> str:
+    unseen = [plain(name) for name in diagnosis["could_not_be_seen"]]
+    shows = f" that can show {listed(unseen[:MOST_NAMED])}" if unseen else ", longer and more varied"
+    return f"No θ explains the scores, and this log does not tell why: log drives{shows}."
 
 
 def level_text(level: Level | None, unit: str) -> str:

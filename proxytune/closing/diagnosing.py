@@ -6,17 +6,18 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.api.diagnosing import DiagnosisReport
-from proxytune.api.recording import Wanted
+from proxytune.api.recording import Wanted, recordable
 from proxytune.closing.opening import Loop
 from proxytune.closing.steps import Teller
 from proxytune.diagnosis.camera.diagnose import camera_effects
+from proxytune.diagnosis.filming import film
 from proxytune.diagnosis.log_diagnosis import diagnose_log
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.diagnosis.naming.candidates import motion_effects
 from proxytune.driving.robot import Robot
 from proxytune.effects import Catalogue
 from proxytune.effects.catalogue import effect_of
-from proxytune.errors import RunError
+from proxytune.errors import RunError, SettingsError
 from proxytune.importing.opening import open_log
 from proxytune.logs import Log
 
@@ -29,6 +30,21 @@ def wanted_of(loop: Loop) -> Wanted:
     of_camera = camera_effects(Catalogue(loop.settings.folder.resolve()))
     seen = any(name in of_camera for name in declared_names(loop))
     return Wanted(frames=FRAMES if seen else 0, seed=loop.settings.seed)
+
+
+def check_camera(loop: Loop) -> None:
+    """Refuse a twin of which frames cannot be recorded, before anything is driven.
+
+    Raises:
+        InputError: If it has no camera, or nobody who drives along lanes.
+    """
+    if loop.log is not None or loop.twin is None or not wanted_of(loop).frames:
+        return
+    try:
+        film(recordable(loop.settings, loop.twin), FRAMES, loop.settings.seed)
+    except SettingsError as problem:
+        remedy = "give a log of it by --log, or take what is of the camera out of [parameters]"
+        raise SettingsError(f"{loop.twin}: no frames can be recorded ({problem}); {remedy}") from None
 
 
 def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> None:

@@ -19,6 +19,9 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
     for axes, row in zip(panels, rows, strict=True):
         _panel(axes, row)
     panels[0].set_ylabel("PRPV (lower is better)", fontsize=8)
+    floor = rows[0].before.floor_ends
+    if floor:
+        panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=6.5, color="0.3", va="bottom")
     return figure
 
 
@@ -38,8 +41,6 @@ def _level(axes: Axes, place: int, level: Level, colour: str) -> None:
     axes.fill_between([place - HALF, place + HALF], low, high, color=LIGHT_GREY, lw=0)
     if level.floor is not None:
         axes.plot([place - HALF, place + HALF], [level.floor] * 2, color=GREY, lw=1.0)
-        if place == 0:
-            axes.annotate("floor", (place, high), fontsize=6.5, color="0.3", ha="center", va="bottom")
     below, above = level.interval or (level.value, level.value)
     spread = [[max(0.0, level.value - below)], [max(0.0, above - level.value)]]
     axes.errorbar(place, level.value, yerr=spread, fmt="o", ms=5, color=colour, capsize=3, lw=1.2)

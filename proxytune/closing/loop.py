@@ -8,7 +8,14 @@ from typing import Any
 
 from proxytune.api.recording import record_log
 from proxytune.api.studies import StudyReport, most_episodes, run_opened
-from proxytune.closing.diagnosing import adds_something, declared_names, diagnose_target, read_diagnosis, wanted_of
+from proxytune.closing.diagnosing import (
+    adds_something,
+    check_camera,
+    declared_names,
+    diagnose_target,
+    read_diagnosis,
+    wanted_of,
+)
 from proxytune.closing.extension import begin_anew_if_changed, extension_text, files_of, write_extension
 from proxytune.closing.held_out import drive_held_out, held_out_settings, scored_agents
 from proxytune.closing.opening import Loop
@@ -68,6 +75,7 @@ def close_loop(loop: Loop, teller: Teller) -> Closed:
     Raises:
         ProxytuneError: From any step, as the command that does the same; what was finished is kept.
     """
+    check_camera(loop)
     with locked(loop.home):
         return _Closing(loop, teller, Kept(loop.home)).run()
 

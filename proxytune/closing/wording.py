@@ -98,7 +98,8 @@ def _change(row: Compared) -> str:
     if row.falls:
         return f"{row.title} falls from {before} to {after}"
     if row.after.value < row.before.value:
-        return f"{row.title} goes from {before} to {after}; the intervals overlap"
+        overlap = "; the intervals overlap" if row.before.interval and row.after.interval else ""
+        return f"{row.title} goes from {before} to {after}{overlap}"
     return f"{row.title} does not fall: {before} before, {after} after"
 
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from processes import ENVIRONMENT, FAKES
+from processes import ENVIRONMENT, FAKES, wait_for
 from tiny_loop import short, write_diagnosis, write_tiny
 
 from proxytune.api.studies import StudyReport
@@ -19,6 +19,8 @@ from proxytune.closing import loop as closing
 from proxytune.closing.loop import STEPS
 
 LINES = {name: f"step {number} of {len(STEPS)}," for number, name in enumerate(STEPS, start=1)}
+STUDIES = {"study": "tiny", "extended study": "tiny/loop/extended"}
+"""These are killed in the middle: a few episodes are driven."""
 
 
 def give_a_diagnosis(patch):
@@ -180,11 +182,13 @@ def test_killed_in_every_step_it_goes_on_to_the_same_page(tmp_path):
         home.mkdir()
         write_tiny(home / "tiny")
     expected = finished(whole)[:2]
-    for line in LINES.values():
+    for name, line in LINES.items():
         with start(stopped) as process:
             for told in process.stderr:
                 if line in told:
                     break
+            if name in STUDIES:
+                wait_for(stopped / STUDIES[name], process, 3)
             process.send_signal(signal.SIGKILL)
         assert process.returncode == -signal.SIGKILL
     assert finished(stopped)[:2] == expected

@@ -7,6 +7,7 @@ from tiny_loop import write_tiny
 
 from proxytune.cli.main import BAD_INPUT, FAILED, main
 from proxytune.closing.opening import open_loop
+from proxytune.shipped import shipped
 
 LOG = 'format = 1\nname = "log"\nrobot = "husky"\ncommand = "duty"\nrate_hz = 20.0\n'
 NO_TRUTH = ('truth = "twin.toml"\n', "")
@@ -127,3 +128,20 @@ def test_of_a_table_those_agents_are_held_out_that_it_has_beside_the_studys(tmp_
     more = "".join(f"{agent},{start},1.0,2.0\n" for agent in ("edges", "laggy", "wary", "unknown") for start in (0, 1))
     (folder / "target.csv").write_text(TABLE + more)
     assert open_loop(folder, log=log).held_out == ("edges", "laggy", "wary")
+
+
+def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is_driven(tmp_path, capsys):
+    changes = (
+        ('robot = "duckiebot"', 'robot = "robby"'),
+        ("delay = [0.0, 0.3]", "delay = [0.0, 0.3]\nblur = [0.0, 0.1]"),
+    )
+    folder = write_tiny(tmp_path / "tiny", *changes)
+    (folder / "twin.toml").write_text((folder / "twin.toml").read_text().replace("duckiebot", "robby"))
+    figures = (shipped("robots") / "duckiebot" / "robot.toml").read_text().splitlines()
+    (folder / "robby").mkdir()
+    own = [line.replace("duckiebot", "robby") for line in figures if not line.startswith(("expert_", "urdf"))]
+    (folder / "robby" / "robot.toml").write_text("\n".join(own))
+    line = refusal(capsys, folder)
+    assert "twin.toml: no frames can be recorded" in line
+    assert "give a log of it by --log" in line
+    assert not (folder / "study.db").exists()

@@ -48,6 +48,7 @@ COMMANDS: dict[str, Command] = {
     "measure": Command("measure", "drive a study's agents in the domain of a model file and write their scores"),
     "record": Command("record", "drive the domain of a model file through manoeuvres and write the log"),
     "diagnose": Command("diagnose", "find the effect that the model lacks, from a log of measured drives"),
+    "loop": Command("loop", "tune, diagnose, extend, tune again: before and after on one page", resumes=True),
     "predict": Command("predict", "predict the poses of a log with a fitted model"),
     "compare": Command("compare", "compare how fast each search engine finds a good θ", resumes=True),
     "plot": Command("plot", "draw a study's figures and report again, without simulating"),

@@ -69,8 +69,9 @@ def test_every_command_is_documented(command):
 def test_every_option_is_documented(command, option):
     row = next(line for line in COMMANDS_PAGE.splitlines() if line.startswith(f"| `{command}"))
     of_a_source = "what `import` reads, with its options" in row and f"`{option}" in LOGS_PAGE
-    assert f"`{option}" in row or of_a_source or option == "--json"
+    assert f"`{option}" in row or of_a_source or option in ("--json", "--format")
     assert "`--json`" in COMMANDS_PAGE
+    assert "`--format svg,pdf`" in COMMANDS_PAGE
 
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
@@ -182,6 +183,12 @@ def test_the_readme_is_short_and_leads_to_every_page_of_docs():
 def test_every_exit_status_is_documented(status):
     rows = [line for line in COMMANDS_PAGE.splitlines() if re.match(r"\| \d", line)]
     assert any(re.search(rf"\b{status}\b", row.split("|")[1]) for row in rows)
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in ("list", "completion")])
+def test_what_every_command_leaves_when_it_is_stopped_is_documented(command):
+    table = COMMANDS_PAGE.split("## When a command is stopped")[1].split("\n## ")[0]
+    assert f"`{command}`" in table
 
 
 @pytest.mark.parametrize("verdict", MEANINGS)

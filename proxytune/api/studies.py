@@ -22,15 +22,18 @@ from proxytune.report.study.verdict import sentence
 from proxytune.report.writing import save, write_text
 from proxytune.running.progress import Bars, Silent, Watcher
 from proxytune.search.engines.registry import make_proposer
+from proxytune.search.history import History, optimize_result
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import Spent
+from proxytune.study.history import history_of
 from proxytune.study.knowledge import goal_of
 from proxytune.study.provenance import note_search
 from proxytune.study.result import Best, StudyResult, result_of
 from proxytune.study.run import as_stored, check_facts
 from proxytune.study.run import run_study as run_trials
 from proxytune.study.settings import LEARNING, StudySettings
+from proxytune.study.spending import with_spending
 from proxytune.study.stages import confirmation, preflight, retrying
 from proxytune.study.study import Study, open_study
 from proxytune.study.study_run import StudyRun
@@ -97,6 +100,18 @@ class StudyReport:
         """Convergence, profiles, evaluations and importance, by name."""
         return {name: draw(self.result) for name, draw in FIGURES.items()}
 
+    def history(self) -> History:
+        """Its trials as a search of any kind has them, for Optuna and scikit-optimize."""
+        return history_of(self.result)
+
+    def optimize_result(self) -> Any:
+        """scikit-optimize's OptimizeResult, as `skopt.plots` draws it: x, fun, x_iters, func_vals, space.
+
+        `x` is the best θ and `fun` the score of its trial; the lowest of `func_vals` would be partly luck. Trials that
+        were cut off or failed are left out. What is to be large has its sign turned.
+        """
+        return optimize_result(self.history())
+
     def document(self) -> dict[str, Any]:
         """What `study --json` prints of it."""
         return study_document(self.result)
@@ -121,7 +136,14 @@ class StudyReport:
         return ReportFiles(paths, report)
 
 
-def run_study(path: str | Path, *, progress: bool = False, retry_failed: bool = False) -> StudyReport:
+def run_study(
+    path: str | Path,
+    *,
+    progress: bool = False,
+    retry_failed: bool = False,
+    budget: int | None = None,
+    jobs: int | None = None,
+) -> StudyReport:
     """Run a study, or resume it where it was left; a finished one is summed up again without simulating.
 
     It may be interrupted at any moment, Ctrl-C or worse: every finished episode is kept, and the next call goes on to
@@ -129,14 +151,16 @@ def run_study(path: str | Path, *, progress: bool = False, retry_failed: bool = 
 
     Args:
         path: The study's folder, or its study.toml.
-        progress: Whether to show a bar with the time left, where standard error is a terminal.
+        progress: Whether to show a bar with the time left; where standard error is no terminal, a line per trial.
         retry_failed: Whether to drive every failed episode again; those whose code has changed are in any case.
+        budget: How many trials, instead of what study.toml says.
+        jobs: How many processes run episodes, instead of what study.toml says.
 
     Raises:
         InputError: If anything in the study cannot be used, with file, key and remedy.
         RunError: If no trial works, or the machine fails; all that was finished is kept.
     """
-    study = open_study(Path(path))
+    study = with_spending(open_study(Path(path)), budget=budget, jobs=jobs)
     if study.settings.objective == LEARNING:
         remedy = f"run it with: python -m proxytune study {study.settings.folder}"
         raise study.settings.error("objective", f"run_study has no search for '{LEARNING}'; {remedy}")

@@ -3,13 +3,13 @@
 import argparse
 import json
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
-from joblib import Parallel, delayed
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, check_truths, objective_of
+from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, Arena, check_truths, objective_of
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.typed import typed
 from proxytune.comparison.analytic import Objective
@@ -22,6 +22,7 @@ from proxytune.report.compare.figure import compare_figure
 from proxytune.report.compare.page import compare_page
 from proxytune.report.page import foot_of, html_of
 from proxytune.report.writing import save, write_text
+from proxytune.running.workers import working
 from proxytune.search.engines.engine import Engine
 from proxytune.search.engines.registry import NAMES, STUDY_ENGINES, engine_code, engine_of, why_not
 from proxytune.storage.lock import locked
@@ -67,9 +68,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     engines = _engines(arguments)
     _check(arguments)
     _make(output)
-    with locked(output), objective_of(arguments, output, len(engines)) as (objective, budget, initial, jobs):
-        keys = _keys(objective, engines, arguments.seeds, budget, initial)
-        runs = _finish_all(objective, keys, output / FILE_NAME, jobs, _beside(arguments))
+    with locked(output), objective_of(arguments, output, len(engines)) as arena:
+        objective = arena.objective
+        keys = _keys(objective, engines, arguments.seeds, arena.budget, arena.initial)
+        runs = _finish_all(arena, keys, output / FILE_NAME, _beside(arguments))
     grouped = [[runs[key] for key in keys if key.engine == engine.name] for engine in engines]
     summaries = [summarise(group, grouped[0], objective.tolerance) for group in grouped]
     return _answer(objective, summaries, grouped, output, typed(arguments))
@@ -133,23 +135,26 @@ def _keys(objective: Objective, engines: Sequence[Engine], seeds: int, budget: i
     ]
 
 
-def _finish_all(
-    objective: Objective, keys: Sequence[RunKey], path: Path, jobs: int, beside: Path
-) -> Mapping[RunKey, Run]:
+def _finish_all(arena: Arena, keys: Sequence[RunKey], path: Path, beside: Path) -> Mapping[RunKey, Run]:
     """All runs, each written as soon as it is finished.
 
     Runs that the file lacks are run now; runs that an older version judged are judged again.
     """
     runs = read_runs(path)
     missing = [key for key in keys if key not in runs or runs[key].judgement.code != judging_code()]
-    with Parallel(n_jobs=min(jobs, max(1, len(missing))), return_as="generator_unordered") as parallel:
-        for run in parallel(delayed(_finish)(objective, key, runs.get(key), beside) for key in missing):
+    arena.bars.begin("comparing", len(keys) - len(missing))
+    work, pieces = partial(_finish, arena.objective, beside), [(key, runs.get(key)) for key in missing]
+    with working(work, pieces, arena.jobs) as ended:
+        for number, run in enumerate(ended, start=1 + len(keys) - len(missing)):
             _append(path, run)
             runs[run.key] = run
+            arena.bars.episode()
+            arena.bars.finished(f"run {number} of {len(keys)}: {run.key.engine}, seed {run.key.seed}")
     return runs
 
 
-def _finish(objective: Objective, key: RunKey, run: Run | None, beside: Path) -> Run:
+def _finish(objective: Objective, beside: Path, piece: tuple[RunKey, Run | None]) -> Run:
+    key, run = piece
     engine = engine_of(key.engine, beside)
     return judged_again(objective, run, engine) if run else run_engine(objective, key, engine)
 

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.comparison.analytic import Analytic, Objective
@@ -25,22 +26,63 @@ STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking(),
 BUDGET, INITIAL = 40, 10
 
 
+class Arena(NamedTuple):
+    """What engines are compared on.
+
+    Attributes:
+        objective: What each of them makes small.
+        budget: Evaluations per run.
+        initial: How many of these are the shared design.
+        jobs: How many runs at a time; a study's own episodes run in parallel instead.
+        bars: Shows how many runs are finished.
+    """
+
+    objective: Objective
+    budget: int
+    initial: int
+    jobs: int
+    bars: Bars
+
+
+class WithinRun:
+    """Shows which seed a run is of and how many episodes there were; the bar itself counts runs."""
+
+    def __init__(self, bars: Bars) -> None:
+        self._bars, self._what, self._episodes = bars, "", 0
+
+    def begin(self, what: str, known: int) -> None:
+        """Show what is being done."""
+        self._what = what
+        self._bars.begin(what, 0)
+
+    def episode(self) -> None:
+        """Count it."""
+        self._episodes += 1
+        self._bars.begin(f"{self._what}, episode {self._episodes}", 0)
+
+    def best(self, score: float) -> None:
+        """Say nothing: each run has its own."""
+
+    def finished(self, what: str) -> None:
+        """Say nothing: a run is told of as a whole."""
+
+
 @contextmanager
-def objective_of(
-    arguments: argparse.Namespace, output: Path, engines: int
-) -> Iterator[tuple[Objective, int, int, int]]:
-    """The objective with budget, design and how many runs at a time: a study's own episodes run in parallel instead."""
+def objective_of(arguments: argparse.Namespace, output: Path, engines: int) -> Iterator[Arena]:
+    """The objective with all that a comparison on it needs, and a bar that shows how far it is."""
+    bars = Bars(engines * arguments.seeds, "runs")
     if arguments.study in STAND_INS:
-        yield STAND_INS[arguments.study], *_spending(arguments, BUDGET, INITIAL), 2
+        with bars:
+            yield Arena(STAND_INS[arguments.study], *_spending(arguments, BUDGET, INITIAL), 2, bars)
         return
     study = open_study(study_folder(Path(arguments.study)))
     budget, initial = _spending(arguments, study.settings.budget, study.settings.initial)
     per_run = _episodes_per_run(arguments, study.settings, budget)
     episodes = per_run * arguments.seeds * engines
     print(f"compare: at most {episodes} episodes, {per_run} in each run", file=sys.stderr)
-    with Store.open(output) as store, Bars(episodes) as bars:
+    with Store.open(output) as store, bars:
         adopt(study, store)
-        yield _on_study(arguments, StudyRun(study, store, bars)), budget, initial, 1
+        yield Arena(_on_study(arguments, StudyRun(study, store, WithinRun(bars))), budget, initial, 1, bars)
 
 
 def check_truths(arguments: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""`export`: what was found, written to a URDF, a MuJoCo model or ROS parameters."""
+"""`export`: what was found, written to a URDF, a MuJoCo model or ROS parameters, or a study's trials for others."""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -17,8 +17,11 @@ from proxytune.report.export.mjcf import mjcf_text
 from proxytune.report.export.places import FORMATS
 from proxytune.report.export.ros import ros_text
 from proxytune.report.export.urdf import urdf_text
-from proxytune.report.writing import write_text
+from proxytune.report.writing import write_text, write_whole
+from proxytune.search.history import History, write_optuna, write_skopt
 
+TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
+"""What takes the trials of a study, not what was found."""
 WRITERS: Mapping[str, Callable[[Instance], str]] = {"urdf": urdf_text, "mjcf": mjcf_text, "ros": ros_text}
 NO_RATE_HZ = 20.0
 """A robot without a folder has no rate of control; none of the formats states one."""
@@ -27,12 +30,19 @@ NO_RATE_HZ = 20.0
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add what is exported, as what, and where to."""
     parser.add_argument("model", type=Path, metavar="MODEL", help="a model.toml, or a study's folder: its best θ")
-    parser.add_argument("--to", required=True, choices=FORMATS, help="URDF, MuJoCo model or ROS 2 parameters")
+    parser.add_argument(
+        "--to",
+        required=True,
+        choices=(*FORMATS, *TRIALS),
+        help="URDF, MuJoCo model or ROS 2 parameters; of a study its trials: Optuna storage or skopt's OptimizeResult",
+    )
     parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="the file to write")
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Write the file, and say what went where and what has no place."""
+    if arguments.to in TRIALS:
+        return _trials(arguments)
     instance = _of_study(arguments.model) if arguments.model.is_dir() else _of_model(arguments.model)
     text, lines = WRITERS[arguments.to](instance), lines_of(instance, arguments.to)
     write_text(arguments.output, text)
@@ -44,6 +54,20 @@ def run(arguments: argparse.Namespace) -> Answer:
         "no_place": [_row(line) for line in lines if not line.place],
     }
     return Answer(document, Text("\n".join([*map(str, lines), str(arguments.output)])))
+
+
+def _trials(arguments: argparse.Namespace) -> Answer:
+    """Write all trials of a study; a file that is there may be a storage with other studies, so it is left alone."""
+    folder, output = arguments.model, arguments.output
+    if not folder.is_dir():
+        raise InputError(f"{folder}: --to {arguments.to} takes the trials of a study; give the study's folder")
+    if output.exists():
+        raise InputError(f"{output}: is there already; give another name, or move it away")
+    history = read_study(folder).history()
+    write_whole(output, "", lambda draft: TRIALS[arguments.to](history, draft))
+    document = {"output": str(output), "to": arguments.to, "name": history.name, "trials": len(history.trials)}
+    look = f"\nlook: optuna-dashboard sqlite:///{output}" if arguments.to == "optuna" else ""
+    return Answer(document, Text(f"{len(history.trials)} trials of '{history.name}'\n{output}{look}"))
 
 
 def _row(line: Line) -> dict[str, object]:

@@ -67,7 +67,7 @@ def _means(scores: ScoreTable, row: int) -> dict[str, float]:
 def _table(scores: ScoreTable) -> Table:
     table = Table(box=None, pad_edge=False)
     for name in ("agent", *scores.metrics):
-        table.add_column(name.replace("_", " "), justify="left" if name == "agent" else "right")
+        table.add_column(name.replace("_", " "), justify="left" if name == "agent" else "right", overflow="fold")
     for row, agent in enumerate(scores.agents):
         table.add_row(agent, *(f"{value:.3f}" for value in scores.means[row]))
     return table

@@ -74,9 +74,11 @@ def write_folder(folder: Path, skeleton: Skeleton) -> None:
         for name, text in skeleton.files.items():
             (draft / name).write_text(text, encoding="utf-8", newline="\n")
         draft.rename(folder)
-    except OSError as problem:
+    except BaseException as problem:
         with suppress(OSError):
             shutil.rmtree(draft)
+        if not isinstance(problem, OSError):
+            raise
         raise RunError(f"{folder}: cannot be written ({problem.strerror}); choose another place") from None
 
 

@@ -15,6 +15,7 @@ from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.typed import typed
 from proxytune.report.study.document import study_document
 from proxytune.report.study.table import study_table
+from proxytune.report.study.table_files import write_tables
 from proxytune.scores import Metric
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import Spent
@@ -42,7 +43,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Answer:
-    """Draw the study's figures, the report and every finished sweep; with other metrics into a separate folder."""
+    """Draw the study's figures and every finished sweep, and write its report and tables.
+
+    With other metrics all that goes into a separate folder.
+    """
     metrics = [Metric.parse(text) for text in arguments.metric]
     opened = open_study(arguments.path)
     with Store.read(opened.settings.folder) as store:
@@ -51,11 +55,13 @@ def run(arguments: argparse.Namespace) -> Answer:
     figures = draw_curves(curves, folder / "figures")
     document: dict[str, Any] = {}
     if result:
-        own_figures, report = StudyReport(result, Spent()).write(folder, typed(arguments) if metrics else "")
+        found = StudyReport(result, Spent())
+        own_figures, report = found.write(folder, typed(arguments) if metrics else "")
         figures = [*own_figures, *figures]
-        document = {**study_document(result), "report": str(report)}
+        tables = [str(path) for path in write_tables(result, found.trials(), folder / "figures")]
+        document = {**study_document(result), "report": str(report), "tables": tables}
     paths = [str(path) for path in figures]
-    files = Text("\n".join([*paths, *([document["report"]] if result else [])]))
+    files = Text("\n".join([*paths, *([*document["tables"], document["report"]] if result else [])]))
     return Answer({**document, "figures": paths}, _by_other_metrics(result, files) if result and metrics else files)
 
 

@@ -18,7 +18,9 @@ from proxytune.report.scores.document import document_of, document_of_ranking
 from proxytune.report.scores.figures import flipped_pairs, scatter
 from proxytune.report.scores.page import Drawn, score_page
 from proxytune.report.scores.table import measures, ranking
+from proxytune.report.scores.table_file import write_scores_table
 from proxytune.report.scores.words import score_answer
+from proxytune.report.table_files import check_ending
 from proxytune.report.writing import save, write_text
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import Assessment, Selection, assess, in_common, select_proxy
@@ -69,12 +71,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--resamples", type=int, default=1000, help="bootstrap resamples and permutations [1000]")
     parser.add_argument("--seed", type=int, default=0, help="seed of the resampling [0]")
     parser.add_argument("--output", type=Path, metavar="DIR", help="draw the figures into this folder")
+    parser.add_argument(
+        "--table", type=Path, metavar="FILE", help="also write all measures as .csv or, for LaTeX with booktabs, .tex"
+    )
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score one proxy, or rank several."""
     if arguments.resamples < FEWEST_RESAMPLES or arguments.seed < 0:
         raise InputError(f"--resamples must be at least {FEWEST_RESAMPLES} and --seed at least 0")
+    if arguments.table:
+        check_ending("--table", arguments.table)
     metrics = [Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])
     (target, proxies), left_out = _common(target, proxies) if arguments.common else ((target, proxies), ())
@@ -92,6 +99,9 @@ def run(arguments: argparse.Namespace) -> Answer:
         selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
     written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
     document = {"target": target_name, **written, "left_out": list(left_out)}
+    if arguments.table:
+        write_scores_table(assessments, arguments.table)
+        document["table"] = str(arguments.table)
     return _answer(document, assessments, selection)
 
 

@@ -16,6 +16,7 @@ from proxytune.running.progress import Bars
 from proxytune.study.evaluation import Spent
 from proxytune.study.result import StudyResult
 from proxytune.study.settings import LEARNING
+from proxytune.study.spending import with_spending
 from proxytune.study.study import Study, open_study
 
 
@@ -32,13 +33,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="drive every episode again that has failed [those whose code has changed since]",
     )
+    parser.add_argument("--budget", type=int, metavar="N", help="how many trials [study.toml's]")
+    parser.add_argument("--jobs", type=int, metavar="N", help="how many processes run episodes [study.toml's]")
 
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Run what is left of a study; a finished one is summed up again without simulating."""
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
-    study, again = open_study(folder), arguments.retry_failed
+    study = with_spending(open_study(folder), budget=arguments.budget, jobs=arguments.jobs)
+    again = arguments.retry_failed
     if study.settings.objective == LEARNING:
         return search_by_plv(study, folder, lambda: _search(study, again).result.knowledge.as_good[1])
     report = _search(study, again)

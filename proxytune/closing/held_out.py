@@ -118,7 +118,7 @@ def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher:
     Raises:
         RunError: If an agent has no episode that works.
     """
-    held = replace(study, settings=settings, target=read_target(settings, study.family))
+    held = replace(study, settings=settings, target=read_target(settings, study.family)[0])
     seeds = [fresh_seed(settings.seed, repetition) for repetition in (1, 2)]
     with locked(study.settings.folder), Store.open(study.settings.folder) as store:
         run = StudyRun(held, store, watcher)

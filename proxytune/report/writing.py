@@ -2,15 +2,34 @@
 
 import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
+from functools import partial
 from pathlib import Path
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
 from proxytune.errors import RunError
+
+UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""What is left out of files, so that the same figure gives the same bytes."""
+
+_beside: ContextVar[tuple[str, ...]] = ContextVar("beside", default=())
+
+
+@contextlib.contextmanager
+def figures_also_as(formats: Sequence[str]) -> Iterator[None]:
+    """Have every figure that is saved meanwhile written in these formats too, of svg and pdf, beside its PNG."""
+    before = _beside.set(tuple(formats))
+    try:
+        yield
+    finally:
+        _beside.reset(before)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -19,16 +38,24 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         RunError: If the file cannot be written.
     """
-    _whole(path, "", lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
+    write_whole(path, "", lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG; an interrupted write leaves the old file.
+    """Write a figure as PNG, and in the formats of `figures_also_as`; an interrupted write leaves the old file.
 
     Raises:
-        RunError: If the file cannot be written.
+        RunError: If the figure cannot be written.
     """
-    _whole(path, "the figure ", lambda draft: figure.savefig(draft, format="png", dpi=200))
+    write_whole(path, "the figure ", lambda draft: figure.savefig(draft, format="png", dpi=200))
+    for form in _beside.get():
+        write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
+
+
+def _draw(figure: Figure, form: str, draft: Path) -> None:
+    """Write a vector file; journals refuse the fonts that Matplotlib's PDF has by default."""
+    with mpl.rc_context({"pdf.fonttype": 42, "svg.hashsalt": "proxytune"}):
+        figure.savefig(draft, format=form, metadata=UNDATED[form])
 
 
 def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
@@ -37,7 +64,7 @@ def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
     Raises:
         RunError: If the file cannot be written.
     """
-    _whole(path, "the picture ", lambda draft: Image.fromarray(picture).save(draft, format="png"))
+    write_whole(path, "the picture ", lambda draft: Image.fromarray(picture).save(draft, format="png"))
 
 
 def write_movie(path: Path, write: Callable[[Path], object]) -> None:
@@ -46,10 +73,20 @@ def write_movie(path: Path, write: Callable[[Path], object]) -> None:
     Raises:
         RunError: If the file cannot be written.
     """
-    _whole(path, "the animation ", write)
+    write_whole(path, "the animation ", write)
 
 
-def _whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
+def write_whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
+    """Have a draft written, its folder made where missing, and put it in the file's place once it is whole.
+
+    Args:
+        path: The file.
+        what: What to call it where it cannot be written, with a space at its end; "" for its path alone.
+        write: Writes the draft.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

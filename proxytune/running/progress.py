@@ -1,9 +1,23 @@
-"""How far a study is: bars on the terminal, nothing anywhere else."""
+"""How far a command is: a bar on the terminal, a plain line for each trial, point or step anywhere else."""
 
+import time
 from typing import Protocol
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Column
+
+WHOLE = Column(no_wrap=True)
+WITH_BAR, WITH_ALL = 60, 80
+"""Columns of a terminal from which on a bar has room, and from which on units and the time so far have."""
 
 
 class Watcher(Protocol):
@@ -21,6 +35,10 @@ class Watcher(Protocol):
         """The lowest score so far."""
         ...
 
+    def finished(self, what: str) -> None:
+        """A trial, a point or a run is finished; what became of it, in one line."""
+        ...
+
 
 class Silent:
     """Watches without a word."""
@@ -34,29 +52,20 @@ class Silent:
     def best(self, score: float) -> None:
         """Say nothing."""
 
+    def finished(self, what: str) -> None:
+        """Say nothing."""
+
 
 class Bars:
     """One bar on standard error, of episodes unless said otherwise: what is being done, time left and the best score.
 
-    Use as a context; where standard error is no terminal, nothing is shown.
+    Use as a context. Where standard error is no terminal, there is a line for whatever is finished instead.
     """
 
     def __init__(self, total: int, unit: str = "episodes") -> None:
-        console = Console(stderr=True)
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn(unit),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            TextColumn("{task.fields[best]}"),
-            console=console,
-            disable=not console.is_terminal,
-            speed_estimate_period=900.0,
-            transient=True,
-        )
+        self._lines, self._unit = Lines(), unit
+        count, best = MofNCompleteColumn(table_column=WHOLE), TextColumn("{task.fields[best]}")
+        self._progress = progress_bar(self._lines.console, count, unit=unit, last=best, speed_estimate_period=900.0)
         self._task = self._progress.add_task("", total=total, best="")
 
     def __enter__(self) -> "Bars":
@@ -78,3 +87,54 @@ class Bars:
     def best(self, score: float) -> None:
         """Show the lowest score."""
         self._progress.update(self._task, best=f"best {score:g}")
+
+    def finished(self, what: str) -> None:
+        """Say what became of it, with the episodes so far; nothing of what was known before the first of them."""
+        task = self._progress.tasks[0]
+        if task.completed:
+            self._lines.say(f"{what}; {task.completed:.0f} of at most {task.total:.0f} {self._unit}")
+
+
+class Lines:
+    """Plain lines on standard error, each after the seconds so far; on a terminal none, since a bar is there.
+
+    Attributes:
+        console: Standard error.
+    """
+
+    def __init__(self) -> None:
+        self.console = Console(stderr=True)
+        self._began = time.monotonic()
+
+    def say(self, line: str) -> None:
+        """Write one line; a log that is followed shows it at once."""
+        if not self.console.is_terminal:
+            self.console.print(
+                f"{time.monotonic() - self._began:.0f} s: {line}", highlight=False, markup=False, soft_wrap=True
+            )
+
+
+def progress_bar(
+    console: Console,
+    *counts: ProgressColumn,
+    unit: str = "",
+    last: ProgressColumn | None = None,
+    speed_estimate_period: float,
+) -> Progress:
+    """A bar with what is being done, these counts and the time left, which vanishes when it ends.
+
+    No figure is cut on a narrow terminal: the bar, the unit and the time so far are left out there, and what is being
+    done is broken into lines.
+    """
+    width = console.width
+    what = TextColumn("{task.description}", table_column=Column(no_wrap=width >= WITH_BAR, overflow="fold"))
+    bar = [BarColumn()] if width >= WITH_BAR else []
+    more = [TextColumn(unit), TimeElapsedColumn(table_column=WHOLE)] if width >= WITH_ALL else []
+    left = (TextColumn("left"), TimeRemainingColumn(table_column=WHOLE), *([last] if last else ()))
+    return Progress(
+        *(what, *bar, *counts, *more, *left),
+        console=console,
+        disable=not console.is_terminal,
+        speed_estimate_period=speed_estimate_period,
+        transient=True,
+    )

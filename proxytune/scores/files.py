@@ -116,9 +116,11 @@ def write_scores(table: ScoreTable, path: Path) -> None:
     try:
         draft.write_text(text.getvalue(), encoding="utf-8", newline="")
         draft.replace(path)
-    except OSError as problem:
+    except BaseException as problem:
         with contextlib.suppress(OSError):
             draft.unlink()
+        if not isinstance(problem, OSError):
+            raise
         raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None
 
 

@@ -10,6 +10,7 @@ from proxytune.search.proposer import Proposer, Trial
 from proxytune.storage.records import State, TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import Evaluation
+from proxytune.study.objective import Objective
 from proxytune.study.provenance import CODE, SEARCH, adopt, differ
 from proxytune.study.settings import LEARNING
 from proxytune.study.stages.cutting import Cut, reference, run_or_cut
@@ -79,7 +80,7 @@ class StudyTrials:
         ended = [_end(self._run, trial, cut) for trial, cut in zip(trials, cuts, strict=True)]
         self._run.save_trials(*ended)
         self._done += ended
-        self._show_best()
+        self._tell(ended)
 
     def _open(self, batch: range, propose: Propose) -> list[TrialRecord]:
         """What is left of a batch: open trials in the store, or else proposed, and in the store from now on."""
@@ -91,16 +92,29 @@ class StudyTrials:
             self._run.save_trials(*trials)
         return trials
 
-    def _show_best(self) -> None:
+    def _tell(self, ended: Sequence[TrialRecord]) -> None:
+        """Tell who watches of the best score so far and of each trial."""
+        watcher, objective, settings = self._run.watcher, self._run.study.objective, self._run.settings
         scores = [trial.score for trial in self._done if trial.state == "finished" and trial.score is not None]
         if scores:
-            self._run.watcher.best(self._run.study.objective.sign * min(scores))
+            watcher.best(objective.sign * min(scores))
+        best = f", best so far {objective.sign * min(scores):g}" if scores else ""
+        for trial in ended:
+            came = came_to(trial, objective)
+            watcher.finished(f"trial {trial.number} of {settings.budget}: {came}{best}")
 
 
 def _name_trials(trials: Sequence[TrialRecord], budget: int) -> str:
     """Which trials these are, in one phrase."""
     first, last = trials[0].number, trials[-1].number
     return f"trial {first} of {budget}" if first == last else f"trials {first} to {last} of {budget}"
+
+
+def came_to(trial: TrialRecord, objective: Objective) -> str:
+    """What became of a trial, in one phrase."""
+    if trial.state == "cut":
+        return f"stopped early, {objective.label} at least {trial.bound:g}"
+    return "failed" if trial.score is None else f"{objective.label} {objective.sign * trial.score:g}"
 
 
 def _end(run: StudyRun, trial: TrialRecord, cut: Cut | None) -> TrialRecord:

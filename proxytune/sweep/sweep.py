@@ -133,10 +133,12 @@ def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = Non
     replays = run.of(discrepancy) if discrepancy is not None else None
     for number, value in enumerate(sweep.points, start=1):
         what = f"{sweep.parameter} {number} of {len(sweep.points)}"
-        run.evaluate(_theta(sweep, value), what)
+        scored = run.evaluate(_theta(sweep, value), what)
         if replays is not None:
             planned = plan(replays.settings, _theta(sweep, value), replays.settings.seed)
             replays.outcomes(planned, f"POD, {what}")
+        came = "failed" if scored.prpv is None else f"PRPV {scored.prpv:g}"
+        run.watcher.finished(f"{what}, at {value:g}: {came}")
     if replays is not None:
         run.spent += replays.spent
 

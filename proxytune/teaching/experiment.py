@@ -148,9 +148,16 @@ def learning_curves(
             pass
     watcher.begin("learning", 0)
     with score_points(setup, missing, jobs) as scored:
-        for _ in scored:
+        for point, score in scored:
             watcher.episode()
+            watcher.finished(_came_to(point, score))
     return {name: _curve(setup, [point for point in points if point.name == name]) for name in proxies}
+
+
+def _came_to(point: Point, score: float) -> str:
+    """What became of a point of a learning curve, in one line."""
+    came = "nothing learnt yet" if np.isnan(score) else f"score {score:.3g}"
+    return f"{point.name}, repetition {point.repetition + 1}, {point.count} target samples: {came}"
 
 
 def count_points(setup: TeachingSetup, proxies: int) -> int:

@@ -179,6 +179,9 @@ class ProxyTrials:
         records = [_record(trial, seconds) for trial in made]
         self._search.store.save_trial(self._identity, *records, objective=OBJECTIVE)
         self._records += records
+        for record in records:
+            came = "not converged" if record.score is None else f"PLV {-record.score:g}"
+            self._search.watcher.finished(f"trial {record.number} of {self._search.setup.settings.budget}: {came}")
 
     def tried(self) -> list[PlvTrial]:
         """Every proxy tried, in order, with its learning curve."""

@@ -165,3 +165,20 @@ def test_a_study_of_which_every_episode_fails_is_one_line(make_study):
     ) as problem:
         run_study(make_study("failing", domain={"faults": f"[{faults}]"}))
     assert "\n" not in str(problem.value)
+
+
+def test_a_report_is_an_optimize_result_of_the_measured_trials(report):
+    found, trials = report.optimize_result(), report.trials()
+    assert [one.name for one in found.space] == ["delay", "trim"]
+    assert found.func_vals.tolist() == trials.score.tolist()
+    assert found.x_iters == trials[["delay", "trim"]].to_numpy().tolist()
+    assert dict(zip(("delay", "trim"), found.x, strict=True)) == report.theta
+    assert found.fun == report.best.trial.score
+
+
+def test_budget_and_jobs_stand_over_study_toml(make_study):
+    report = run_study(make_study("over"), budget=6, jobs=2)
+    assert len(report.trials()) == 6
+    assert report.result.study.settings.jobs == 2
+    with pytest.raises(InputError, match="budget must be between 1 and 100000, got 0"):
+        run_study(make_study("over"), budget=0)

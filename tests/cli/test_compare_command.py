@@ -1,8 +1,10 @@
 import json
+from types import SimpleNamespace
 
 import pytest
 
 from proxytune.cli.compare import _engines, read_runs
+from proxytune.cli.compare_objective import WithinRun
 from proxytune.cli.main import main, parser
 from proxytune.comparison.judgement import judging_code
 from proxytune.search.engines import registry as engines
@@ -77,7 +79,12 @@ def test_a_study_is_compared_on_its_own_episodes_which_are_simulated_once(make_s
     assert main([*arguments, "--json"]) == 0
     out, told = capsys.readouterr()
     document = json.loads(out)
-    assert told == f"compare: at most {2 * 2 * 8 * 18} episodes, {8 * 18} in each run\n"
+    first, *runs = told.splitlines()
+    assert first == f"compare: at most {2 * 2 * 8 * 18} episodes, {8 * 18} in each run"
+    assert [line.partition(" s: ")[2] for line in runs] == [
+        f"run {1 + place} of 4: {engine}, seed {1 + place // 2}; {1 + place} of at most 4 runs"
+        for place, engine in enumerate(("gp", "sobol", "gp", "sobol"))
+    ]
     assert (document["objective"], document["budget"]) == ("wobbly", 7)
     assert [row["error"] for row in document["engines"]] == [None, None]
     episodes = journal.read_text().splitlines()
@@ -86,6 +93,7 @@ def test_a_study_is_compared_on_its_own_episodes_which_are_simulated_once(make_s
     assert not (folder / "study.db").exists()
     assert main([*arguments, "--json"]) == 0
     assert journal.read_text().splitlines() == episodes
+    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 def truths(folder, output, *more):
@@ -192,3 +200,14 @@ def test_a_place_that_cannot_be_written_is_one_line_and_exit_1(tmp_path, capsys)
     (tmp_path / "file").touch()
     assert compare("analytic", *FEW, "--output", tmp_path / "file" / "out") == 1
     assert "cannot be created" in capsys.readouterr().err
+
+
+def test_within_a_run_its_episodes_are_told_and_the_bar_counts_runs():
+    shown = []
+    bars = SimpleNamespace(begin=lambda what, known: shown.append((what, known)))
+    within = WithinRun(bars)
+    within.begin("seed 3", 18)
+    within.episode()
+    within.best(4.0)
+    within.finished("pre-flight 1 of 2")
+    assert shown == [("seed 3", 0), ("seed 3, episode 1", 0)]

@@ -3,7 +3,9 @@
 import json
 
 import pytest
+import skopt
 
+from proxytune import read_study
 from proxytune.cli.main import main
 
 MODEL = """format = 1
@@ -99,3 +101,46 @@ def test_an_unknown_robot_is_refused_with_where_it_is_looked_for(tmp_path, capsy
     path.write_text('format = 1\nrobot = "rover"\n')
     assert main(["export", str(path), "--to", "ros", "--output", str(tmp_path / "out.yaml")]) == 2
     assert "its robot 'rover' is unknown here; go to the folder that rover lies in" in capsys.readouterr().err
+
+
+def test_a_studys_trials_go_into_an_optuna_storage_each_with_its_value(finished, tmp_path, capsys):
+    optuna = pytest.importorskip("optuna")
+    words = ["export", str(finished), "--to", "optuna", "--output", str(tmp_path / "new" / "trials.sqlite3")]
+    assert main([*words, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["name"], document["trials"], document["to"]) == ("wobbly", 7, "optuna")
+    study = optuna.load_study(study_name="wobbly", storage=f"sqlite:///{tmp_path}/new/trials.sqlite3")
+    table = read_study(finished).trials()
+    assert [trial.value for trial in study.trials] == table.prpv.tolist()
+    assert [trial.params["trim"] for trial in study.trials] == table.trim.tolist()
+    assert [trial.user_attrs["ppv"] for trial in study.trials] == table.ppv.tolist()
+    assert study.user_attrs["best_trial"] == read_study(finished).best.trial.number - 1
+
+
+def test_a_studys_trials_are_what_scikit_optimize_loads(finished, tmp_path, capsys):
+    assert main(["export", str(finished), "--to", "skopt", "--output", str(tmp_path / "trials.pkl")]) == 0
+    assert "7 trials of 'wobbly'" in capsys.readouterr().out
+    found, report = skopt.load(tmp_path / "trials.pkl"), read_study(finished)
+    assert dict(zip(("delay", "trim"), found.x, strict=True)) == report.theta
+    assert found.func_vals.tolist() == report.trials().score.tolist()
+
+
+@pytest.mark.parametrize("form", ["optuna", "skopt"])
+def test_a_file_that_is_there_and_a_model_have_no_trials_written(finished, model, tmp_path, capsys, form):
+    there = tmp_path / "there.db"
+    there.write_bytes(b"someone's")
+    for source, output, says in (
+        (finished, there, "there.db: is there already; give another name, or move it away"),
+        (model, tmp_path / "new", "takes the trials of a study; give the study's folder"),
+    ):
+        assert main(["export", str(source), "--to", form, "--output", str(output)]) == 2
+        assert says in capsys.readouterr().err
+    assert there.read_bytes() == b"someone's"
+    assert not (tmp_path / "new").exists()
+
+
+def test_an_output_that_cannot_be_written_is_one_line(finished, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    output = tmp_path / "file" / "trials.pkl"
+    assert main(["export", str(finished), "--to", "skopt", "--output", str(output)]) == 1
+    assert f"{output}: cannot be written (" in capsys.readouterr().err

@@ -2,17 +2,16 @@
 
 import json
 import os
-import re
 import signal
 import sys
 import time
 from pathlib import Path
 
 import pytest
-from processes import finished_episodes, start, wait_for
+from processes import besides_progress, finished_episodes, start, wait_for
 
 from proxytune.cli.compare import read_runs
-from proxytune.cli.main import main
+from proxytune.cli.main import COMMANDS, main
 from proxytune.cli.terminal.interruption import Terminated, sigterm_as_interrupt
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
@@ -22,22 +21,12 @@ from planted import planted_log, write_log
 SLOWLY = {"sleep": "0.03"}
 
 
-KEPT, LOST = (
-    "everything finished is kept; run the same command to continue",
-    "nothing was written; run the same command to start again",
-)
-
-
-def ended(process, number, left=KEPT):
+def ended(process, number, command):
     """Stop a command, and see that it ends with its one line and no process left."""
     process.send_signal(number)
     out, told = process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
-    lines = [
-        line for line in told.splitlines() if not re.match(r"compare: at most|proxytune study: page: |\d+ s: ", line)
-    ]
     word, status = {signal.SIGTERM: ("terminated", 143), signal.SIGINT: ("interrupted", 130)}[number]
-    (line,) = lines
-    assert line.endswith(f": {word}; {left}")
+    assert besides_progress(told) == f"proxytune {command}: {word}; {COMMANDS[command].left}\n"
     assert (process.returncode, out) == (status, "")
 
 
@@ -48,7 +37,7 @@ def test_a_stopped_sweep_goes_on_to_the_same_curve(make_study, capsys, number, j
     arguments = ("--parameter", "trim", "--points", "5", "--json")
     process = start("sweep", folder, *arguments)
     wait_for(folder, process, 30)
-    ended(process, number)
+    ended(process, number, "sweep")
     kept = finished_episodes(folder)
     assert 30 <= kept < 5 * 18
     documents = []
@@ -66,7 +55,7 @@ def test_a_stopped_comparison_goes_on_to_the_same_runs(make_study, tmp_path, num
     few = ("--engines", "gp,sobol", "--seeds", "2", "--budget", "4", "--initial", "2", "--output")
     process = start("compare", folder, *few, tmp_path / "out")
     wait_for(tmp_path / "out", process, 30)
-    ended(process, number)
+    ended(process, number, "compare")
     assert 30 <= finished_episodes(tmp_path / "out") < 4 * 5 * 18
     found = []
     for home, output in ((folder, tmp_path / "out"), (whole, tmp_path / "never stopped")):
@@ -83,7 +72,7 @@ def test_a_terminated_comparison_on_the_stand_in_ends_its_processes(tmp_path):
     runs = tmp_path / "runs.jsonl"
     while not runs.exists() and process.poll() is None:
         time.sleep(0.01)
-    ended(process, signal.SIGTERM)
+    ended(process, signal.SIGTERM, "compare")
     assert len(runs.read_text().splitlines()) < 60
 
 
@@ -92,7 +81,7 @@ def test_a_terminated_diagnosis_is_one_line_and_leaves_no_findings(tmp_path):
     log = write_log(planted_log({}, episodes=6, seconds=20.0), tmp_path / "log")
     process = start("diagnose", log, "--output", tmp_path / "out")
     wait_until_heeding(process)
-    ended(process, signal.SIGTERM, LOST)
+    ended(process, signal.SIGTERM, "diagnose")
     assert not (tmp_path / "out").exists()
 
 

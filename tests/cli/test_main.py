@@ -2,14 +2,17 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 
 import pytest
 
+import proxytune as proxytune_package
 from proxytune.cli import listing
-from proxytune.cli.main import COMMANDS, main
+from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
 
 
@@ -65,6 +68,9 @@ def test_an_interruption_says_whether_the_same_command_goes_on(failing, capsys, 
     monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(resumes=True))
     assert main(["list", "robots"]) == 130
     assert "everything finished is kept; run the same command to continue" in capsys.readouterr().err
+    monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(resumes=False, kept="half of it is there"))
+    assert main(["list", "robots"]) == 130
+    assert "half of it is there; run the same command to start again" in capsys.readouterr().err
 
 
 def test_help_loads_no_library_that_only_commands_need(tmp_path):
@@ -94,6 +100,69 @@ def test_every_command_has_help(command, capsys):
         main([command, "--help"])
     assert caught.value.code == 0
     assert "--json" in capsys.readouterr().out
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"proxytune {proxytune_package.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("started", "name"),
+    [
+        ("/usr/local/bin/proxytune", "proxytune"),
+        ("/lib/proxytune/__main__.py", "python -m proxytune"),
+        ("/bin/pytest", "python -m proxytune"),
+    ],
+)
+def test_the_program_says_the_name_it_was_started_by(started, name, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [started])
+    with pytest.raises(SystemExit):
+        main(["study", "--help"])
+    told = capsys.readouterr().out
+    assert told.startswith(f"usage: {name} study ")
+    assert f"\n  {name} study quickstart\n" in told
+
+
+@pytest.mark.parametrize("status", [DONE, FAILED, BAD_INPUT, INTERRUPTED, TERMINATED])
+def test_help_says_every_exit_status(status, capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert re.search(rf"\b{status}\b", capsys.readouterr().out.partition("exit status:")[2])
+
+
+def test_no_color_leaves_tables_without_colours():
+    """On a terminal of many colours; bold is no colour."""
+    import pty
+
+    for more, coloured in (({}, True), ({"NO_COLOR": "1"}, False)):
+        leader, follower = pty.openpty()
+        environment = {name: value for name, value in os.environ.items() if name != "NO_COLOR"} | more
+        code = "import rich; rich.print('[red]x'); from proxytune.cli.main import main"
+        words = [sys.executable, "-c", f"{code}; main(['list', 'robots']); main(['study', 'gone'])"]
+        with subprocess.Popen(
+            words, stdout=follower, stderr=follower, env=environment | {"TERM": "xterm-256color"}
+        ) as process:
+            process.wait(timeout=60)
+        shown = os.read(leader, 1 << 16).decode()
+        os.close(leader), os.close(follower)
+        assert "duckiebot" in shown
+        assert "no such folder" in shown
+        assert ("\x1b[3" in shown) == coloured
+
+
+@pytest.mark.parametrize(("text", "also"), [("svg,pdf", ("svg", "pdf")), ("png", ()), (" pdf , png,pdf", ("pdf",))])
+def test_formats_are_those_beside_png(text, also):
+    assert formats(text) == also
+
+
+def test_an_unknown_format_is_wrong_usage(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["plot", "study", "--format", "svg,gif"])
+    assert caught.value.code == 2
+    assert "'gif' is none of png, svg, pdf" in capsys.readouterr().err
 
 
 def test_a_closed_pipe_is_no_error(tmp_path):

@@ -18,7 +18,9 @@ def test_every_figure_is_drawn_again_without_simulating(finished, capsys):
     capsys.readouterr()
     assert main(["plot", str(finished), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert names == sorted(path.name for path in (finished / "figures").iterdir())
+    tables = {"trials.csv", "parameters.tex", "usefulness.tex"}
+    assert sorted({*names, *tables}) == sorted(path.name for path in (finished / "figures").iterdir())
+    assert {str(finished / "figures" / name) for name in tables} == set(document["tables"])
     assert len(names) == 8
     assert (finished / "report.html").exists()
     assert document["best"] == before["best"]

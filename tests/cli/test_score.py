@@ -2,8 +2,10 @@
 
 import argparse
 import json
+import re
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from rich.console import Console
 
@@ -298,3 +300,28 @@ def test_with_three_agents_no_proxy_is_called_perfect(tables):
     assert (found["prpv"], found["noise_floor_kind"], found["at_noise_floor"]) == (0, "same starts", False)
     assert any(note.startswith("PRPV is no better than chance") for note in found["notes"])
     assert not any("no difference between proxy and target" in note for note in found["notes"])
+
+
+def test_all_measures_are_also_a_table_for_programs(tables):
+    found = document("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--table", "new/t.csv")
+    assert found["table"] == "new/t.csv"
+    table = pd.read_csv("new/t.csv").set_index("measure")
+    assert list(table.columns) == ["proxy", "value", "low", "high", "better"]
+    assert table.value["prpv"] == found["prpv"]
+    assert table.loc["prpv", ["low", "high"]].tolist() == found["prpv_interval"]
+    assert table.value["srcc_distance"] == found["srcc"]["distance"]
+
+
+def test_several_proxies_are_columns_of_a_latex_table(tables):
+    run("--proxy", "both.csv:sim", "--proxy", "both.csv:real", "--target", "real.csv", *METRIC, "--table", "t.tex")
+    lines = Path("t.tex").read_text().splitlines()
+    assert lines[2] == r"measure & sim & real \\"
+    row = next(line for line in lines if line.startswith("PRPV"))
+    assert re.fullmatch(r"PRPV & 2 \(\d+ to \d+\) & 0 \(\d+ to \d+\) \\\\", row)
+    assert r"Kendall $\tau$ distance" in Path("t.tex").read_text()
+
+
+def test_a_table_of_another_kind_is_refused_before_anything_is_written(tables):
+    with pytest.raises(InputError, match=r"--table t\.xlsx: a table is written as \.csv or \.tex"):
+        run("--proxy", "sim.csv", "--target", "real.csv", *METRIC, "--table", "t.xlsx", "--output", "out")
+    assert not Path("out").exists()

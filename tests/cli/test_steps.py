@@ -1,7 +1,7 @@
 """Every step is told as it begins: a bar with the time left on a terminal, else a line."""
 
-from proxytune.cli.terminal import steps
 from proxytune.cli.terminal.steps import Steps
+from proxytune.running import progress
 
 
 def told(capsys, *lines):
@@ -23,8 +23,8 @@ def test_a_bar_never_goes_back(capsys):
 
 
 def test_a_terminal_has_a_bar_and_no_lines(capsys, monkeypatch):
-    real = steps.Console
-    monkeypatch.setattr(steps, "Console", lambda **known: real(**known, force_terminal=True, width=80))
+    real = progress.Console
+    monkeypatch.setattr(progress, "Console", lambda **known: real(**known, force_terminal=True, width=80))
     text, _ = told(capsys, "first")
-    assert "left about" in text
+    assert "left" in text
     assert "0 s: first" not in text

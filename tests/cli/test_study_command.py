@@ -1,22 +1,19 @@
 import json
+import re
 import subprocess
 from pathlib import Path
 
 import pytest
+from processes import besides_progress, trials
 
 from proxytune.cli.main import main
-
-
-def without_page(told):
-    """Standard error without the line that says where the page is."""
-    return "".join(line for line in told.splitlines(keepends=True) if not line.startswith("proxytune study: page: "))
 
 
 def refused(capsys, status, *arguments):
     """The one line on standard error of a command that is refused."""
     assert main([str(argument) for argument in arguments]) == status
     out, told = capsys.readouterr()
-    told = without_page(told)
+    told = besides_progress(told)
     assert out == ""
     assert told.count("\n") == 1
     assert "Traceback" not in told
@@ -88,7 +85,7 @@ def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(mak
     assert main(["study", str(folder), "--json"]) == 0
     out, told = capsys.readouterr()
     found = json.loads(out)["preflight"]
-    assert without_page(told) == f"proxytune study: {found['warnings'][0]}\n"
+    assert besides_progress(told) == f"proxytune study: {found['warnings'][0]}\n"
     assert "'dead' changes nothing at all" in told
     assert {name: one["moves"] for name, one in found["parameters"].items()} == {"matters": True, "dead": False}
     assert main(["study", str(folder)]) == 0
@@ -96,7 +93,43 @@ def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(mak
     out = " ".join(out.split())
     assert "pre-flight 'dead' changes nothing at all" in out
     assert f"0 run, {7 * 18 + found['episodes']} reused" in out
-    assert told == ""
+    assert told == "", "a finished study has no progress to tell of"
+
+
+def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_and_the_episodes(make_study, capsys):
+    folder = make_study(preflight="true", confirm="1", cut_off="true")
+    assert main(["study", str(folder), "--json"]) == 0
+    out, told = capsys.readouterr()
+    said = [line.partition(" s: ")[2] for line in told.splitlines()]
+    found = json.loads(out)
+    assert [line.partition(";")[0] for line in said[:2]] == ["pre-flight 1 of 2", "pre-flight 2 of 2"]
+    trials = [line for line in said if line.startswith("trial ")]
+    assert len(trials) == found["trials"] if isinstance(found["trials"], int) else len(found["trials"])
+    assert all(
+        re.fullmatch(r"trial \d of 7: .*PRPV .*, best so far \d+; \d+ of at most \d+ episodes", t) for t in trials
+    )
+    assert said[-1].startswith("fresh episodes ")
+
+
+@pytest.mark.parametrize(("asked", "says"), [("7", "7 of 7"), ("5", "7 (budget 5)"), ("9", "9 of 9")])
+def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, asked, says):
+    assert main(["study", str(finished), "--budget", asked]) == 0
+    assert f"trials {says}; best" in " ".join(capsys.readouterr().out.split())
+    assert main(["study", str(finished), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["settings"]["budget"] == 7, "study.toml stays as it is"
+
+
+def test_a_study_of_a_lowered_budget_goes_on_to_the_trials_it_would_have_had(make_study, finished, capsys):
+    folder = make_study("low")
+    assert main(["study", str(folder), "--budget", "6", "--jobs", "2"]) == 0
+    assert main(["study", str(folder)]) == 0
+    assert trials(folder) == trials(finished)
+
+
+@pytest.mark.parametrize(("option", "value"), [("budget", "0"), ("budget", "100001"), ("jobs", "-1"), ("jobs", "1025")])
+def test_a_budget_or_jobs_out_of_bounds_are_refused(make_study, capsys, option, value):
+    line = refused(capsys, 2, "study", make_study(), f"--{option}={value}")
+    assert f"{option} must be between 1 and " in line
 
 
 def test_why_a_study_has_ended_is_said(make_study, capsys):
@@ -170,7 +203,7 @@ def test_a_study_that_comes_with_the_package_is_copied_and_that_is_said(travelli
     assert main(["study", str(folder), "--json"]) == 0
     out, told = capsys.readouterr()
     assert json.loads(out)["name"] == "wobbly"
-    assert without_page(told) == f"copied the study 'quickstart', which comes with proxytune, to {folder}\n"
+    assert besides_progress(told) == f"copied the study 'quickstart', which comes with proxytune, to {folder}\n"
     assert (travelling / "quickstart" / "study.db").read_text() == "somebody's"
     assert not list(folder.parent.glob(".*"))
     assert main(["study", str(folder / "study.toml"), "--json"]) == 0

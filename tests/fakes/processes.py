@@ -1,6 +1,7 @@
 """The command line as real processes: started, watched until something is in study.db, and stopped by a signal."""
 
 import os
+import re
 import signal
 import sqlite3
 import subprocess
@@ -24,6 +25,12 @@ def start(*words, **how):
     command = [sys.executable, "-m", "proxytune", *map(str, words)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **how}
     return subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **{"preexec_fn": heeding_ctrl_c, **pipes})
+
+
+def besides_progress(told):
+    """What a command says on standard error, without its lines of progress."""
+    lines = told.splitlines(keepends=True)
+    return "".join(line for line in lines if not re.match(r"compare: at most|proxytune study: page: |\d+ s: ", line))
 
 
 def finished_episodes(folder):

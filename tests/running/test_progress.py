@@ -1,28 +1,69 @@
+"""How far a command is: on a terminal of any width a bar whose figures are whole, elsewhere plain lines."""
+
 import io
 
+import pytest
 from rich.console import Console
 
 from proxytune.running.progress import Bars
 
+STUDY = ("fresh episodes 2 of 3", "episodes", 3.25)
+TEACHING = ("demonstrations", "points of learning curves", None)
 
-def shown(terminal, monkeypatch):
+
+def shown(terminal, monkeypatch, width=120, colours=None, what=("trial 2 of 2", "episodes", 4.0)):
     text = io.StringIO()
-    console = Console(file=text, force_terminal=terminal, width=120)
+    console = Console(file=text, force_terminal=terminal, width=width, color_system=colours)
     monkeypatch.setattr("proxytune.running.progress.Console", lambda stderr: console)
-    with Bars(36) as bars:
-        bars.begin("trial 2 of 2", 18)
-        bars.best(4.0)
-        for _ in range(6):
+    step, unit, best = what
+    with Bars(1636, unit) as bars:
+        bars.begin(step, 36)
+        bars.finished("known before")
+        for _ in range(1250):
             bars.episode()
+        if best is not None:
+            bars.best(best)
+        bars.finished(f"{step}: PRPV 4")
     return text.getvalue()
 
 
 def test_a_terminal_sees_trial_episodes_to_run_and_best(monkeypatch):
     text = shown(True, monkeypatch)
     assert "trial 2 of 2" in text
-    assert "6/18" in text, "episodes known already are not counted: they need no time"
+    assert "1250/1600 episodes" in text, "episodes known already are not counted: they need no time"
     assert "best 4" in text
+    assert "PRPV" not in text, "the bar says it"
 
 
-def test_anything_else_sees_nothing(monkeypatch):
-    assert shown(False, monkeypatch) == ""
+@pytest.mark.parametrize("what", [STUDY, TEACHING], ids=["study", "teach"])
+@pytest.mark.parametrize("width", [44, 60, 79, 80, 100])
+def test_no_figure_is_cut_however_narrow_the_terminal(monkeypatch, width, what):
+    text = shown(True, monkeypatch, width, what=what)
+    assert "1250/1600" in text
+    assert "left 0:0" in text
+    assert what[2] is None or "best 3.25" in text
+    assert "…" not in text
+    assert all(word in text for word in what[0].split())
+
+
+@pytest.mark.parametrize(("width", "bar", "unit"), [(44, False, False), (60, True, False), (80, True, True)])
+def test_on_a_narrow_terminal_the_bar_goes_first(monkeypatch, width, bar, unit):
+    text = shown(True, monkeypatch, width)
+    assert ("━" in text) == bar
+    assert ("1250/1600 episodes" in text) == unit
+
+
+def test_anything_else_sees_a_plain_line_for_what_is_finished(monkeypatch):
+    lines = shown(False, monkeypatch).splitlines()
+    assert [line.partition(" s: ")[2] for line in lines] == ["trial 2 of 2: PRPV 4; 1250 of at most 1600 episodes"]
+
+
+def test_a_line_is_never_broken_and_no_brackets_are_taken_for_markup(monkeypatch):
+    what = (f"trial 1 of 2 [red]{'x' * 100}", "episodes", None)
+    assert f"[red]{'x' * 100}: PRPV 4; 1250" in shown(False, monkeypatch, 44, what=what)
+
+
+def test_no_color_leaves_the_bar_without_colours(monkeypatch):
+    assert "\x1b[3" in shown(True, monkeypatch, colours="standard")
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b[3" not in shown(True, monkeypatch, colours="standard")

@@ -9,9 +9,9 @@ import time
 
 import numpy as np
 import pytest
-from processes import ENVIRONMENT, FAKES, episodes, finished_episodes, start, trials, wait_for
+from processes import ENVIRONMENT, FAKES, besides_progress, episodes, finished_episodes, start, trials, wait_for
 
-from proxytune.cli.main import main
+from proxytune.cli.main import COMMANDS, main
 from proxytune.search.engines.registry import STUDY_ENGINES, make_proposer
 from proxytune.storage.store import Store
 from proxytune.study.knowledge import goal_of
@@ -75,8 +75,8 @@ def stop(process, number):
         assert status == -signal.SIGKILL
     else:
         expected, word = TOLD[number]
-        line = f"proxytune study: {word}; everything finished is kept; run the same command to continue\n"
-        assert (status, printed) == (expected, line)
+        line = f"proxytune study: {word}; {COMMANDS['study'].left}\n"
+        assert (status, besides_progress(printed)) == (expected, line)
 
 
 def in_the_middle(folder):
@@ -162,7 +162,10 @@ def test_ctrl_c_ends_with_130_one_line_and_no_process_left(make_study, jobs):
     out, told = process.communicate(timeout=60)
     assert process.returncode == 130
     assert out == ""
-    assert told == "proxytune study: interrupted; everything finished is kept; run the same command to continue\n"
+    assert (
+        besides_progress(told)
+        == "proxytune study: interrupted; every finished trial and episode is kept; run the same command to continue\n"
+    )
     assert 25 <= finished_episodes(folder) < EPISODES
     assert not (folder / "study.lock").exists()
 
@@ -177,7 +180,10 @@ def test_sigterm_ends_with_143_one_line_and_no_process_left(make_study, send):
     send(process.pid, signal.SIGTERM)
     out, told = process.communicate(timeout=60)  # returns only when every process that holds its pipes has ended
     assert (process.returncode, out) == (143, "")
-    assert told == "proxytune study: terminated; everything finished is kept; run the same command to continue\n"
+    assert (
+        besides_progress(told)
+        == "proxytune study: terminated; every finished trial and episode is kept; run the same command to continue\n"
+    )
     assert 25 <= finished_episodes(folder) < EPISODES
     assert not (folder / "study.lock").exists()
 

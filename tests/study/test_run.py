@@ -3,14 +3,16 @@ from dataclasses import replace
 
 import pytest
 from stopping import Stopping
+from telling import Telling
 
 from proxytune.errors import EpisodeError, RunError, SettingsError
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.knowledge import goal_of
+from proxytune.study.objective import PRPV
 from proxytune.study.outputs import score_trials
-from proxytune.study.run import as_stored, check_facts, run_study
+from proxytune.study.run import as_stored, came_to, check_facts, run_study
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 
@@ -213,3 +215,27 @@ def test_the_search_sees_failed_trials_without_a_score(make_study):
         TrialRecord(2, {"trim": 0, "delay": 0}, "finished", 3),
     ]
     assert [(trial.values, trial.score) for trial in score_trials(space, done)] == [((0.2, 0.1), None), ((0.0, 0.0), 3)]
+
+
+def test_what_became_of_a_trial_is_one_phrase_whatever_the_objective():
+    large = replace(PRPV, label="Kendall τ", maximise=True)
+    trials = {
+        "PRPV 12": (TrialRecord(1, {}, "finished", 12.0), PRPV),
+        "Kendall τ 0.5": (TrialRecord(1, {}, "finished", -0.5), large),
+        "stopped early, PRPV at least 9": (TrialRecord(1, {}, "cut", 14.0, bound=9.0), PRPV),
+        "failed": (TrialRecord(1, {}, "failed"), PRPV),
+    }
+    assert {came: came_to(*given) for came, given in trials.items()} == {came: came for came in trials}
+
+
+def test_every_trial_is_told_with_its_score_and_the_best_so_far(make_study):
+    telling = Telling()
+    study = open_study(make_study())
+    with Store.open(study.settings.folder) as store:
+        under_way = StudyRun(study, store, telling)
+        run_study(under_way, make_proposer("gp", 5))
+        scores = [trial.score for trial in under_way.finished_trials()]
+    assert telling.lines == [
+        f"trial {number} of 7: PRPV {score:g}, best so far {min(scores[:number]):g}"
+        for number, score in enumerate(scores, start=1)
+    ]

@@ -1,4 +1,5 @@
 import pytest
+from telling import Telling
 
 from proxytune.errors import InputError
 from proxytune.running.progress import Silent
@@ -47,6 +48,17 @@ def test_what_is_known_is_not_simulated_again_and_truth_is_shared_between_curves
 def test_the_others_are_nominal_where_nothing_is_said(make_study):
     _, curve = swept(make_study(), base={})
     assert {tuple(point.evaluation.theta) for point in curve.points} == {("trim",)}
+
+
+def test_every_point_is_told_with_its_place_value_and_prpv(make_study):
+    study, telling = open_study(make_study()), Telling()
+    with Store.open(study.settings.folder) as store:
+        run_sweep(StudyRun(study, store, telling), plan_sweep(sweep_interval(study, "trim"), TRUTH, 3))
+        curve = all_curves(StudyRun(study, store))[0]
+    scores = [point.assessment.prpv.value for point in curve.points]
+    values = ["-0.3", "0", "0.1", "0.3"]
+    expected = [(f"trim {n} of 4, at {v}: PRPV {s}") for n, (v, s) in enumerate(zip(values, scores, strict=True), 1)]
+    assert telling.lines == expected
 
 
 class Stopping(Silent):

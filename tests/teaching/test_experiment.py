@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from taught import GRID, make_taught
+from telling import Telling
 
 from proxytune.errors import EpisodeError, InputError, LearnerError, SettingsError
 from proxytune.running.progress import Silent
@@ -28,6 +29,16 @@ def test_the_right_proxy_saves_target_samples_and_the_wrong_one_harms(make_study
     assert worth["wrong"].plv.value < 0.0
     assert np.isnan(found.without.scores[:, 0]).all()
     assert np.isfinite(found.without.scores[:, 1:]).all()
+
+
+def test_every_point_of_a_learning_curve_is_told_with_its_score(make_study):
+    telling = Telling()
+    settings = read_study_settings(make_taught(make_study))
+    found = run_experiment(settings, load_setup(settings), telling)
+    assert len(telling.lines) == len(set(telling.lines)) == 4 * 3 * len(GRID)
+    assert "none, repetition 1, 0 target samples: nothing learnt yet" in telling.lines
+    last = found.without.scores[2, -1]
+    assert f"none, repetition 3, {GRID[-1]} target samples: score {last:.3g}" in telling.lines
 
 
 def test_a_stated_level_is_what_counts_as_converged(make_study):

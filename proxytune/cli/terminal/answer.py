@@ -12,7 +12,7 @@ class Answer:
 
     Attributes:
         document: What `--json` prints: plain numbers, texts, lists and dicts, None where undefined.
-        text: What a person reads on standard output.
+        text: What a person reads on standard output; of a plain text no line is broken.
     """
 
     document: dict[str, Any]

@@ -39,6 +39,10 @@ class LivePage:
         """The lowest score so far."""
         self._watcher.best(score)
 
+    def finished(self, what: str) -> None:
+        """Something has ended."""
+        self._watcher.finished(what)
+
     def write(self, doing: str) -> None:
         """Write the page, and say at the first time where it is."""
         # The run is worth more than its page, and the page of the end says what is wrong with the place.

@@ -1,10 +1,8 @@
 """Progress of a command in several steps: a bar with the time left on a terminal, elsewhere a line per step."""
 
-import time
 from collections.abc import Mapping
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from proxytune.running.progress import Lines, progress_bar
 
 
 class Steps:
@@ -16,20 +14,8 @@ class Steps:
         Args:
             shares: By how a step's line begins, the share of the whole time that has usually passed by then.
         """
-        self._shares = shares
-        self._began = time.monotonic()
-        self._console = Console(stderr=True)
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left about"),
-            TimeRemainingColumn(),
-            console=self._console,
-            disable=not self._console.is_terminal,
-            speed_estimate_period=3600.0,
-            transient=True,
-        )
+        self._shares, self._lines = shares, Lines()
+        self._bar = progress_bar(self._lines.console, speed_estimate_period=3600.0)
         self._task = self._bar.add_task("", total=1.0)
 
     def __enter__(self) -> "Steps":
@@ -41,7 +27,6 @@ class Steps:
 
     def __call__(self, step: str) -> None:
         """Show that a step begins; the bar never goes back."""
-        if not self._console.is_terminal:
-            self._console.print(f"{time.monotonic() - self._began:.0f} s: {step}", highlight=False, soft_wrap=True)
+        self._lines.say(step)
         share = max((over for begin, over in self._shares.items() if step.startswith(begin)), default=0.0)
         self._bar.update(self._task, description=step, completed=max(share, self._bar.tasks[0].completed))

@@ -72,9 +72,9 @@ def _region(region: Region | None, seeds: int) -> tuple[str, ...]:
 
 def _table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
     table = Table(box=None, pad_edge=False, title=title, title_justify="left")
-    table.add_column("engine")
+    table.add_column("engine", overflow="fold")
     for column in columns:
-        table.add_column(column, justify="right")
+        table.add_column(column, justify="right", overflow="fold")
     for row in rows:
         table.add_row(*row)
     return table

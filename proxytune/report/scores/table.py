@@ -9,6 +9,7 @@ from rich.text import Text
 
 from proxytune.usefulness import MEASURES, Assessment, Measure, Selection, SuccessRates
 from proxytune.usefulness.catalogue import PRPV
+from proxytune.usefulness.measure import Measured
 
 Row = tuple[str, str, str, str, str]
 BESIDE_PRPV = tuple(measure for measure in MEASURES if measure is not PRPV)
@@ -18,7 +19,7 @@ def measures(assessment: Assessment, *, proxy: str, target: str) -> Group:
     """Show every measure of one proxy with its interval, direction and meaning, and the notes below."""
     table = _table(f"{proxy} as a proxy of {target}: {_sizes(assessment)}")
     for column in ("measure", "value", "95 % interval", "better", "what it says"):
-        table.add_column(column, justify="right" if column in ("value", "95 % interval") else "left")
+        table.add_column(column, justify="right" if column in ("value", "95 % interval") else "left", overflow="fold")
     beside = [row for measure in BESIDE_PRPV for row in _rows(measure, assessment)]
     for row in (*_prpv_rows(assessment), *beside):
         table.add_row(*map(escape, row))
@@ -29,7 +30,7 @@ def _rates(rates: SuccessRates) -> Table:
     """The success rate of each agent on both sides."""
     table = _table(f"{rates.metric}: success rates with their own 95 % intervals (Wilson)")
     for column in ("agent", "in the proxy", "episodes", "on the target", "episodes"):
-        table.add_column(column, justify="left" if column == "agent" else "right")
+        table.add_column(column, justify="left" if column == "agent" else "right", overflow="fold")
     for agent, target in rates.target.items():
         sides = [
             (f"{one.value:.2f} ({one.low:.2f} to {one.high:.2f})", str(one.episodes))
@@ -46,8 +47,8 @@ def ranking(assessments: Mapping[str, Assessment], selection: Selection, *, targ
     table = _table(f"{len(assessments)} proxies of {target}: {_sizes(first)}")
     titles = [row[0] for measure in beside for row in _rows(measure, first)]
     for column in ("", "proxy", PRPV.name, "95 % interval", "chance", "p", *map(escape, titles)):
-        table.add_column(column, justify="left" if column == "proxy" else "right")
-    table.add_column("better beyond noise than")
+        table.add_column(column, justify="left" if column == "proxy" else "right", overflow="fold")
+    table.add_column("better beyond noise than", overflow="fold")
     for rank, (name, value) in enumerate(selection.ranking, 1):
         found = assessments[name]
         inner = _ends((found.prpv_interval.low, found.prpv_interval.high))
@@ -114,6 +115,12 @@ def _notes(assessments: Mapping[str, Assessment]) -> list[Text]:
 
 def _whose(names: Sequence[str], proxies: int) -> str:
     return "" if len(names) == proxies else f" ({', '.join(names)})"
+
+
+def measured_text(found: Measured) -> str:
+    """A value with its interval."""
+    ends = _ends(found.interval)
+    return f"{_number(found.value)} ({ends})" if ends else _number(found.value)
 
 
 def _number(value: float | None) -> str:

@@ -124,7 +124,7 @@ def _shape(series: Series, curve: Curve) -> dict[str, Any]:
 def _table(curve: Curve, series: Sequence[Series], title: str | None) -> Table:
     table = Table(box=None, pad_edge=False, title=title, title_justify="left")
     for name in (curve.label, *(_broken(one.name) for one in series)):
-        table.add_column(name, justify="right", vertical="bottom")
+        table.add_column(name, justify="right", vertical="bottom", overflow="fold")
     for row, point in enumerate(curve.points):
         table.add_row(f"{point.value:.4g}", *(_cell(one, row) for one in series))
     return table

@@ -43,7 +43,7 @@ def plv_table(study: PlvStudy, files: Mapping[str, Any]) -> RenderableType:
     names = study.space.names
     table = Table(box=None, pad_edge=False)
     for name in ("trial", *names, "zero-shot score", "samples needed", "PLV"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", overflow="fold")
     ordered = sorted(study.trials, key=lambda trial: (trial is not study.best, trial.number))
     for trial in ordered:
         values = [f"{trial.theta[name]:.4g}" for name in names]

@@ -21,7 +21,7 @@ def teach_table(experiment: Experiment, prpv: Mapping[str, float | None], files:
     """The result of a learning experiment as `teach` shows it."""
     table = Table(box=None, pad_edge=False)
     for name in COLUMNS:
-        table.add_column(name, justify="left" if name == "proxy" else "right")
+        table.add_column(name, justify="left" if name == "proxy" else "right", overflow="fold")
     for row in table_rows(experiment, prpv):
         table.add_row(*row)
     lines = [PLV_MEANING, *convergence_lines(experiment), *(f"{what}: {path}" for what, path in files.items())]

@@ -81,7 +81,9 @@ def run_confirmation(run: StudyRun) -> None:
     run.watcher.begin("fresh episodes", most_episodes(settings) - len(chosen) * per_candidate(settings))
     for number, trial in enumerate(chosen, start=1):
         planned = [episode for repetition in _plans(settings, trial) for episode in repetition]
-        run.outcomes(planned, f"fresh episodes {number} of {len(chosen)}")
+        what = f"fresh episodes {number} of {len(chosen)}"
+        run.outcomes(planned, what)
+        run.watcher.finished(what)
 
 
 def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowledge) -> Confirmation | None:

@@ -85,6 +85,7 @@ def _simulate(run: StudyRun, look: int, added: Sequence[Episode]) -> None:
     what = f"pre-flight {look + 1} of {LOOKS}"
     run.watcher.begin(what, _most(run.settings, look) - len(added))
     outcomes = run.outcomes(added, what)
+    run.watcher.finished(what)
     if look == 0:
         check_some_work(outcomes.values(), "the pre-flight")
 

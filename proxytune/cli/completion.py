@@ -1,0 +1,50 @@
+"""`completion`: a script with which a shell completes commands, options and files."""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+from proxytune.cli.terminal.answer import Answer
+from proxytune.errors import InputError
+
+SHELLS = ("bash", "zsh", "tcsh")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the shell."""
+    parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=", ".join(SHELLS))
+
+
+def run(arguments: argparse.Namespace) -> Answer:
+    """Print the script."""
+    script = completion_script(arguments.shell)
+    return Answer({"shell": arguments.shell, "script": script}, script)
+
+
+def completion_script(shell: str) -> str:
+    """A script for a shell, made from the parser with every option that it has.
+
+    Raises:
+        InputError: If the library that writes it is not installed.
+    """
+    from proxytune.cli.main import parser
+
+    try:
+        import shtab
+    except ImportError:
+        remedy = 'install it with: pip install "proxytune[completion]"'
+        raise InputError(f"completion needs shtab, which is not installed; {remedy}") from None
+    whole = parser(prog="proxytune")
+    for action in _actions(whole):
+        if action.type is Path:
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
+    return str(shtab.complete(whole, shell))
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Every option and argument, those of subcommands too."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _actions(command)

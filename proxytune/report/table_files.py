@@ -1,0 +1,94 @@
+"""Tables as files: CSV for programs, LaTeX with booktabs for papers."""
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from proxytune.errors import InputError
+from proxytune.report.writing import write_text
+
+ENDINGS = (".csv", ".tex")
+
+GREEK = {
+    "α": "alpha",
+    "β": "beta",
+    "δ": "delta",
+    "θ": "theta",
+    "λ": "lambda",
+    "μ": "mu",
+    "ρ": "rho",
+    "σ": "sigma",
+    "τ": "tau",
+    "φ": "varphi",
+    "ω": "omega",
+    "Θ": "Theta",
+}
+IN_LATEX = {
+    "\\": r"\textbackslash{}",
+    **{character: f"\\{character}" for character in "&%$#_{}"},
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": "$<$",
+    ">": "$>$",
+    "−": "$-$",
+    "–": "--",
+    "…": r"\ldots{}",
+    "’": "'",
+    "°": r"$^\circ$",
+    "²": "$^2$",
+    "±": r"$\pm$",
+    "×": r"$\times$",
+    "·": r"$\cdot$",
+    "≤": r"$\leq$",
+    "≥": r"$\geq$",
+    "→": r"$\rightarrow$",
+    "∞": r"$\infty$",
+    **{letter: f"$\\{name}$" for letter, name in GREEK.items()},
+}
+"""What pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
+
+Cell = str | float | None
+
+
+def check_ending(option: str, path: Path) -> None:
+    """Refuse a file of another kind before anything is worked out.
+
+    Raises:
+        InputError: If its name ends otherwise.
+    """
+    if path.suffix not in ENDINGS:
+        raise InputError(f"{option} {path}: a table is written as {' or '.join(ENDINGS)}; name the file so")
+
+
+def write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
+    """Write a table as CSV; cells without a value are empty.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerows([columns, *rows])
+    write_text(path, text.getvalue())
+
+
+def write_latex(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    r"""Write a table as LaTeX, to be taken in by `\input` between `\usepackage{booktabs}` and a caption.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    write_text(path, booktabs(columns, rows))
+
+
+def booktabs(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A tabular with the rules of booktabs: the first column is of names, the others of figures."""
+    head, *body = (" & ".join(map(latex, row)) + r" \\" for row in (columns, *rows))
+    lines = [rf"\begin{{tabular}}{{{'l' + 'r' * (len(columns) - 1)}}}", r"\toprule", head, r"\midrule"]
+    return "\n".join([*lines, *body, r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
+def latex(text: str) -> str:
+    """A text as LaTeX shows it."""
+    return "".join(IN_LATEX.get(character, character) for character in text.strip())

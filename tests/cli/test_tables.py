@@ -1,0 +1,89 @@
+"""Tables are readable at 80 columns and at 44: names and figures may be broken, but never cut."""
+
+import io
+import sys
+from pathlib import Path
+
+import foreign_robot
+import pytest
+from rich.console import Console
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+from taught import make_taught
+
+from proxytune.cli.main import COMMANDS, parser
+from proxytune.report.diagnosis.tables import plain_table
+
+LONG = "an_agent_with_a_name_that_is_much_longer_than_any_column_of_a_narrow_terminal"
+SCORES = "domain,agent,episode,distance,lane_error_of_the_whole_drive\n" + "".join(
+    f"{domain},{agent},{episode},{number + shift * episode},{number - episode}\n"
+    for shift, domain in enumerate(("the_target", "a_simulator_with_a_long_name", "another_simulator"))
+    for number, agent in enumerate(("a", "b", LONG))
+    for episode in (1, 2, 3)
+)
+
+
+def marks(text, width):
+    """What is shown at a width, without what lays it out."""
+    console = Console(width=width, file=io.StringIO(), color_system=None)
+    console.print(text)
+    return sorted("".join(console.file.getvalue().split()))
+
+
+def assert_whole(text):
+    whole = marks(text, 2000)
+    assert "…" not in whole
+    for width in (80, 44):
+        assert marks(text, width) == whole, f"at {width} columns"
+
+
+def shown(*words):
+    arguments = parser(list(map(str, words))).parse_args(list(map(str, words)))
+    return COMMANDS[words[0]].load().run(arguments).text
+
+
+@pytest.mark.parametrize("kind", ["robots", "maps", "effects", "agents", "metrics", "engines", "measures"])
+def test_lists_are_whole(kind):
+    assert_whole(shown("list", kind))
+
+
+def test_the_scores_of_one_proxy_and_of_several_are_whole(tmp_path):
+    (tmp_path / "all.csv").write_text(SCORES)
+    metrics = ("--metric", "distance:max", "--metric", "lane_error_of_the_whole_drive:min")
+    path = tmp_path / "all.csv"
+    for proxies in ((f"{path}:another_simulator",), (path,)):
+        words = [word for proxy in proxies for word in ("--proxy", proxy)]
+        assert_whole(shown("score", *words, "--target", f"{path}:the_target", *metrics))
+
+
+def test_a_study_and_its_sweep_are_whole(finished):
+    assert_whole(shown("study", finished))
+    assert_whole(shown("sweep", finished, "--parameter", "trim", "--points", "2"))
+    assert_whole(shown("plot", finished, "--metric", "survival_time:max"))
+
+
+def test_the_scores_of_a_twin_are_whole(make_study, tmp_path):
+    (tmp_path / "model.toml").write_text("trim = 0.1\ndelay = 0.12\n")
+    words = ("--model", tmp_path / "model.toml", "--output", tmp_path / "out.csv")
+    assert_whole(shown("measure", make_study(), *words))
+
+
+def test_a_comparison_is_whole(tmp_path):
+    few = ("--seeds", "2", "--budget", "4", "--initial", "2", "--output", tmp_path)
+    assert_whole(shown("compare", "analytic", "--engines", "sobol,random", *few))
+
+
+def test_learning_curves_are_whole(make_study):
+    assert_whole(shown("teach", make_taught(make_study)))
+
+
+def test_what_a_source_holds_is_whole(tmp_path):
+    source = foreign_robot.write_form(tmp_path, "csv", [foreign_robot.drive(0, seconds=20.0)])
+    assert_whole(shown("import", source))
+
+
+def test_tables_of_a_diagnosis_are_whole():
+    table = plain_table("Candidates", ("effect", "held-out gain [nats]", "p", "value"))
+    table.add_row(LONG, "1234.5678", "0.001", "−0.123 to 0.456")
+    assert_whole(table)

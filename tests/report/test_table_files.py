@@ -1,0 +1,55 @@
+"""Tables as files: what LaTeX would take for a command is escaped, and CSV reads back."""
+
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from proxytune.errors import InputError
+from proxytune.report.table_files import IN_LATEX, booktabs, check_ending, latex, write_csv, write_latex
+
+COLUMNS, ROWS = ("measure", "sim_1", "95 % interval"), [("SRCC d_x", "−0.5", "−1 to 1"), ("Kendall τ", "1", "")]
+
+
+def test_a_latex_table_has_the_rules_of_booktabs_and_a_line_per_row(tmp_path):
+    write_latex(tmp_path / "t.tex", COLUMNS, ROWS)
+    assert (tmp_path / "t.tex").read_text().splitlines() == [
+        r"\begin{tabular}{lrr}",
+        r"\toprule",
+        r"measure & sim\_1 & 95 \% interval \\",
+        r"\midrule",
+        r"SRCC d\_x & $-$0.5 & $-$1 to 1 \\",
+        r"Kendall $\tau$ & 1 &  \\",
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+
+
+@given(st.text(alphabet=[*IN_LATEX, "a", "7", " "], max_size=20))
+def test_nothing_that_latex_would_take_for_a_command_is_left(text):
+    shown = re.sub(r"\\[&%$#_{}]|\\[a-zA-Z]+(\{\})?|\$[^$]*\$", "", latex(text))
+    assert not set(shown) & set("\\&%$#_{}~^<>")
+    assert shown.isascii()
+
+
+@given(st.lists(st.text(alphabet="a&\\b%", max_size=5), min_size=3, max_size=3))
+def test_every_row_has_as_many_cells_as_there_are_columns(row):
+    line = booktabs(COLUMNS, [tuple(row)]).splitlines()[4]
+    assert len(re.findall(r"(?<!\\)&", line)) == 2
+
+
+def test_a_csv_reads_back_and_what_is_undefined_is_empty(tmp_path):
+    write_csv(tmp_path / "new" / "t.csv", ("name", "value"), [('a "b", c', 0.1), ("d", None)])
+    table = pd.read_csv(tmp_path / "new" / "t.csv")
+    assert table.name.tolist() == ['a "b", c', "d"]
+    assert table.value[0] == 0.1
+    assert pd.isna(table.value[1])
+
+
+@pytest.mark.parametrize("name", ["t.txt", "t", "t.TEX"])
+def test_a_file_of_another_kind_is_refused(name):
+    with pytest.raises(InputError, match=rf"--table {name}: a table is written as .csv or .tex; name the file so"):
+        check_ending("--table", Path(name))

@@ -34,7 +34,8 @@ def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
         lacked = f"The simulator lacked what no named effect explains (verdict: {verdict}); curves stand in for it."
     chosen = {row.key: row for row in rows}
     moved = chosen.get("error_on_bullet") or chosen.get("error")
-    shown = (chosen["prpv"], chosen.get("held_out"), moved, chosen.get("markings_error"))
+    seen = chosen.get("markings_error") if (diagnosis["camera"] or {}).get("effects") else None
+    shown = (chosen["prpv"], chosen.get("held_out"), moved, seen)
     return f"{lacked} With it, {'; '.join(_change(row) for row in shown if row)}."
 
 

@@ -55,6 +55,8 @@ def test_motion_and_camera_are_told_together():
     assert "The simulator lacked: dead band and field of view" in told
     assert "position in windows of 2 s, planar plant falls from 80 mm (70 to 90) to 4 mm (3.9 to 4.1)" in told
     assert "displacement of markings falls from 2.94 px (2.8 to 3.07) to 0.23 px (0.21 to 0.26)" in told
+    unchanged = {**both, "camera": {**CAMERA, "effects": []}}
+    assert "markings" not in answer(unchanged, [prpv(HIGH, LOW), *compare_errors(unchanged)])
 
 
 def test_an_error_that_was_not_measured_has_no_row():

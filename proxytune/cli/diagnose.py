@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> Answer:
 def _diagnosed(arguments: argparse.Namespace, log: Log, test: Log | None, imported: Sequence[str]) -> Answer:
     robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), _names(arguments.effects)))
     declared = None if arguments.declared is None else _names(arguments.declared)
-    with Steps(_shares(log)) as step:
+    with Steps(shares(log)) as step:
         found = diagnose_log(log, robot, declared, test=test, seed=arguments.seed, report=step)
         here = arguments.log.resolve()
         folder = arguments.output or Path(f"diagnosis_{here.stem if here.is_file() else here.name}")
@@ -100,7 +100,7 @@ def _diagnosed(arguments: argparse.Namespace, log: Log, test: Log | None, import
     return Answer(document, Group(whole_tables_and_notes(found), Text("\n".join(lines))))
 
 
-def _shares(log: Log) -> dict[str, float]:
+def shares(log: Log) -> dict[str, float]:
     """The share of the whole time that has usually passed when each step begins."""
     if log.frames is None:
         return MOTION

@@ -32,10 +32,6 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "record my_study --model twin.toml --output my_log",
         "record my_study --model twin.toml --output my_log --repeats 4 --frames 200",
     ),
-    "drive": (
-        "drive my_study --agent stroller",
-        "drive my_study --agent stroller --theta nominal --against twin.toml --output stroller.gif",
-    ),
     "diagnose": (
         "diagnose my_log --output found",
         "diagnose my_log --declared trim,delay,camera_pitch --test another_log --output found",

@@ -90,6 +90,13 @@ COMMANDS: dict[str, Command] = {
         kept="findings are written last, each file whole or not at all",
         draws=True,
     ),
+    "loop": Command(
+        "loop",
+        "tune, diagnose, extend, tune again: before and after on one page",
+        resumes=True,
+        kept="every finished step, trial and episode is kept",
+        draws=True,
+    ),
     "predict": Command(
         "predict",
         "predict the poses of a log with a fitted model",

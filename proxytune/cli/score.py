@@ -98,10 +98,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     if len(assessments) > 1:
         selection = select_proxy(proxies=proxies, target=target, metrics=metrics, **sampling)
     written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
+    document = {"target": target_name, **written, "left_out": list(left_out)}
     if arguments.table:
         write_scores_table(assessments, arguments.table)
-        written["table"] = str(arguments.table)
-    document = {"target": target_name, **written, "left_out": list(left_out)}
+        document["table"] = str(arguments.table)
     return _answer(document, assessments, selection)
 
 

@@ -20,7 +20,7 @@ LEARNING = "plv"
 KEYS = (
     "format", "name", "family", "proxy", "target", "target_columns", "truth", "objective", "metrics", "agents",
     "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
-    "cut_off", "stop", "parameters", "domain", "teaching",
+    "cut_off", "stop", "parameters", "domain", "teaching", "held_out",
 )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ FLOORS = (
     {"sweep", "teaching", "comparison", "diagnosis"},
     {"report"},
     {"api", "testing", "skeletons"},
+    {"closing"},
     {"cli"},
     {"__main__", "__init__"},
 )

@@ -40,7 +40,7 @@ class LivePage:
         self._watcher.best(score)
 
     def finished(self, what: str) -> None:
-        """A trial or a step is finished."""
+        """Something has ended."""
         self._watcher.finished(what)
 
     def write(self, doing: str) -> None:

@@ -19,6 +19,14 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "sweep my_study --parameter delay --at trim=0.1,blur=0.02 --target-model twin.toml",
     ),
     "teach": ("teach my_study", "teach my_study --json", "teach my_study --format pdf"),
+    "drive": (
+        "drive my_study --agent steady",
+        "drive my_study --agent daredevil --theta best --against twin.toml --output daredevil.gif",
+    ),
+    "loop": (
+        "loop my_study --log drive.bag",
+        "loop my_study --twin twin.toml",
+    ),
     "import": (
         "import drive.bag",
         "import drive.bag my_log --robot duckiebot",

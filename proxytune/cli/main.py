@@ -76,7 +76,11 @@ COMMANDS: dict[str, Command] = {
         kept="every finished point of a learning curve is kept",
         draws=True,
     ),
-    "drive": Command("drive", "show an episode, the proxy beside the target: metrics, a picture or an animation"),
+    "drive": Command(
+        "drive",
+        "show an episode, the proxy beside the target: metrics, a picture or an animation",
+        kept="the picture is the old one or none",
+    ),
     "import": Command("importing", "make a log of a ROS bag, a CSV, a TUM trajectory or arrays, and say what is in it"),
     "measure": Command("measure", "drive a study's agents in the domain of a model file and write their scores"),
     "record": Command(

@@ -41,7 +41,7 @@ def test_parameters_and_errors_are_those_of_the_document(report):
 def test_what_is_written_is_what_is_said(report, tmp_path):
     paths = report.write(tmp_path / "found")
     assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report.document()))
-    assert {path.stem for path in paths[2:]} == set(report.figures())
+    assert {path.stem for path in paths[2:]} == {*report.figures(), "report"}
     assert any("camera_roll" in note for note in report.notes)
 
 

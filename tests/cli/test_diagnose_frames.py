@@ -15,7 +15,7 @@ from circling import circling_log
 from pictured import add_frames, lane_poses, write_still_frames
 from planted import CALM, TRUTH, write_log
 
-from proxytune.cli.diagnose import _shares
+from proxytune.cli.diagnose import shares as shares_of
 from proxytune.cli.main import main
 from proxytune.effects import read_model
 from proxytune.logs import read_log
@@ -199,7 +199,7 @@ def test_motion_and_camera_come_out_in_one_document_one_model_and_one_folder(tmp
 
 
 def test_progress_of_both_goes_from_motion_to_the_camera(tmp_path):
-    shares = _shares(read_log(short_drives(tmp_path / "log")))
+    shares = shares_of(read_log(short_drives(tmp_path / "log")))
     assert shares["testing on drives kept aside"] < shares["reading frames"] < shares["testing on frames kept aside"]
     assert shares["drawing"] == max(shares.values()) < 1.0
 

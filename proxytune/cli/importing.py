@@ -34,7 +34,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     """List what the source holds, and write the log."""
     facts = facts_of(arguments)
     with Console(stderr=True).status(f"reading {arguments.source}"):
-        source = source_without_unnamed_pictures(read_source(arguments.source, wanted_of(arguments)), facts)
+        whole = read_source(arguments.source, wanted_of(arguments), facts.offset_s)
+        source = source_without_unnamed_pictures(whole, facts)
         if arguments.output is not None:
             write_log(source, arguments.output, facts, origin=arguments.source.name)
     surveys = [survey(drive) for drive in source.drives]

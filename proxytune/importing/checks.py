@@ -22,8 +22,13 @@ PLAUSIBLE_S = 946684800.0
 """2000-01-01: stamps between a day after 1970 and this are of a clock that was never set."""
 
 
-def checked_drive(drive: Drive, where: str) -> tuple[Drive, list[str]]:
+def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Drive, list[str]]:
     """A drive with stamps in order and without repeats, and what was found, a sentence each.
+
+    Args:
+        drive: As an importer has read it.
+        where: The source, as a complaint names it.
+        offset_s: How much later poses are stamped than commands, as far as that is known [s].
 
     Raises:
         LogError: If stamps jump back, all are equal, poses are not z-up, or commands and poses are of different times.
@@ -35,7 +40,7 @@ def checked_drive(drive: Drive, where: str) -> tuple[Drive, list[str]]:
     if commands is not None:
         commands, more = _ordered_commands(commands, about)
         notes += more
-        _check_overlap(commands.times, poses.times, about)
+        _check_overlap(commands.times + offset_s, poses.times, about)
     return replace(drive, poses=poses, commands=commands), [f"drive {drive.name}: {note}" for note in notes]
 
 

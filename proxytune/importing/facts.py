@@ -1,5 +1,6 @@
 """What a log.toml is to say besides what the source holds."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -26,6 +27,11 @@ class Facts:
     road: str = ""
     clock_offset: str = ""
 
+    @property
+    def offset_s(self) -> float:
+        """Seconds that poses are known to be stamped later than commands."""
+        return 0.0 if self.clock_offset in ("", "fit") else float(self.clock_offset)
+
 
 def read_figures(given: list[str]) -> dict[str, float]:
     """Figures of a robot from texts such as baseline_m=0.16.
@@ -39,7 +45,9 @@ def read_figures(given: list[str]) -> dict[str, float]:
         if key.strip() not in GEOMETRY:
             raise InputError(f"--figure {text}: write one of {', '.join(GEOMETRY)}, as in baseline_m=0.16")
         try:
-            figures[key.strip()] = float(value)
+            figures[key.strip()] = number = float(value)
         except ValueError:
-            raise InputError(f"--figure {text}: '{value}' is no number; write it as in {key}=0.16") from None
+            number = math.nan
+        if not (math.isfinite(number) and number > 0.0):
+            raise InputError(f"--figure {text}: '{value}' is no length or speed; write it as in {key}=0.16")
     return figures

@@ -30,9 +30,9 @@ def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> I
     if (path / "log.toml").is_file() or (path / "samples.csv").is_file():
         yield read_log(path), ()
         return
-    source = read_source(path, wanted)
+    source = read_source(path, wanted, facts.offset_s)
     with tempfile.TemporaryDirectory(prefix="proxytune_") as home:
-        folder = Path(home) / (path.stem or "log")
+        folder = Path(home) / path.resolve().stem
         try:
             write_log(source_without_unnamed_pictures(source, facts), folder, facts, origin=path.name)
         except LogError as problem:

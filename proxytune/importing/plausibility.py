@@ -21,6 +21,9 @@ APART = 50.0
 
 MOVED_M = 0.1
 
+SPARSEST = 20.0
+"""A drive that lasts this many times as long as its poses at their usual interval has stamps of another unit."""
+
 
 def check_units(drive: Drive, where: str) -> None:
     """Refuse a drive whose times, places or commands are plainly in another unit.
@@ -34,6 +37,12 @@ def check_units(drive: Drive, where: str) -> None:
     if lasts < SHORTEST_S:
         short = f"takes {lasts:.3g} s with {len(times)} poses"
         raise LogError(f"{about}: {short}; state the unit of time (--columns time=t:ms)")
+    usual = float(np.median(np.diff(times)))
+    if lasts > SPARSEST * usual * len(times):
+        raise LogError(
+            f"{about}: takes {lasts:.4g} s with {len(times)} poses usually {usual:.3g} s apart; leave out wrong "
+            "stamps, cut it at its gaps, or state the unit of time (--columns time=t:ms)"
+        )
     speed = _usual_speed(drive.poses)
     if speed > FASTEST_M_S:
         raise LogError(f"{about}: drives at {speed:.3g} m/s; state the units of x, y and time (--columns x=pos_x:mm)")

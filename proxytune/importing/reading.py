@@ -37,8 +37,13 @@ FORMS = (
 KNOWN = "a ROS bag (.bag, .db3, .mcap or a folder of them), CSV, TUM or MRCLAM files, or arrays (.npz)"
 
 
-def read_source(path: Path, wanted: Wanted) -> Source:
+def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
     """What a source holds: its drives with stamps in order, and notes on what was taken and what is odd.
+
+    Args:
+        path: The source.
+        wanted: What to take from it.
+        offset_s: How much later its poses are stamped than its commands, as far as that is known [s].
 
     Raises:
         LogError: If it is none of the known forms, or lacks what a log needs.
@@ -47,14 +52,14 @@ def read_source(path: Path, wanted: Wanted) -> Source:
         raise LogError(f"{path}: no such folder; check the path")
     for form in FORMS:
         if form.recognise(path):
-            return _checked(form.read(path, wanted), path)
+            return _checked(form.read(path, wanted), path, offset_s)
     raise LogError(f"{path}: is no recording that is known; give {KNOWN}")
 
 
-def _checked(source: Source, path: Path) -> Source:
+def _checked(source: Source, path: Path, offset_s: float) -> Source:
     drives, notes = [], list(source.notes)
     for drive in source.drives:
-        one, found = checked_drive(drive, str(path))
+        one, found = checked_drive(drive, str(path), offset_s)
         check_units(one, str(path))
         drives.append(one)
         notes += found

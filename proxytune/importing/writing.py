@@ -33,6 +33,7 @@ def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> None:
         LogError: If what was read makes no log.
         RunError: If it cannot be written.
     """
+    folder = folder.resolve()
     with _written_whole(folder) as draft:
         _write_table(draft / "samples.csv", [_samples(drive.name, drive.poses) for drive in source.drives])
         commands = [_commands(drive.name, drive.commands) for drive in source.drives if drive.commands is not None]

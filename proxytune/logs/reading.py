@@ -43,7 +43,7 @@ def read_log(path: str | Path) -> Log:
         raise LogError(str(problem)) from None
     apart = (path / "commands.csv").exists()
     samples = _read_samples(path / "samples.csv", stated.command, apart=apart)
-    issued = _read_commands(path / "commands.csv", stated.command, samples) if apart else {}
+    issued = _read_commands(path / "commands.csv", stated, samples) if apart else {}
     episodes, rate_hz = _episodes(samples, stated, issued)
     frames = read_frames(stated.camera, path, samples, stated.rate_hz, episodes) if stated.camera else None
     return Log(
@@ -89,8 +89,9 @@ def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:
     return samples
 
 
-def _read_commands(path: Path, command: str, samples: Rows) -> dict[str, Issued]:
+def _read_commands(path: Path, stated: Description, samples: Rows) -> dict[str, Issued]:
     """Every episode's commands, each at its own time."""
+    command = stated.command
     if command == "none":
         raise LogError(f"{path}: log.toml states that there are no commands; state their kind, or take this file out")
     rows = read_rows(path, Layout(COMMANDS[command], (), (), 1, f"commands of kind '{command}'"))
@@ -100,11 +101,11 @@ def _read_commands(path: Path, command: str, samples: Rows) -> dict[str, Issued]
     cuts = rows.firsts[1:]
     parts = zip(rows.names, np.split(times, cuts), np.split(columns, cuts), strict=True)
     issued: dict[str, Issued] = {name: (own, values) for name, own, values in parts}
-    _check_overlap(samples, rows, issued)
+    _check_overlap(samples, rows, issued, stated.clock_offset_s or 0.0)
     return issued
 
 
-def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued]) -> None:
+def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued], offset_s: float) -> None:
     """Refuse an episode without commands, or whose commands and poses are of different times."""
     lasts = np.append(samples.firsts[1:], len(samples.lines)) - 1
     for name, first, last in zip(samples.names, samples.firsts, lasts, strict=True):
@@ -113,7 +114,7 @@ def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued]) -> N
                 int(first), "episode", f"'{name}' is not in commands.csv; add its commands, or leave it out"
             )
         begin, end = samples.values["time"][[first, last]]
-        own, _ = issued[name]
+        own = issued[name][0] + offset_s
         if own[0] >= end or own[-1] < begin:
             row = int(rows.firsts[rows.names.index(name)])
             problem = (

@@ -115,3 +115,18 @@ def test_diagnose_takes_a_folder_of_tables_and_names_what_the_robot_has(capsys, 
     assert {effect["name"] for effect in found["effects"]} <= {"dead_band", "wheel_gain", "motor_lag", "delay"}
     assert found["clocks"]["offset_s"] == pytest.approx(-0.24, abs=0.02)
     assert any("two clocks" in note for note in found["imported"])
+
+
+@pytest.mark.parametrize(
+    "words", [("--clock-offset", "nan"), ("--figure", "baseline_m=nan"), ("--figure", "baseline_m=-1")]
+)
+def test_figures_that_are_not_finite_are_told_by_option(capsys, table, tmp_path, words):
+    assert words[0] in complaint(capsys, str(table), str(tmp_path / "log"), *words)
+    assert not (tmp_path / "log").exists()
+
+
+def test_the_folder_that_one_is_in_may_become_the_log(capsys, table, tmp_path, monkeypatch):
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    document(capsys, str(table), ".", "--robot", "nobodys", *FIGURES)
+    assert read_log(tmp_path / "empty").name == "empty"

@@ -1,5 +1,7 @@
 """A log is opened whatever form it comes in, and every form of one recording is the same log."""
 
+from pathlib import Path
+
 import foreign_robot
 import numpy as np
 import pytest
@@ -77,3 +79,19 @@ def test_a_clock_offset_given_with_it_is_declared(forms):
     facts = Facts(robot="nobodys", figures=foreign_robot.FIGURES, clock_offset="0.1")
     with open_log(forms["csv"], Wanted(), facts) as (log, _):
         assert log.clock_offset_s == 0.1
+
+
+def test_clocks_an_hour_apart_are_opened_with_the_offset_that_the_complaint_asks_for(tmp_path):
+    one = foreign_robot.drive(1, seconds=12.0, offset_s=3000.0)
+    table = foreign_robot.write_form(tmp_path, "csv", [one]) / "run0.csv"
+    with pytest.raises(LogError, match="two clocks; .*--clock-offset"):
+        opened(table)
+    with open_log(table, facts=Facts("nobodys", foreign_robot.FIGURES, clock_offset="3000")) as (log, _):
+        np.testing.assert_allclose(log.episodes[0].issued, one.issued + 3000.0, rtol=0, atol=1e-5)
+
+
+def test_a_source_may_be_where_one_is(forms, monkeypatch):
+    (forms["csv"] / "inside").mkdir(exist_ok=True)
+    monkeypatch.chdir(forms["csv"] / "inside")
+    log, _ = opened(Path(".."))
+    assert (len(log.episodes), log.name) == (2, "csv")

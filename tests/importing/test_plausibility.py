@@ -61,3 +61,10 @@ def test_a_robot_that_stands_still_whatever_it_is_told_is_no_matter_of_units():
     one = slow()
     stuck = replace(one, poses=replace(one.poses, places=np.zeros_like(one.poses.places)))
     check_units(stuck, "table")
+
+
+def test_one_wild_stamp_is_told_before_anything_of_its_size_is_made():
+    wild = slow()
+    times = np.append(wild.poses.times[:-1], 1.7e9)
+    with pytest.raises(LogError, match=r"takes 1.7e\+09 s with 400 poses usually 0.05 s apart"):
+        check_units(replace(wild, poses=replace(wild.poses, times=times)), "table")

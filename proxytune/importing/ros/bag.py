@@ -1,5 +1,6 @@
 """Bags on disk: which they are, what topics they hold, and their messages one after the other."""
 
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -160,7 +161,8 @@ def _bags_in(path: Path) -> dict[str, Path]:
         found = [item] if _is_one(item) else [file for file in sorted(item.glob("*")) if _is_one(file)]
         for bag in found:
             name = _name_of(bag) if bag == item else item.name if len(found) == 1 else f"{item.name}_{_name_of(bag)}"
-            bags[name if name not in bags else f"{name}{bag.suffix}"] = bag
+            names = itertools.chain((name, f"{name}{bag.suffix}"), (f"{name}_{n}" for n in itertools.count(2)))
+            bags[next(free for free in names if free not in bags)] = bag
     return bags
 
 

@@ -77,6 +77,8 @@ def _check(message: Any) -> tuple[float, ...]:
     if message.encoding not in ENCODINGS:
         known = ", ".join(ENCODINGS)
         raise LogError(f"encoding '{message.encoding}' is none of {known}; leave pictures out by --pictures none")
+    if not (message.width and message.height):
+        raise LogError("has no pixels; record it again, or leave pictures out by --pictures none")
     channels = ENCODINGS[message.encoding][0]
     if message.step < channels * message.width or len(message.data) < message.step * message.height:
         size = f"{message.width} × {message.height} pixels in rows of {message.step} bytes"

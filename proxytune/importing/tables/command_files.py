@@ -96,7 +96,8 @@ def share_commands(file: CommandFile, drives: Sequence[Drive], labels: Sequence[
     Raises:
         LogError: If commands and drives do not match.
     """
-    if len(file.commands) == 1 and len(drives) == 1:
+    unnamed = set(file.commands) == {""} or set(labels) == {""}
+    if unnamed and len(file.commands) == 1 and len(drives) == 1:
         return [replace(drives[0], commands=next(iter(file.commands.values())))]
     if set(file.commands) == {""}:
         return _by_time(file, drives)

@@ -91,11 +91,11 @@ def _starts(closed: Closed) -> range:
 
 def _introduction(closed: Closed, told: dict[str, Any], pair: SideBySide) -> str:
     agent, start, starts = told["agent"], pair.episode.start, _starts(closed)
-    pairs = f"{short(told['wrong_pairs_before'])} before and {short(told['wrong_pairs_after'])} after"
-    chosen = f", of starts 0 to {starts[-1]} that in which the two are furthest apart on average" if starts[1:] else ""
+    pairs = f"{short(told['wrong_pairs_before'])} before, {short(told['wrong_pairs_after'])} after"
+    chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
     return (
-        f"Of the pairs of agents with {agent}, the proxy orders {pairs} wrongly. Here it drives in the proxy tuned "
-        f"before and in the target, under the same seed from start {start}{chosen}."
+        f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
+        f"under the same seed from start {start}{chosen}."
     )
 
 

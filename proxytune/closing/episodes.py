@@ -34,8 +34,8 @@ class BothEpisodes(NamedTuple):
 def righted_pictures(closed: Closed) -> list[Picture]:
     """Both episodes of the righted agent; none where there is no such agent, or no twin to drive it in."""
     told = righted(closed)
-    both = told and _drive_both(closed, told["agent"])
-    if not both:
+    both = drive_both(closed, told["agent"]) if told else None
+    if told is None or both is None:
         return []
     metrics = [metric.name for metric in closed.loop.settings.metrics]
     captions = (_introduction(closed, told, both.before), "The same start and seed in the extended proxy.")
@@ -50,16 +50,8 @@ def righted_pictures(closed: Closed) -> list[Picture]:
     ]
 
 
-def mean_gap_m(pair: SideBySide) -> float:
-    """How far proxy and target are apart on average [m]; a robot whose episode has ended stays where it is."""
-    sides = [episode.poses for episode in pair.sides.values()]
-    times = max((poses["time"] for poses in sides), key=lambda times: float(times[-1]))
-    here, there = ([np.interp(times, poses["time"], poses[name]) for name in ("x", "y")] for poses in sides)
-    return float(np.hypot(*np.subtract(here, there)).mean())
-
-
-def _drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
-    """Drive the start in which the proxy before is furthest from the target; None where that cannot be shown."""
+def drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
+    """Drive an agent from the start in which the proxy before is furthest from the target; None without a twin."""
     loop = closed.loop
     if loop.twin is None or closed.after is None or not can_record(loop.family):
         return None
@@ -70,6 +62,14 @@ def _drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
     start = max(known, key=mean_gap_m).episode.start
     before, after = (_drive(report, twin, agent, start, filmed=True) for report in (closed.before, closed.after))
     return BothEpisodes(before, after) if before and after else None
+
+
+def mean_gap_m(pair: SideBySide) -> float:
+    """How far proxy and target are apart on average [m]; a robot whose episode has ended stays where it is."""
+    sides = [episode.poses for episode in pair.sides.values()]
+    times = max((poses["time"] for poses in sides), key=lambda time: float(time[-1]))
+    here, there = ([np.interp(times, poses["time"], poses[name]) for name in ("x", "y")] for poses in sides)
+    return float(np.hypot(*np.subtract(here, there)).mean())
 
 
 def _drive(

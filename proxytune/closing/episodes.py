@@ -42,7 +42,7 @@ def righted_pictures(closed: Closed) -> list[Picture]:
     rest = " This is one episode; the order of the agents counts every start, under other seeds."
     return [
         Picture(
-            f"{told['agent']} {when}",
+            f"{told['agent']} beside the target, {when}",
             png_of(episode_figure(pair, metrics)),
             f"{caption} {parting(pair)} {_scores(pair, metrics)}{end}",
         )

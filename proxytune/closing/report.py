@@ -1,13 +1,11 @@
 """A closed loop as one JSON document and one page."""
 
 from dataclasses import asdict
-from io import BytesIO
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from proxytune.closing.comparison import Compared, compare_errors, compare_prpv
-from proxytune.closing.figure import prpv_figure
+from proxytune.closing.episodes import righted_pictures
+from proxytune.closing.figure import png_of, prpv_figure
 from proxytune.closing.loop import STEPS, Closed
 from proxytune.closing.righted import righted
 from proxytune.closing.wording import answer, chance_text, floor_text, following, lacking, level_text
@@ -81,12 +79,12 @@ def page_of(closed: Closed, command: str, date: str) -> Page:
     values = {key: value for key, value in as_document(closed.loop.settings).items() if value not in (None, {}, [])}
     settings = tuple((key, _text(value)) for key, value in values.items() if key != "path")
     caption = "PRPV of the best θ on fresh episodes with 95 % intervals; grey: what a perfect proxy scores."
-    shown = [Picture("PRPV before and after", _png(prpv_figure(prpv)), caption)] if closed.after else []
+    shown = [Picture("PRPV before and after", png_of(prpv_figure(prpv)), caption)] if closed.after else []
     return Page(
         title=f"{closed.loop.settings.name}: the loop closed",
         answer=answer(closed.diagnosis, rows),
         following=_following(closed),
-        parts=(_table(closed, rows), *shown, *_found(closed), _words(closed)),
+        parts=(_table(closed, rows), *shown, *righted_pictures(closed), *_found(closed), _words(closed)),
         foot=Foot(command, settings, tuple(versions_of(PACKAGES).items()), date),
     )
 
@@ -149,9 +147,3 @@ def _row(row: Compared) -> dict[str, Any]:
 
 def _text(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
-def _png(figure: Figure) -> bytes:
-    image = BytesIO()
-    figure.savefig(image, format="png", dpi=200)
-    return image.getvalue()

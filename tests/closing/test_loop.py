@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from processes import ENVIRONMENT, FAKES, wait_for
-from tiny_loop import short, write_diagnosis, write_tiny
+from tiny_loop import RIGHTING, short, write_diagnosis, write_tiny
 
 from proxytune.api.studies import StudyReport
 from proxytune.cli.main import main
@@ -92,6 +92,47 @@ def test_before_and_after_come_with_interval_and_floor(closed_once):
     page = (folder / "loop" / "report.html").read_text()
     assert document["sentence"] in page
     assert page.count("data:image/png;base64,") == 1
+
+
+@pytest.fixture
+def righting(closed, diagnosed, close):
+    """A closed loop with other held-out agents, one of which is righted, and its document."""
+    study = closed / "study.toml"
+    study.write_text(study.read_text().replace(*RIGHTING))
+    return closed, close(closed)
+
+
+def captions_of_episodes(folder):
+    """Captions of the righted agent's pictures on the page."""
+    page = (folder / "loop" / "report.html").read_text()
+    captions = re.findall(r'<img [^>]*src="data:image/png.*?<figcaption[^>]*>(.*?)</figcaption>', page, re.DOTALL)
+    assert len(captions) == page.count("data:image/png;base64,")
+    return [caption for caption in captions if "seed" in caption]
+
+
+def test_the_righted_agent_is_shown_beside_the_target_before_and_after(righting, capsys):
+    folder, document = righting
+    assert document["righted"]["agent"] == "yellow_only"
+    before, after = captions_of_episodes(folder)
+    assert "Wrongly ordered pairs with yellow_only: 2 before, 0 after." in before
+    assert "The same start and seed in the extended proxy." in after
+    start = re.search(r"from start (\d), where of starts 0 to 1 the two are furthest apart", before)[1]
+    for study, caption in ((folder, before), (folder / "loop" / "extended", after)):
+        assert main(["drive", str(study), "--agent", "yellow_only", "--start", start, "--json"]) == 0
+        driven = json.loads(capsys.readouterr().out)
+        for side in ("proxy", "target"):
+            scores = driven[side]["metrics"]
+            assert f"distance {scores['distance']:.3g} m, survival time {scores['survival_time']:.3g} s" in caption
+        assert f"at {driven['parted_s']:.1f} s" in caption if driven["parted_s"] else "stay within 5 cm" in caption
+
+
+def test_without_a_twin_the_righted_agent_is_named_but_not_shown(righting, close):
+    folder, document = righting
+    study, target, held_out = folder / "study.toml", folder / "target.csv", folder / "loop" / "held_out.csv"
+    study.write_text(study.read_text().replace('truth = "twin.toml"', ""))
+    target.write_text(target.read_text() + held_out.read_text().partition("\n")[2])
+    assert close(folder, "--log", folder / "loop" / "log")["righted"] == document["righted"]
+    assert captions_of_episodes(folder) == []
 
 
 def test_what_is_done_is_not_done_again_and_comes_out_the_same(closed, closed_once, diagnosed, close):
@@ -180,8 +221,9 @@ def test_killed_in_every_step_it_goes_on_to_the_same_page(tmp_path):
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
     for home in (whole, stopped):
         home.mkdir()
-        write_tiny(home / "tiny")
+        write_tiny(home / "tiny", RIGHTING)
     expected = finished(whole)[:2]
+    assert expected[0]["righted"]
     for name, line in LINES.items():
         with start(stopped) as process:
             for told in process.stderr:

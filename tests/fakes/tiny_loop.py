@@ -31,6 +31,8 @@ robot = "duckiebot"
 plant = "planar"
 seconds = 2.0
 """
+RIGHTING = ('"crawler", "laggy", "edges"', '"yellow_only", "laggy", "smooth"')
+"""A change of study.toml: without a dead band the first of these leaves the road, and comes last instead of first."""
 TWIN = """\
 format = 1
 robot = "duckiebot"

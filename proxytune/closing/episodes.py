@@ -1,0 +1,108 @@
+"""The righted agent on its way: beside the target in the proxy tuned before, and in the extended one after."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proxytune.api.studies import StudyReport
+from proxytune.closing.figure import png_of
+from proxytune.closing.loop import Closed
+from proxytune.closing.righted import righted
+from proxytune.domain import DomainFamily, make_episode
+from proxytune.errors import EpisodeError
+from proxytune.report.drive.document import parting
+from proxytune.report.drive.figure import episode_figure
+from proxytune.report.numbers import short
+from proxytune.report.page import Picture
+from proxytune.report.style import plain
+from proxytune.seeds import episode_seed
+from proxytune.study.family import load_family
+from proxytune.study.side_by_side import SideBySide, drive_side_by_side
+from proxytune.study.single_episode import can_record
+
+MOST_STARTS = 4
+"""The start that is shown is one of the first so many: each is driven to choose it, whenever a page is made."""
+
+
+class BothEpisodes(NamedTuple):
+    """The same episode beside the target in both tuned proxies."""
+
+    before: SideBySide
+    after: SideBySide
+
+
+def righted_pictures(closed: Closed) -> list[Picture]:
+    """Both episodes of the righted agent; none where there is no such agent, or no twin to drive it in."""
+    told = righted(closed)
+    both = drive_both(closed, told["agent"]) if told else None
+    if told is None or both is None:
+        return []
+    metrics = [metric.name for metric in closed.loop.settings.metrics]
+    captions = (_introduction(closed, told, both.before), "The same start and seed in the extended proxy.")
+    rest = " This is one episode; the order of the agents counts every start, under other seeds."
+    return [
+        Picture(
+            f"{told['agent']} beside the target, {when}",
+            png_of(episode_figure(pair, metrics)),
+            f"{caption} {parting(pair)} {_scores(pair, metrics)}{end}",
+        )
+        for when, pair, caption, end in zip(("before", "after"), both, captions, ("", rest), strict=True)
+    ]
+
+
+def drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
+    """Drive an agent from the start in which the proxy before is furthest from the target; None without a twin."""
+    loop = closed.loop
+    if loop.twin is None or closed.after is None or not can_record(loop.family):
+        return None
+    twin = load_family(loop.settings, loop.twin)
+    known = [pair for start in _starts(closed) if (pair := _drive(closed.before, twin, agent, start))]
+    if not known:
+        return None
+    start = max(known, key=mean_gap_m).episode.start
+    before, after = (_drive(report, twin, agent, start, filmed=True) for report in (closed.before, closed.after))
+    return BothEpisodes(before, after) if before and after else None
+
+
+def mean_gap_m(pair: SideBySide) -> float:
+    """How far proxy and target are apart on average [m]; a robot whose episode has ended stays where it is."""
+    sides = [episode.poses for episode in pair.sides.values()]
+    times = max((poses["time"] for poses in sides), key=lambda time: float(time[-1]))
+    here, there = ([np.interp(times, poses["time"], poses[name]) for name in ("x", "y")] for poses in sides)
+    return float(np.hypot(*np.subtract(here, there)).mean())
+
+
+def _drive(
+    report: StudyReport, twin: DomainFamily, agent: str, start: int, *, filmed: bool = False
+) -> SideBySide | None:
+    """The episode that `drive` shows of a study; None where it fails, or places are not kept."""
+    study = report.result.study
+    episode = make_episode(report.theta, agent=agent, start=start, seed=episode_seed(study.settings.seed, start))
+    try:
+        pair = drive_side_by_side(study.family, twin, episode, filmed=filmed)
+    except EpisodeError:
+        return None
+    return pair if all(side.has_places for side in pair.sides.values()) else None
+
+
+def _starts(closed: Closed) -> range:
+    return range(min(MOST_STARTS, closed.loop.settings.starts))
+
+
+def _introduction(closed: Closed, told: dict[str, Any], pair: SideBySide) -> str:
+    agent, start, starts = told["agent"], pair.episode.start, _starts(closed)
+    pairs = f"{short(told['wrong_pairs_before'])} before, {short(told['wrong_pairs_after'])} after"
+    chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
+    return (
+        f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
+        f"under the same seed from start {start}{chosen}."
+    )
+
+
+def _scores(pair: SideBySide, metrics: list[str]) -> str:
+    """The compared metrics of proxy and target, as a sentence."""
+    values = [
+        ", ".join(f"{plain(name)} {short(side.metrics[name])} {pair.units[name]}".rstrip() for name in metrics)
+        for side in pair.sides.values()
+    ]
+    return "; ".join(f"{side}: {value}" for side, value in zip(pair.sides, values, strict=True)).capitalize() + "."

@@ -108,7 +108,7 @@ def test_without_a_random_effect_its_mean_lateness_is_delay():
     ],
 )
 def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger(ratios, material):
-    one = WeighedEffect(adopted("x"), {float(h): Ratio(value, ends) for h, (value, *ends) in enumerate(ratios)})
+    one = WeighedEffect(adopted("x", SLIP), {float(h): Ratio(value, ends) for h, (value, *ends) in enumerate(ratios)})
     assert one.material == material
     assert RULES.material_factor == 1.05
 
@@ -133,3 +133,11 @@ def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them(si
     assert drawn > 0.4 * np.sqrt(np.mean(errors**2)), "by their size alone they would matter"
     kept = drop_immaterial(found(calm, jittery.theta, adopted("delay_jitter", names=("delay_jitter",))), 1)
     assert kept.adopted == ()
+
+
+def test_draws_matter_only_where_more_than_one_horizon_shows_them():
+    shown, hidden = Ratio(1.14, (1.03, 1.26)), Ratio(1.04, (1.0, 1.1))
+    lossy = adopted("dropped_commands", names=("dropped_commands",))
+    assert not WeighedEffect(lossy, {1.0: hidden, 2.0: hidden, 5.0: shown}).material
+    assert WeighedEffect(lossy, {1.0: hidden, 2.0: shown, 5.0: shown}).material
+    assert WeighedEffect(lossy, {2.0: shown}).material

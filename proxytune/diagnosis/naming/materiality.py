@@ -41,8 +41,9 @@ class WeighedEffect(NamedTuple):
 
     @property
     def material(self) -> bool:
-        """Whether predictions are shown to need it."""
-        return any(one.value >= RULES.material_factor and one.above for one in self.worth.values())
+        """Whether predictions are shown to need it; draws add to the error at every horizon: one is not enough."""
+        shown = sum(one.value >= RULES.material_factor and one.above for one in self.worth.values())
+        return shown >= (1 if self.effect.free else min(2, len(self.worth)))
 
     @property
     def harmful(self) -> bool:

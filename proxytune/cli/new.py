@@ -1,6 +1,7 @@
 """`new`: a robot, study or family to start from."""
 
 import argparse
+import keyword
 import os
 import shutil
 from contextlib import suppress
@@ -101,6 +102,8 @@ def _check(arguments: argparse.Namespace) -> None:
         raise InputError(f"'{name}': a name has letters, digits, _ and -, and begins with a letter; it is no path")
     if kind == "family" and "-" in name:
         raise InputError(f"'{name}': a family is a Python module; write _ for -")
+    if kind == "family" and (keyword.iskeyword(name) or name.startswith("_")):
+        raise InputError(f"'{name}': a family is a Python module that is imported by its name; choose another name")
     if kind == "family" and find_spec(name) is not None:
         raise InputError(f"'{name}': a Python module of this name is installed; choose another name")
     if kind == "robot" and name in robot_names():

@@ -92,10 +92,14 @@ def digest(*parts: Any) -> str:
 
 
 def digest_of_files(path: Path) -> str:
-    """A digest of a file, or of all files in a folder with their names; hidden and compiled ones are left out."""
-    files = [path] if path.is_file() else sorted(one for one in path.rglob("*") if one.is_file())
-    seen = [one for one in files if not one.name.startswith(".") and one.parent.name != "__pycache__"]
-    return digest([(str(one.relative_to(path)), hashlib.sha256(one.read_bytes()).hexdigest()) for one in seen])
+    """A digest of a file, or of all files in a folder with their names; its hidden and compiled ones are left out."""
+    files = [path] if path.is_file() else _files_in(path)
+    return digest([(str(one.relative_to(path)), hashlib.sha256(one.read_bytes()).hexdigest()) for one in files])
+
+
+def _files_in(folder: Path) -> list[Path]:
+    files = sorted(one for one in folder.rglob("*") if one.is_file())
+    return [one for one in files if not one.name.startswith(".") and one.parent.name != "__pycache__"]
 
 
 def _read(path: Path) -> dict[str, str]:

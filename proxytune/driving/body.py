@@ -3,6 +3,7 @@
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,8 +87,19 @@ def read_body(root: ET.Element, path: Path) -> Body:
     Raises:
         SettingsError: If its two driven wheels cannot be told, or a number in it is none.
     """
-    try:
+    with sound_urdf(path):
         return _read_body(root, path)
+
+
+@contextmanager
+def sound_urdf(path: Path) -> Iterator[None]:
+    """Whatever is read or changed of a URDF, one line where a number in it is none.
+
+    Raises:
+        SettingsError: If one is none, or its joints go round in a circle.
+    """
+    try:
+        yield
     except (ValueError, RecursionError) as problem:
         raise SettingsError(f"{path}: is no sound URDF ({problem}); correct it") from None
 
@@ -108,6 +120,11 @@ def _read_body(root: ET.Element, path: Path) -> Body:
 
 def _links(root: ET.Element) -> list[str]:
     return [link.get("name", "") for link in root.iter("link")]
+
+
+def links_called(root: ET.Element, name: str) -> list[ET.Element]:
+    """The links of a name, whatever characters it has."""
+    return [link for link in root.findall("link") if link.get("name") == name]
 
 
 def link_pose(root: ET.Element, link: str) -> NDArray[np.float64]:
@@ -174,9 +191,10 @@ def _wheel(root: ET.Element, joint: ET.Element) -> Wheel:
 
 def _radius(root: ET.Element, link: str) -> float | None:
     """Of what the wheel collides as, else of what it looks like."""
-    for part in ("collision", "visual"):
-        for shape in ("sphere", "cylinder"):
-            found = root.find(f"link[@name='{link}']/{part}/geometry/{shape}")
+    shapes = (f"{part}/geometry/{shape}" for part in ("collision", "visual") for shape in ("sphere", "cylinder"))
+    for shape in shapes:
+        for element in links_called(root, link):
+            found = element.find(shape)
             if found is not None:
                 return float(found.get("radius", 0.0))
     return None

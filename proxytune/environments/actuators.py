@@ -28,7 +28,7 @@ class Actuators:
         self._largest[self._largest == 0.0] = 1.0
 
     def pass_on(self, action: Any) -> Any:
-        """What reaches the environment of the next action."""
+        """What reaches the environment of the next action; whole numbers are rounded to the nearest ones."""
         if self._idle:
             return action
         shares = np.asarray(action, dtype=float) / self._largest
@@ -36,4 +36,6 @@ class Actuators:
         for number, chain in enumerate(self._chains):
             signal, self._memories[number] = chain.apply(np.clip(signal, -1.0, 1.0), self._memories[number])
         bent = signal[0] if len(shares) == WHEELS else signal[:, 0, 0]
-        return np.clip(bent * self._largest, self._low, self._high).astype(np.asarray(action).dtype)
+        given = np.clip(bent * self._largest, self._low, self._high)
+        kind = np.asarray(action).dtype
+        return (np.rint(given) if np.issubdtype(kind, np.integer) else given).astype(kind)

@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.body import AXLES, Body, add_little_mass, origin_of, parse_urdf, read_body
+from proxytune.driving.body import AXLES, Body, add_little_mass, origin_of, parse_urdf, read_body, sound_urdf
 from proxytune.errors import InputError
 from proxytune.skeletons.robot import Known, check_figures, completed, robot_text, then
 from proxytune.skeletons.skeleton import Skeleton
+
+WHEELS = ("wheel_radius", "wheel_distance")
+"""Of these robot.toml and URDF must say the same: the bullet plant drives by both."""
 
 
 def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float]) -> Skeleton:
@@ -23,15 +26,16 @@ def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float]) -> Skel
         figures: What the user states; it goes before what the URDF says, save for the wheels.
 
     Raises:
-        InputError: If its wheels cannot be told.
+        InputError: If its wheels cannot be told, or a number in it is none.
     """
     check_figures(figures)
     root = parse_urdf(path)
-    _drop_empty_roots(root, path)
-    body = read_body(root, path)
-    radius = _radius(body, figures, path)
-    read = _figures(body, radius)
-    notes = tuple(_conform(root, body, radius))
+    with sound_urdf(path):
+        _drop_empty_roots(root, path)
+        body = read_body(root, path)
+        radius = _radius(body, figures, path)
+        notes = tuple(_conform(root, body, radius))
+    read = {name: value for name, value in _figures(body, radius).items() if name in WHEELS or name not in figures}
     known = (Known(read, f"read from {path.name}"), Known(figures, "given to `new robot`"))
     values = completed({**figures, **read})
     ET.indent(root)

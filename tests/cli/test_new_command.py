@@ -120,3 +120,10 @@ def test_a_long_command_is_broken_so_that_it_can_be_pasted():
     lines = pasteable(command).split("\n")
     assert max(map(len, lines)) <= 80
     assert shlex.split("".join(line.removesuffix("\\") for line in lines)) == shlex.split(command)
+
+
+@pytest.mark.parametrize("name", ["class", "None", "_carts"])
+def test_a_family_that_cannot_be_imported_by_its_name_is_refused(typed, tmp_path, capsys, name):
+    assert main(["new", "family", name]) == 2
+    assert f"'{name}': a family is a Python module that is imported by its name" in capsys.readouterr().err
+    assert not (tmp_path / name).exists()

@@ -68,3 +68,9 @@ def test_what_a_study_may_read_lies_beside_the_extended_one_and_what_runs_made_d
 @pytest.mark.parametrize("key", ["a b", "é", 'quo"te', ""])
 def test_keys_are_quoted_where_toml_needs_it(key):
     assert tomllib.loads(toml_text({key: 1, "table": {key: {"inner": 2}}})) == {key: 1, "table": {key: {"inner": 2}}}
+
+
+@pytest.mark.parametrize("text", ["inf", "-inf", "nan", "2024-02-29", "07:32:00.5", "1979-05-27T07:32:00-07:00"])
+def test_values_that_json_does_not_have_read_back_as_they_were(text):
+    values = tomllib.loads(f"plain = {text}\nlist = [{text}]\n")
+    assert repr(tomllib.loads(toml_text(values))) == repr(values)

@@ -72,3 +72,11 @@ def test_a_digest_of_files_changes_with_content_and_names_and_not_with_hidden_or
     changed = digest_of_files(tmp_path)
     (tmp_path / "one").rename(tmp_path / "two")
     assert len({before, changed, digest_of_files(tmp_path)}) == 3
+
+
+def test_a_digest_of_a_single_hidden_file_changes_with_its_content(tmp_path):
+    model = tmp_path / ".model.toml"
+    model.write_text("1")
+    before = digest_of_files(model)
+    model.write_text("2")
+    assert digest_of_files(model) != before

@@ -58,6 +58,14 @@ def test_actions_keep_their_type_and_bounds():
     assert bent.tolist() == [[1.0, np.float32(0.2)]]
 
 
+def test_whole_actions_are_rounded_to_the_nearest_ones():
+    known = spaces(low=(-10, -10), high=(10, 10))
+    bent = passed_on(known, {"trim": 0.04}, [np.array([10, 10]), np.array([-7, -7])], np.int64)
+    exact = passed_on(known, {"trim": 0.04}, [np.array([10, 10]), np.array([-7, -7])])
+    assert np.array_equal(bent, np.rint(exact))
+    assert not np.array_equal(bent, np.trunc(exact))
+
+
 def test_without_effects_an_action_goes_through_untouched():
     action = np.array([0.1, 0.2], np.float32)
     assert Actuators((), spaces(), 1).pass_on(action) is action

@@ -113,9 +113,44 @@ def test_ros_parameters_are_those_that_make_the_robot_go_as_told():
     assert wheels["wheel_separation"] * wheels["wheel_separation_multiplier"] == pytest.approx(0.2)
     assert (wheels["left_wheel_radius_multiplier"], wheels["right_wheel_radius_multiplier"]) == (0.9, 1.1)
     assert wheels["linear.x.max_velocity"] == pytest.approx(0.6 * 0.5 * 0.9)
-    assert wheels["linear.x.max_acceleration"] == pytest.approx(0.54)
+    # A duty rises at the same rate whatever it is cut off at.
+    assert wheels["linear.x.max_acceleration"] == pytest.approx(0.6 * 0.9 / 0.5)
+    assert wheels["angular.z.max_acceleration"] == pytest.approx(2.0 / 0.2 * 0.6 * 0.9 / 0.5)
     assert camera["camera_info.d"] == [-0.2, 0.0, 0.0, 0.0, 0.0]
     assert nodes["camera_transform"]["ros__parameters"]["translation.z"] == pytest.approx(0.108)
+
+
+def with_urdf(folder, *changes):
+    """The Duckiebot with changes of its URDF."""
+    text = ROBOT.urdf.read_text()
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after)
+    (folder / "changed.urdf").write_text(text)
+    return replace(ROBOT, urdf=folder / "changed.urdf")
+
+
+def test_a_link_may_have_a_quote_in_its_name(tmp_path):
+    robot = with_urdf(tmp_path, ('"wheel_left"', '"wheel\'s"'))
+    root = ET.fromstring(urdf_text(instance(robot, wheel_gain__left=0.9)))
+    assert read_body(root, Path("exported.urdf")).left.radius_m == pytest.approx(0.0318 * 0.9)
+
+
+def test_a_urdf_with_a_number_that_is_none_is_one_line(tmp_path):
+    joint = (
+        '<joint name="spot" type="fixed"><parent link="p"/><child link="tracked_point"/><origin xyz="a b c"/></joint>'
+    )
+    robot = with_urdf(tmp_path, ("</robot>", f"{joint}</robot>"))
+    with pytest.raises(SettingsError, match="changed.urdf: is no sound URDF .*; correct it"):
+        urdf_text(instance(robot, marker_offset__forward=0.05))
+
+
+@pytest.mark.parametrize("form", [urdf_text, mjcf_text])
+def test_names_with_signs_of_xml_give_a_file_that_can_be_read(form):
+    named = replace(instance(replace(ROBOT, name='R&D "<b>"')), source="a----b -")
+    root = ET.fromstring(form(named))
+    assert root.tag in ("robot", "mujoco")
+    assert form is urdf_text or root.get("model") == 'R&D "<b>"'
 
 
 def test_a_robot_that_lacks_what_a_format_needs_is_refused_by_name():

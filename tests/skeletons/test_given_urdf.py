@@ -96,3 +96,33 @@ def test_wheels_that_are_meshes_need_their_radius(tmp_path):
     assert (
         "wheel_radius = { value = 0.04," in robot_from_urdf("rover", path, {"wheel_radius": 0.04}).files["robot.toml"]
     )
+
+
+def test_what_is_stated_goes_before_the_urdf_save_for_the_wheels(tmp_path):
+    stated = {"mass": 2.5, "camera_pitch": 10.0, "wheel_radius": 0.05, "wheel_distance": 0.3}
+    skeleton = robot_from_urdf("rover", urdf(tmp_path), stated)
+    robot = write(tmp_path, skeleton)
+    wanted = {"mass": 2.5, "camera_pitch": 10.0, "wheel_radius": 0.033, "wheel_distance": 0.16, "camera_height": 0.11}
+    assert {name: robot.figures[name] for name in wanted} == pytest.approx(wanted)
+    lines = skeleton.files["robot.toml"].splitlines()
+    sources = {line.split(" = ")[0]: line for line in lines if " = { value" in line}
+    assert "given to" in sources["mass"]
+    assert "read from turtle.urdf" in sources["wheel_radius"]
+    assert "mass" not in skeleton.notes[0]
+
+
+def test_a_link_may_have_a_quote_in_its_name(tmp_path):
+    path = urdf(tmp_path)
+    path.write_text(path.read_text().replace('"wheel_left"', '"wheel\'s left"'))
+    assert read_body(parse_urdf(path), path).left.radius_m == 0.033
+    assert "wheel's left" in robot_from_urdf("rover", path, {}).files["rover.urdf"]
+
+
+@pytest.mark.parametrize("number", ["-0.02 0 0.03", "-0.03 0 0.07", "0 0 0.01"])
+@pytest.mark.parametrize("wrong", ["a b c", "1 2"])
+def test_a_number_that_is_none_is_one_line(tmp_path, number, wrong):
+    path = urdf(tmp_path)
+    assert f'xyz="{number}"' in (text := path.read_text())
+    path.write_text(text.replace(f'xyz="{number}"', f'xyz="{wrong}"'))
+    with pytest.raises(InputError, match="turtle.urdf: is no sound URDF .*; correct it"):
+        robot_from_urdf("rover", path, {})

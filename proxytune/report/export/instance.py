@@ -1,5 +1,6 @@
 """A domain instance in the figures that other simulators take: wheels, motors, camera and the tracked point."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -142,3 +143,14 @@ def header(instance: Instance, form: str) -> list[str]:
         *(["NOT in this file, which has no place for it:"] if left_out else []),
         *(f"  {line}" for line in left_out),
     ]
+
+
+def xml_comment(instance: Instance, form: str, columns: int) -> str:
+    """The head of a file as an XML comment, in which no two hyphens may stand side by side.
+
+    Args:
+        instance: What is written.
+        form: The format.
+        columns: By how many its lines are indented.
+    """
+    return re.sub("-(?=-)", "- ", ("\n" + columns * " ").join(header(instance, form)))

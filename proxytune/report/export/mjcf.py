@@ -2,11 +2,12 @@
 
 import math
 from string import Template
+from xml.sax.saxutils import escape
 
 import numpy as np
 
 from proxytune.driving.cameras import CameraFigures, orientation
-from proxytune.report.export.instance import Instance, header
+from proxytune.report.export.instance import Instance, xml_comment
 
 TIMESTEP_S = 0.0005
 """Short, and integrated explicitly: MuJoCo's implicit integrators push a robot with stiffly driven light wheels."""
@@ -74,8 +75,8 @@ def mjcf_text(instance: Instance) -> str:
     }
     return MODEL.substitute(
         {key: f"{number:.9g}" for key, number in numbers.items()},
-        name=instance.robot.name,
-        comment="\n       ".join(header(instance, "mjcf")).replace("--", "- -"),
+        name=escape(instance.robot.name, {'"': "&quot;"}),
+        comment=xml_comment(instance, "mjcf", 7),
         chassis_size=f"{length / 2.0:.6g} {0.35 * baseline:.6g} {height / 2.0:.6g}",
         parts="\n".join(_parts(instance)),
         actuators="\n".join(_actuator(instance, side) for side in (0, 1)),

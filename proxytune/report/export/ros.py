@@ -41,6 +41,8 @@ def _controller(instance: Instance) -> Rows:
     speed = instance.figure("full_speed")
     fastest = min(speed * gain * limit for gain, limit in zip(gains, instance.limits, strict=True))
     rise = instance.value("slew_rate", "rise_time", 0.0)
+    # A duty rises at the same rate whatever it is cut off at.
+    fastest_rise = speed * min(gains) / rise if rise else 0.0
     return [
         "diff_drive_controller:",
         "  ros__parameters:",
@@ -52,8 +54,8 @@ def _controller(instance: Instance) -> Rows:
         f"    left_wheel_radius_multiplier: {_number(gains[0])}",
         f"    right_wheel_radius_multiplier: {_number(gains[1])}",
         f"    cmd_vel_timeout: {_number(TIMEOUT_S)}  # the controller's default: nothing was found of it",
-        *_limits("linear.x", fastest, fastest / rise if rise else 0.0),
-        *_limits("angular.z", 2.0 * fastest / baseline, 2.0 * fastest / baseline / rise if rise else 0.0),
+        *_limits("linear.x", fastest, fastest_rise),
+        *_limits("angular.z", 2.0 * fastest / baseline, 2.0 * fastest_rise / baseline),
     ]
 
 

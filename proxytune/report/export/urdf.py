@@ -7,9 +7,18 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.body import AXLES, add_little_mass, link_pose, origin_of, parse_urdf, read_body
+from proxytune.driving.body import (
+    AXLES,
+    add_little_mass,
+    link_pose,
+    links_called,
+    origin_of,
+    parse_urdf,
+    read_body,
+    sound_urdf,
+)
 from proxytune.driving.cameras import orientation
-from proxytune.report.export.instance import Instance, header
+from proxytune.report.export.instance import Instance, xml_comment
 
 Pose = NDArray[np.float64]
 
@@ -20,11 +29,20 @@ def urdf_text(instance: Instance) -> str:
     A wheel that turns faster than nominal is a larger one; wheels stand as far apart as the turn rate shows it.
 
     Raises:
-        SettingsError: If the robot has no URDF, or its axles are not to be found there.
+        SettingsError: If the robot has no URDF, its axles are not to be found there, or a number in it is none.
     """
     path = instance.robot.body()
     root = parse_urdf(path)
     read_body(root, path)
+    with sound_urdf(path):
+        _change(root, instance)
+    ET.indent(root)
+    comment = xml_comment(instance, "urdf", 5)
+    return f'<?xml version="1.0"?>\n<!-- {comment} -->\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def _change(root: ET.Element, instance: Instance) -> None:
+    """Give wheels, camera and tracked point what was found of them."""
     for side, (axle, gain, limit) in enumerate(zip(AXLES, instance.gains, instance.limits, strict=True)):
         joint = next(one for one in root.iter("joint") if one.get("name") == axle)
         _set_wheel(root, joint, (0.5 - side) * instance.baseline_m, instance.figure("wheel_radius"), gain)
@@ -38,9 +56,6 @@ def urdf_text(instance: Instance) -> str:
         cosine, sine = math.cos(angle), math.sin(angle)
         turned = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
         _mount(root, "tracked_point", "tracked_point_mount", _pose(turned, (forward, left, 0.0)))
-    ET.indent(root)
-    comment = "\n     ".join(header(instance, "urdf")).replace("--", "- -")
-    return f'<?xml version="1.0"?>\n<!-- {comment} -->\n{ET.tostring(root, encoding="unicode")}\n'
 
 
 def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: float, gain: float) -> None:
@@ -51,10 +66,9 @@ def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: flo
     centre[1, 3] = left_m
     centre[2, 3] += (gain - 1.0) * radius_m
     _set_origin(joint, np.linalg.inv(above) @ centre)
-    for shape in root.find(f"link[@name='{link}']") or ():
-        for kind in ("sphere", "cylinder"):
-            for geometry in shape.iterfind(f"geometry/{kind}"):
-                geometry.set("radius", f"{gain * float(geometry.get('radius', radius_m)):.9g}")
+    for element in links_called(root, link)[:1]:
+        for geometry in (*element.iterfind("*/geometry/sphere"), *element.iterfind("*/geometry/cylinder")):
+            geometry.set("radius", f"{gain * float(geometry.get('radius', radius_m)):.9g}")
 
 
 def _mount(root: ET.Element, link: str, mount: str, pose: Pose) -> None:

@@ -122,7 +122,8 @@ def test_a_link_may_have_a_quote_in_its_name(tmp_path):
 @pytest.mark.parametrize("wrong", ["a b c", "1 2"])
 def test_a_number_that_is_none_is_one_line(tmp_path, number, wrong):
     path = urdf(tmp_path)
-    assert f'xyz="{number}"' in (text := path.read_text())
+    text = path.read_text()
+    assert f'xyz="{number}"' in text
     path.write_text(text.replace(f'xyz="{number}"', f'xyz="{wrong}"'))
     with pytest.raises(InputError, match="turtle.urdf: is no sound URDF .*; correct it"):
         robot_from_urdf("rover", path, {})

@@ -19,6 +19,7 @@ from proxytune.report.export.ros import ros_text
 from proxytune.report.export.urdf import urdf_text
 from proxytune.report.writing import write_text, write_whole
 from proxytune.search.history import History, write_optuna, write_skopt
+from proxytune.study.family import bare_family
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
 """What takes the trials of a study, not what was found."""
@@ -102,9 +103,10 @@ def _robot(model: Model, catalogue: Catalogue, path: Path) -> Robot:
 def _of_study(folder: Path) -> Instance:
     """The best θ of a study, with its 95 % intervals."""
     result = read_study(folder).result
-    family, region = result.study.family, result.knowledge
+    settings, region = result.study.settings, result.knowledge
+    family = bare_family(settings, settings.proxy)
     if not isinstance(family, LaneFollowing):
         raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
     robot = read_robot(family.robot, family.folder)
     theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
-    return Instance(robot, theta, dict(region.intervals), f"the best θ of the study {result.study.settings.name}")
+    return Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}")

@@ -18,6 +18,7 @@ from proxytune.space import Theta
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import failure_of, plan, table
+from proxytune.study.family import bare_family
 from proxytune.study.settings import StudySettings
 from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
@@ -62,8 +63,8 @@ def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) 
             raise settings.error(KEY, f"the target's table has no scores of '{name}'; measure them, or take it out")
     if named and len(named) < FEWEST:
         raise settings.error(KEY, f"names {len(named)} of at least {FEWEST} agents; add some, or take the key out")
-    shipped = tuple(AGENTS) if isinstance(family, LaneFollowing) else ()
-    others = [name for name in (shipped if driven else scored) if name not in used and _is_known(family, name)]
+    candidates = _shipped(settings) if driven else scored
+    others = [name for name in candidates if name not in used and _is_known(family, name)]
     found = named or tuple(others)
     return found if len(found) >= FEWEST else ()
 
@@ -87,6 +88,11 @@ def scored_agents(settings: StudySettings) -> tuple[str, ...]:
         return ()
     metrics = [metric.name for metric in settings.metrics]
     return read_scores(settings.targets, metrics, columns=settings.target_columns).agents
+
+
+def _shipped(settings: StudySettings) -> tuple[str, ...]:
+    """The agents that come with the family; one that names its agents otherwise is asked without its guard."""
+    return tuple(AGENTS) if isinstance(bare_family(settings, settings.proxy), LaneFollowing) else ()
 
 
 def _is_known(family: DomainFamily, name: str) -> bool:

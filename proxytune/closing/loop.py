@@ -26,6 +26,7 @@ from proxytune.scores import write_scores
 from proxytune.seeds import target_seed
 from proxytune.storage.lock import locked
 from proxytune.study.measure import measure
+from proxytune.study.own_code import code_of
 from proxytune.study.settings import FILE_NAME, StudySettings
 from proxytune.study.study import Study, open_study
 from proxytune.usefulness import Assessment
@@ -126,8 +127,8 @@ class _Closing:
         inputs = digest(name, twin.read_text(encoding="utf-8"), self._agents(settings.agents))
         if settings.target.exists() and self.kept.inputs_of(name) != inputs:
             raise InputError(
-                f"{settings.target}: was measured of another model, or of other agents, starts, seed or [domain]; "
-                "move it and study.db away to start again"
+                f"{settings.target}: was measured of another model, or of other agents, starts, seed, [domain] or "
+                "modules of your own; move it and study.db away to start again"
             )
         self._keep(name, inputs, settings.target, partial(self._measure, settings, settings.target))
 
@@ -156,7 +157,8 @@ class _Closing:
         if loop.log is not None:
             self._begin("log", "given")
         robot = digest_of_files(robot_home(loop.robot, self.settings.folder))
-        inputs = digest("diagnosis", seen, declared_names(loop), self.settings.seed, robot, versions_of(["proxytune"]))
+        made_by = (robot, code_of(self.settings), versions_of(["proxytune"]))
+        inputs = digest("diagnosis", seen, declared_names(loop), self.settings.seed, made_by)
         do = partial(diagnose_target, loop, log, home, self.teller)
         self._keep("diagnosis", inputs, home / "diagnosis.json", do)
         return read_diagnosis(home)
@@ -166,7 +168,7 @@ class _Closing:
         loop, folder, wanted = self.loop, self.loop.home / "log", wanted_of(self.loop)
         assert loop.twin is not None
         twin, domain = loop.twin.read_text(encoding="utf-8"), self.settings.domain.values
-        inputs = digest("log", twin, domain, vars(wanted), versions_of(["proxytune"]))
+        inputs = digest("log", twin, domain, vars(wanted), code_of(self.settings), versions_of(["proxytune"]))
         do = partial(record_log, self.settings, loop.twin, folder, wanted, lambda line: None)
         self._keep("log", inputs, folder / "log.toml", do)
         return folder, inputs
@@ -218,5 +220,5 @@ class _Closing:
 
     def _agents(self, names: tuple[str, ...]) -> list[Any]:
         """What scores of a domain depend on besides its model."""
-        settings = self.settings
-        return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values)]
+        settings, code = self.settings, code_of(held_out_settings(self.settings, names))
+        return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]

@@ -76,6 +76,25 @@ def test_the_best_theta_of_a_study_is_exported_with_its_intervals(make_study, tm
     assert values["motor_lag.time_constant"]["value"] == 0.2
 
 
+def test_a_study_that_names_its_agents_otherwise_is_exported(make_study, tmp_path, capsys):
+    folder = make_study(
+        family=None,
+        agents=None,
+        metrics='["distance:max"]',
+        starts="1",
+        budget="3",
+        initial="3",
+        engine='"sobol"',
+        domain={"plant": '"planar"', "seconds": "2"},
+    )
+    with (folder / "study.toml").open("a") as study:
+        study.write('\n[agents]\nslow = "steady"\nwild = "daredevil"\n')
+    (folder / "target.csv").write_text("agent,episode,distance\nslow,0,0.2\nwild,0,0.5\n")
+    assert main(["study", str(folder), "--json"]) == 0
+    capsys.readouterr()
+    assert main(["export", str(folder), "--to", "ros", "--output", str(tmp_path / "robot.yaml")]) == 0
+
+
 def test_a_study_of_another_simulator_is_refused(finished, tmp_path, capsys):
     assert main(["export", str(finished), "--to", "ros", "--output", str(tmp_path / "robot.yaml")]) == 2
     assert "is a study of another simulator" in capsys.readouterr().err

@@ -184,6 +184,18 @@ def test_a_target_measured_of_another_twin_is_told_of(closed, capsys):
     assert "target.csv: was measured of another model" in capsys.readouterr().err
 
 
+def test_what_depends_on_the_users_own_modules_is_done_again_when_they_change(closed, diagnosed, close, capsys):
+    (closed / "mine.py").write_text("GAIN = 1.0\n")
+    assert main(["loop", str(closed)]) == 2
+    assert "target.csv: was measured of another model" in capsys.readouterr().err
+    for name in ("target.csv", "study.db"):
+        (closed / name).unlink()
+    assert {"target", "log", "diagnosis", "held-out scores"} <= set(close(closed)["this_run"]["steps"])
+    assert close(closed)["this_run"]["steps"] == []
+    (closed / "mine.py").write_text("GAIN = 1.0  # a comment\n")
+    assert close(closed)["this_run"]["steps"] == ["extension"]
+
+
 def test_scores_of_held_out_agents_in_the_targets_table_are_used(closed, closed_once, diagnosed, close):
     more = (closed / "loop" / "held_out.csv").read_text().partition("\n")[2]
     loop_json = closed / "loop" / "loop.json"

@@ -119,6 +119,18 @@ def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_p
     assert not {"steady", "brisk", "daredevil"} & set(held_out)
 
 
+def test_shipped_agents_are_held_out_of_a_study_that_names_its_agents_otherwise(tmp_path):
+    table = '[agents]\nslow = "steady"\nfast = "brisk"\nwild = "daredevil"\n\n[parameters]'
+    changes = (
+        ('held_out = ["crawler", "laggy", "edges"]\n', ""),
+        ('agents = ["steady", "brisk", "daredevil"]\n', ""),
+        ("[parameters]", table),
+    )
+    held_out = open_loop(write_tiny(tmp_path / "tiny", *changes)).held_out
+    assert {"crawler", "edges", "wary"} <= set(held_out)
+    assert not {"steady", "brisk", "daredevil", "slow", "fast", "wild"} & set(held_out)
+
+
 def test_of_a_table_those_agents_are_held_out_that_it_has_beside_the_studys(tmp_path):
     folder = write_tiny(tmp_path / "tiny", NO_TRUTH, ('held_out = ["crawler", "laggy", "edges"]\n', ""))
     log = a_log(tmp_path / "log", LOG.replace("husky", "duckiebot"))

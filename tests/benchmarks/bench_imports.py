@@ -25,16 +25,15 @@ from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.importing.facts import Facts
 from proxytune.importing.opening import open_log
 
-DRIVES, SECONDS = 6, 40.0
 OFFSETS_S = (0.0, -0.25, 0.1)
 FACTS = Facts(robot="nobodys", figures=foreign_robot.FIGURES)
 EXPECTED = {"dead_band", "wheel_gain", "motor_lag"}
 
 
-def diagnosed(form: str, seed: int, offset_s: float) -> dict[str, Any]:
-    """What diagnose says of one recording."""
+def diagnosed(form: str, seed: int, offset_s: float, count: int, seconds: float) -> dict[str, Any]:
+    """What diagnose says of one recording of so many drives, each so long [s]."""
     begin = time.process_time()
-    drives = [foreign_robot.drive(100 * seed + k, seconds=SECONDS, offset_s=offset_s) for k in range(DRIVES)]
+    drives = [foreign_robot.drive(100 * seed + k, seconds=seconds, offset_s=offset_s) for k in range(count)]
     with tempfile.TemporaryDirectory() as home:
         path = foreign_robot.write_form(Path(home), form, drives)
         with open_log(path, facts=FACTS) as (log, _):
@@ -68,6 +67,8 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("output", type=Path)
     parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--drives", type=int, default=6)
+    parser.add_argument("--length", type=float, default=40.0, help="of a drive [s]")
     parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args(words)
     wanted = [
@@ -76,7 +77,7 @@ def main(words: Sequence[str] | None = None) -> None:
         for turn, offset in enumerate(OFFSETS_S)
     ]
     known = {(row["form"], row["seed"], row["offset_s"]) for row in rows_of(asked.output)}
-    tasks = (delayed(diagnosed)(*one) for one in wanted if one not in known)
+    tasks = (delayed(diagnosed)(*one, asked.drives, asked.length) for one in wanted if one not in known)
     for row in Parallel(n_jobs=asked.jobs, return_as="generator_unordered", pre_dispatch="n_jobs")(tasks):
         with asked.output.open("a") as file:
             file.write(json.dumps(row) + "\n")

@@ -12,8 +12,7 @@ from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
 from proxytune.importing.opening import source_without_unnamed_pictures
 from proxytune.importing.reading import read_source
-from proxytune.importing.source import Source
-from proxytune.importing.survey import Survey, survey
+from proxytune.importing.source import Source, Survey
 from proxytune.importing.writing import write_log
 
 MEASURES = ("drive", "time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
@@ -38,18 +37,17 @@ def run(arguments: argparse.Namespace) -> Answer:
         source = source_without_unnamed_pictures(whole, facts)
         if arguments.output is not None:
             write_log(source, arguments.output, facts, origin=arguments.source.name)
-    surveys = [survey(drive) for drive in source.drives]
     written = None if arguments.output is None else str(arguments.output)
-    document = source.facts | {"log": written, "drives": [one.facts for one in surveys]}
-    return Answer(document, _told(source, surveys, arguments.output))
+    document = source.facts | {"log": written, "drives": [one.facts for one in source.surveys]}
+    return Answer(document, _told(source, arguments.output))
 
 
-def _told(source: Source, surveys: list[Survey], output: Path | None) -> Group:
+def _told(source: Source, output: Path | None) -> Group:
     channels = _table(source.form, ("what", "type", "count", "taken for"), {"count"})
     for channel in source.channels:
         channels.add_row(channel.name, channel.kind, str(channel.count), channel.role)
     drives = _table("Drives", MEASURES, {*MEASURES[1:]})
-    for one in surveys:
+    for one in source.surveys:
         drives.add_row(*_row(one))
     notes = Text("\n".join(f"- {note}" for note in source.notes))
     last = f"next: python -m proxytune diagnose {output}" if output else "give OUTPUT to write the log"

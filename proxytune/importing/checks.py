@@ -51,8 +51,7 @@ def _ordered_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:
     notes = lacking + notes
     if len(kept) < 2:
         raise LogError(f"{about}: only {len(kept)} of its poses have a time of their own; a drive needs two or more")
-    parts = (poses.times, poses.places, poses.headings, poses.tilts)
-    return Poses(*(part[kept] for part in parts)), notes
+    return poses.only(kept), notes
 
 
 def _whole_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:
@@ -65,7 +64,7 @@ def _whole_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:
         what = f"{lacking} of its {len(whole)} poses, first number {number}, are no pose"
         raise LogError(f"{about}: {what}; record it again")
     notes = [f"{lacking} poses without a place or an orientation were left out"] if lacking else []
-    return Poses(*(part[whole] for part in parts)), notes
+    return poses.only(whole), notes
 
 
 def _ordered_commands(commands: Commands, about: str) -> tuple[Commands, list[str]]:

@@ -6,12 +6,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from proxytune.errors import LogError
 from proxytune.importing.facts import Facts
 from proxytune.importing.reading import read_source
 from proxytune.importing.source import Source
 from proxytune.importing.wanted import Wanted
-from proxytune.importing.writing import write_log
+from proxytune.importing.writing import fill_log, read_as, writable
 from proxytune.logs import Log, read_log
 
 NOTHING = Wanted()
@@ -32,12 +31,11 @@ def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> I
         return
     source = read_source(path, wanted, facts.offset_s)
     with tempfile.TemporaryDirectory(prefix="proxytune_") as home:
-        folder = Path(home) / path.resolve().stem
-        try:
-            write_log(source_without_unnamed_pictures(source, facts), folder, facts, origin=path.name)
-        except LogError as problem:
-            raise LogError(str(problem).replace(str(folder), str(path))) from None
-        yield read_log(folder), source.notes
+        folder = Path(home)
+        named = source_without_unnamed_pictures(source, facts)
+        with writable(folder):
+            fill_log(folder, named, facts, path.resolve().stem, origin=path.name)
+        yield read_as(folder, path), source.notes
 
 
 def source_without_unnamed_pictures(source: Source, facts: Facts) -> Source:

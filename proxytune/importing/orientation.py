@@ -9,7 +9,6 @@ from proxytune.importing.source import Floats
 LEAST_NORM = 1e-3
 """A shorter quaternion is no orientation: drivers publish zeros before they know one."""
 
-
 MOST_LACKING = 0.1
 """A tracker that loses its markers now and then lacks no more of its poses than this share."""
 
@@ -27,7 +26,8 @@ def headings_and_tilts(quaternions: Floats, where: str) -> tuple[Floats, Floats]
     wrong = no_rotation(quaternions)
     if wrong.mean() > MOST_LACKING:
         raise complaint(quaternions, wrong, where)
-    x, y, z, w = np.where(wrong[:, None], np.nan, quaternions / _norms(quaternions)[:, None]).T
+    known = np.where(wrong[:, None], np.nan, quaternions)
+    x, y, z, w = (known / np.linalg.norm(known, axis=1, keepdims=True)).T
     headings = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     tilts = np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
     return headings, tilts
@@ -47,8 +47,3 @@ def complaint(quaternions: Floats, wrong: NDArray[np.bool_], where: str) -> LogE
         f"{where}: orientation {number + 1} is the quaternion ({values}), which is no rotation, and so are "
         f"{wrong.sum()} of {len(wrong)}; record poses whose orientation is set"
     )
-
-
-def _norms(quaternions: Floats) -> Floats:
-    norms = np.linalg.norm(quaternions, axis=1)
-    return np.where(np.isfinite(norms) & (norms > 0.0), norms, 1.0)

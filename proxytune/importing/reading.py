@@ -68,6 +68,7 @@ def _checked(source: Source, path: Path, offset_s: float) -> Source:
         raise LogError(
             f"{path}: its drives have commands of several kinds ({', '.join(sorted(kinds))}); import them apart"
         )
+    surveys = tuple(survey(drive) for drive in drives)
     if kinds != {"none"}:
-        notes += clock_notes([survey(drive) for drive in drives])
-    return replace(source, drives=tuple(drives), notes=tuple(notes))
+        notes += clock_notes(surveys)
+    return replace(source, drives=tuple(drives), notes=tuple(notes), surveys=surveys)

@@ -1,7 +1,7 @@
 """What every importer makes of a source: drives with commands, poses and pictures, each at times of their own."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,10 @@ class Poses:
     places: Floats
     headings: Floats
     tilts: Floats
+
+    def only(self, chosen: NDArray[Any]) -> "Poses":
+        """Some of the poses, by number or by mask."""
+        return Poses(self.times[chosen], self.places[chosen], self.headings[chosen], self.tilts[chosen])
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,42 @@ class Channel:
 
 
 @dataclass(frozen=True)
+class Survey:
+    """A drive in numbers.
+
+    Attributes:
+        name: What the log calls it.
+        seconds: From its first pose to its last [s].
+        poses: How many were measured.
+        poses_hz: At the usual interval between them.
+        lost: Share of the poses that dropped out, gaps apart.
+        gaps: Times without a pose of more than half a second.
+        longest_gap_s: The longest of them [s].
+        jitter_s: Standard deviation of the intervals between poses, drop-outs apart [s].
+        commands: How many were issued.
+        frames: How many pictures were taken.
+        lag_s: How long after its command it turns [s]; below 0: before it. None where that cannot be told.
+    """
+
+    name: str
+    seconds: float
+    poses: int
+    poses_hz: float
+    lost: float
+    gaps: int
+    longest_gap_s: float
+    jitter_s: float
+    commands: int
+    frames: int
+    lag_s: float | None
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What a JSON document says of it."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
 class Source:
     """What an importer found.
 
@@ -98,12 +138,14 @@ class Source:
         drives: Its drives.
         channels: All that it holds, and what each was taken for.
         notes: What was decided on the way, a sentence each.
+        surveys: The drives in numbers, once their stamps have been checked.
     """
 
     form: str
     drives: tuple[Drive, ...]
     channels: tuple[Channel, ...]
     notes: tuple[str, ...]
+    surveys: tuple[Survey, ...] = ()
 
     @property
     def facts(self) -> dict[str, Any]:

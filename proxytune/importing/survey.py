@@ -1,51 +1,14 @@
 """A drive in numbers: how long, how often measured, what dropped out, and when it answers its commands."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from proxytune.importing.reaction import reaction_of
-from proxytune.importing.source import Drive, Floats
+from proxytune.importing.source import Drive, Floats, Survey
 
 GAP_S = 0.5
 """A longer time without a pose is a gap."""
-
-
-@dataclass(frozen=True)
-class Survey:
-    """A drive in numbers.
-
-    Attributes:
-        name: What the log calls it.
-        seconds: From its first pose to its last [s].
-        poses: How many were measured.
-        poses_hz: At the usual interval between them.
-        lost: Share of the poses that dropped out, gaps apart.
-        gaps: Times without a pose of more than GAP_S.
-        longest_gap_s: The longest of them [s].
-        jitter_s: Standard deviation of the intervals between poses, drop-outs apart [s].
-        commands: How many were issued.
-        frames: How many pictures were taken.
-        lag_s: How long after its command it turns [s]; below 0: before it. None where that cannot be told.
-    """
-
-    name: str
-    seconds: float
-    poses: int
-    poses_hz: float
-    lost: float
-    gaps: int
-    longest_gap_s: float
-    jitter_s: float
-    commands: int
-    frames: int
-    lag_s: float | None
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """What a JSON document says of it."""
-        return asdict(self)
 
 
 def survey(drive: Drive) -> Survey:
@@ -75,7 +38,7 @@ def _lost(steps: Floats, usual: float) -> float:
     return missing / (missing + len(steps) + 1)
 
 
-def clock_notes(drives: list[Survey]) -> list[str]:
+def clock_notes(drives: Sequence[Survey]) -> list[str]:
     """What the lags say of the clocks of commands and poses, in a sentence."""
     lags = [(one.lag_s, one.name) for one in drives if one.lag_s is not None]
     early = [pair for pair in lags if pair[0] < 0.0]

@@ -14,7 +14,7 @@ from PIL import Image
 from proxytune.errors import InputError, LogError, RunError
 from proxytune.importing.facts import Facts
 from proxytune.importing.source import Commands, Drive, Pictures, Poses, Source
-from proxytune.logs import COMMANDS, read_log
+from proxytune.logs import COMMANDS, Log, read_log
 
 PICTURES = "frames/%06d.png"
 
@@ -35,24 +35,41 @@ def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> None:
     """
     folder = folder.resolve()
     with _written_whole(folder) as draft:
-        _write_table(draft / "samples.csv", [_samples(drive.name, drive.poses) for drive in source.drives])
-        commands = [_commands(drive.name, drive.commands) for drive in source.drives if drive.commands is not None]
-        if commands:
-            _write_table(draft / "commands.csv", commands)
-        pictures = [drive for drive in source.drives if drive.pictures is not None]
-        if pictures:
-            _write_pictures(draft, pictures)
-        text = _description(source, folder.name, facts, origin, with_pictures=bool(pictures))
-        (draft / "log.toml").write_text(text, encoding="utf-8")
-        _check(draft, folder)
+        fill_log(draft, source, facts, folder.name, origin)
+        read_as(draft, folder)
 
 
-def _check(draft: Path, folder: Path) -> None:
-    """Read the draft once, as diagnose will."""
+def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str) -> None:
+    """Write a log's files into a folder that is there.
+
+    Args:
+        folder: Where to.
+        source: What was read and checked.
+        facts: What only the user knows.
+        name: What the log is called.
+        origin: Where it came from, for log.toml.
+    """
+    _write_table(folder / "samples.csv", [_samples(drive.name, drive.poses) for drive in source.drives])
+    commands = [_commands(drive.name, drive.commands) for drive in source.drives if drive.commands is not None]
+    if commands:
+        _write_table(folder / "commands.csv", commands)
+    pictures = [drive for drive in source.drives if drive.pictures is not None]
+    if pictures:
+        _write_pictures(folder, pictures)
+    text = _description(source, name, facts, origin, with_pictures=bool(pictures))
+    (folder / "log.toml").write_text(text, encoding="utf-8")
+
+
+def read_as(folder: Path, shown: Path) -> Log:
+    """Read a log that lies elsewhere for the moment; complaints name where the user knows it.
+
+    Raises:
+        LogError: If it is none.
+    """
     try:
-        read_log(draft)
+        return read_log(folder)
     except LogError as problem:
-        raise LogError(str(problem).replace(str(draft), str(folder))) from None
+        raise LogError(str(problem).replace(str(folder), str(shown))) from None
 
 
 @contextmanager
@@ -60,7 +77,7 @@ def _written_whole(folder: Path) -> Iterator[Path]:
     """A folder to fill that becomes the wanted one once it is whole."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: is there already; give a folder that is not")
-    try:
+    with writable(folder):
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as draft:
             inside = Path(draft) / "log"
@@ -69,6 +86,17 @@ def _written_whole(folder: Path) -> Iterator[Path]:
             if folder.exists():
                 folder.rmdir()
             shutil.move(inside, folder)
+
+
+@contextmanager
+def writable(folder: Path) -> Iterator[None]:
+    """Tell in one line what keeps a folder from being written.
+
+    Raises:
+        RunError: If something does.
+    """
+    try:
+        yield
     except OSError as problem:
         raise RunError(f"{folder}: cannot be written ({problem.strerror}); make room, or give another folder") from None
 

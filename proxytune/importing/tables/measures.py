@@ -14,8 +14,6 @@ from proxytune.importing.tables.columns import Columns, column_values, missing
 from proxytune.importing.tables.fields import PLACE, POSE, QUATERNION
 from proxytune.logs import COMMANDS
 
-Mask = NDArray[np.bool_]
-
 LEAST_EXTENT_M = 0.01
 """A drive that stays within this, in a unit that nobody stated, is taken for one in another unit."""
 
@@ -88,12 +86,13 @@ def poses_by_drive(table: Table, columns: Columns) -> dict[str, Poses]:
     headings, tilts = by_field.get("heading"), np.zeros(len(rows.times))
     if headings is None:
         headings, tilts = headings_and_tilts(rows.values[:, -4:], str(table.path))
+    poses = Poses(rows.times, places, headings, tilts)
     drives = {}
     for name in rows.names:
         mine = rows.labels == name
         if mine.sum() < 2:
             raise LogError(f"{_where(table, name)}: has a single pose; a drive needs two or more")
-        drives[name] = Poses(rows.times[mine], places[mine], headings[mine], tilts[mine])
+        drives[name] = poses.only(mine)
         _check_clock(drives[name].times, f"{_where(table, name)}: poses")
     return drives
 

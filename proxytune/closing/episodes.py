@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proxytune.api.studies import StudyReport
-from proxytune.closing.figure import png_of
 from proxytune.closing.loop import Closed
 from proxytune.closing.righted import righted
 from proxytune.domain import DomainFamily, make_episode
@@ -15,6 +14,7 @@ from proxytune.report.drive.figure import episode_figure
 from proxytune.report.numbers import short
 from proxytune.report.page import Picture
 from proxytune.report.style import plain
+from proxytune.report.writing import png_of
 from proxytune.seeds import episode_seed
 from proxytune.study.family import load_family
 from proxytune.study.side_by_side import SideBySide, drive_side_by_side

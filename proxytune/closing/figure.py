@@ -1,7 +1,6 @@
 """PRPV of the tuned proxy before and after, against its noise floor."""
 
 from collections.abc import Sequence
-from io import BytesIO
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -24,13 +23,6 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
     if floor:
         panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=6.5, color="0.3", va="bottom")
     return figure
-
-
-def png_of(figure: Figure) -> bytes:
-    """A figure as the bytes of a PNG file."""
-    image = BytesIO()
-    figure.savefig(image, format="png", dpi=200)
-    return image.getvalue()
 
 
 def _panel(axes: Axes, row: Compared) -> None:

@@ -5,11 +5,12 @@ from typing import Any
 
 from proxytune.closing.comparison import Compared, compare_errors, compare_prpv
 from proxytune.closing.episodes import righted_pictures
-from proxytune.closing.figure import png_of, prpv_figure
+from proxytune.closing.figure import prpv_figure
 from proxytune.closing.loop import STEPS, Closed
 from proxytune.closing.righted import righted
 from proxytune.closing.wording import answer, chance_text, floor_text, following, lacking, level_text
 from proxytune.report.page import Foot, Page, Picture, Table, Words
+from proxytune.report.writing import png_of
 from proxytune.study.settings import as_document
 from proxytune.versions import versions_of
 

@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,13 @@ def save(figure: Figure, path: Path) -> None:
     write_whole(path, "the figure ", lambda draft: figure.savefig(draft, format="png", dpi=200))
     for form in _beside.get():
         write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
+
+
+def png_of(figure: Figure) -> bytes:
+    """A figure as the bytes of a PNG file."""
+    image = BytesIO()
+    figure.savefig(image, format="png", dpi=200)
+    return image.getvalue()
 
 
 def _draw(figure: Figure, form: str, draft: Path) -> None:

@@ -1,7 +1,6 @@
 """A study under way as a page: the trials so far, without what takes long to compute."""
 
 from collections.abc import Sequence
-from io import BytesIO
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -11,6 +10,7 @@ from proxytune.report.page import Page, Picture, foot_of
 from proxytune.report.study.page import study_command, study_settings
 from proxytune.report.study.trials_table import MEASURES, trials_table
 from proxytune.report.style import BLUE, COLUMN, dress
+from proxytune.report.writing import png_of
 from proxytune.storage.records import TrialRecord
 from proxytune.study.settings import LEARNING, StudySettings
 
@@ -53,10 +53,8 @@ def _answer(trials: Sequence[TrialRecord], measure: str, doing: str) -> str:
 
 
 def _picture(trials: Sequence[TrialRecord], measure: str) -> Picture:
-    image = BytesIO()
-    _figure(trials, measure).savefig(image, format="png", dpi=200)
     caption = "Each point is a trial; trials that failed or were stopped early have none. The best may be luck."
-    return Picture(f"{measure.upper()} trial by trial", image.getvalue(), caption)
+    return Picture(f"{measure.upper()} trial by trial", png_of(_figure(trials, measure)), caption)
 
 
 def _figure(trials: Sequence[TrialRecord], measure: str) -> Figure:

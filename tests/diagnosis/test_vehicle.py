@@ -62,6 +62,11 @@ def test_an_unknown_robot_has_the_geometry_of_its_log_and_obeys_at_once(log):
     assert dict(robot.figures) == {**OWN, "full_speed": 1.5, "motor_time_constant": 0.0, "control_rate": 20.0}
 
 
+def test_a_robot_of_the_logs_own_figures_may_be_named_as_the_log_names_it(log):
+    own = replace(log, robot="tractor", geometry={**OWN, "full_speed": 1.5})
+    assert robot_of(own, "tractor") == robot_of(own)
+
+
 @pytest.mark.parametrize(
     ("kind", "command", "fastest"),
     [("twist", (0.8, 1.0), 1.0), ("twist", (0.0, -3.0), 0.6), ("wheel_speed", (10.0, -23.0), 1.2)],

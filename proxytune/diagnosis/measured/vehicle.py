@@ -26,7 +26,7 @@ def robot_of(log: Log, name: str | None = None, catalogue: Catalogue = SHIPPED) 
         SettingsError: If the named robot is unknown.
     """
     names = robot_names(catalogue.folder)
-    if name is not None or log.robot in names:
+    if log.robot in names or name not in (None, log.robot):
         return replace(read_robot(name or log.robot, catalogue.folder), catalogue=catalogue)
     missing = [key for figure, key in NEEDED.items() if figure not in log.geometry]
     if missing:

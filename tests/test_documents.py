@@ -41,7 +41,7 @@ LOGS_PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
 LONGEST_README = 120
 """Lines: the README is read in one go; the rest is in docs/."""
 RUN_ELSEWHERE = ("extending.md", "logs.md", "own_robot.md")
-"""Their commands need what comes before them: test_extending.py, test_logs_page.py and test_own_robot.py run them."""
+"""Their commands need what comes before: test_extending.py, test_logs_page.py and test_own_robot.py run them."""
 COMMAND_LINES = sorted(
     {
         line.removeprefix("$ ")

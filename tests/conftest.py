@@ -62,6 +62,18 @@ def study_maker(parent: Path) -> MakeStudy:
 
 
 @pytest.fixture
+def write_file(tmp_path: Path) -> Callable[..., Path]:
+    """Write a text or bytes into a file of the test's folder."""
+
+    def write(content: str | bytes, name: str) -> Path:
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write
+
+
+@pytest.fixture
 def make_study(tmp_path: Path) -> MakeStudy:
     """Write a study's folder; call it again to edit the study.toml."""
     return study_maker(tmp_path)

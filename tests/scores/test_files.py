@@ -9,13 +9,8 @@ GOOD = "agent,episode,distance,time\nA,1,1.5,10\nA,2,2.5,20\nB,1,3,30\n"
 
 
 @pytest.fixture
-def csv(tmp_path):
-    def write(text, name="scores.csv"):
-        path = tmp_path / name
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return path
-
-    return write
+def csv(write_file):
+    return lambda content, name="scores.csv": write_file(content, name)
 
 
 def test_a_table_keeps_episodes_counts_and_means(csv):

@@ -3,11 +3,11 @@
 import argparse
 from pathlib import Path
 
-from rich.console import Console
 from rich.text import Text
 
 from proxytune.api.recording import Wanted, record_log
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.waiting import waiting
 from proxytune.errors import InputError
 from proxytune.logs import Log
 from proxytune.study.settings import read_study_settings
@@ -34,8 +34,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
     wanted = Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed)
-    with Console(stderr=True).status("driving") as status:
-        log = record_log(settings, arguments.model, arguments.output, wanted, status.update)
+    with waiting("driving") as tell:
+        log = record_log(settings, arguments.model, arguments.output, wanted, tell)
     return _answer(log, arguments)
 
 

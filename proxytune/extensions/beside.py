@@ -31,7 +31,7 @@ def import_beside(module: str, folder: Path) -> ModuleType:
     home = _home(str(folder.resolve()))
     if str(folder.resolve()) not in sys.path:
         sys.path.append(str(folder.resolve()))
-    name = f"{home}.{module}" if _lies_in(folder.resolve(), module) else module
+    name = f"{home}.{module}" if _lies_in(Path(sys.modules[home].__path__[0]), module) else module
     if name not in sys.modules:
         importlib.invalidate_caches()
     return importlib.import_module(name)
@@ -47,6 +47,14 @@ def open_folders(known: Sequence[str]) -> None:
     """Let this process import the modules of these folders by the names that they had in another."""
     for folder in known:
         _home(folder)
+
+
+def open_folder(folder: str, place: str) -> None:
+    """Let this process import a folder's modules by the names that they have there, though they lie elsewhere."""
+    name = _home(folder)
+    sys.modules[name].__path__ = [place]
+    if place not in sys.path:
+        sys.path.append(place)
 
 
 def _home(folder: str) -> str:

@@ -10,6 +10,15 @@ import pytest
 FAKES = Path(__file__).parent / "fakes"
 sys.path.append(str(FAKES))
 
+FUZZ = 1000
+"""How many files of each kind are spoilt in tests/fuzzing, if nobody says otherwise."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a nightly run spoil more files."""
+    parser.addoption("--fuzz", type=int, default=FUZZ, metavar="N", help=f"spoilt files of each kind [{FUZZ}]")
+
+
 STUDY = {
     "format": "1",
     "name": '"wobbly"',

@@ -162,10 +162,10 @@ def _finish(objective: Objective, beside: Path, piece: tuple[RunKey, Run | None]
 def read_runs(path: Path) -> dict[RunKey, Run]:
     """Read the finished runs from a file of JSON lines; a line left unfinished by an interruption is skipped."""
     runs = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+    for line in path.read_bytes().splitlines() if path.exists() else []:
         try:
             run = run_from(json.loads(line))
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             continue
         runs[run.key] = run
     return runs

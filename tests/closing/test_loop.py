@@ -135,6 +135,7 @@ def test_without_a_twin_the_righted_agent_is_named_but_not_shown(righting, close
     assert captions_of_episodes(folder) == []
 
 
+@pytest.mark.slow
 def test_kept_pictures_that_are_damaged_are_told_of_and_drawn_again_once_removed(righting, close, capsys):
     kept = righting[0] / "loop" / "righted"
     (kept / "before.png").unlink()
@@ -165,6 +166,7 @@ def test_another_log_does_only_what_comes_after_it_again(closed, closed_once, di
     assert (changed["verdict"], changed["prpv"]) == ("partly explained", closed_once[1]["prpv"])
 
 
+@pytest.mark.slow
 def test_another_model_tunes_again_and_the_way_back_drives_nothing(closed, closed_once, diagnosed, close):
     found = closed / "loop" / "diagnosed" / "model.toml"
     was = found.read_text()
@@ -194,6 +196,7 @@ def test_a_target_measured_of_another_twin_is_told_of(closed, capsys):
     assert "target.csv: was measured of another model" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_what_depends_on_the_users_own_modules_is_done_again_when_they_change(closed, diagnosed, close, capsys):
     (closed / "mine.py").write_text("GAIN = 1.0\n")
     assert main(["loop", str(closed)]) == 2

@@ -137,6 +137,7 @@ def test_trials_do_not_depend_on_it(finished, make_study):
     assert trials[0][:7] == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
     study = opened(finished, jobs=jobs, confirm=2)

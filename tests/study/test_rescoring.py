@@ -48,6 +48,7 @@ def test_every_trial_is_scored_as_a_study_of_these_metrics_would_have(finished, 
     assert again.best.assessment.prpv.value == again.best.trial.prpv
 
 
+@pytest.mark.slow
 def test_a_metric_may_be_taken_out_or_turned_round(finished):
     assert scores(found(finished, OWN[:1])) != scores(found(finished, OWN))
     turned = (Metric.parse("distance:min"), Metric.parse("survival_time:min"))

@@ -105,10 +105,18 @@ def counted_means(table: ScoreTable, counts: NDArray[np.int64]) -> Array:
     return np.asarray(np.swapaxes(sums / counts.sum(axis=-1)[..., None], 0, 1), dtype=np.float64)
 
 
-def in_blocks(measure: Callable[[Array, Array], Array], proxy: Array, target: Array) -> Array:
-    """Apply a measure of pairs of agents to many tables without holding all pairs of all tables at once."""
-    agents = proxy.shape[-2]
-    size = max(1, BLOCK // agents**2)
+def in_blocks(
+    measure: Callable[[Array, Array], Array], proxy: Array, target: Array, *, numbers: int | None = None
+) -> Array:
+    """Apply a measure to many tables without holding at once all that it takes.
+
+    Args:
+        measure: Of mean scores in the proxy and on the target, shape (…, agents, metrics).
+        proxy: Mean scores in the proxy, shape (tables, agents, metrics).
+        target: Mean scores on the target, same shape.
+        numbers: How many numbers the measure holds of one table; by default one for each pair of agents.
+    """
+    size = max(1, BLOCK // (numbers or proxy.shape[-2] ** 2))
     starts = range(0, len(proxy), size)
     return np.concatenate([measure(proxy[start : start + size], target[start : start + size]) for start in starts])
 

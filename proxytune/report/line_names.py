@@ -34,7 +34,7 @@ def name_lines(axes: Axes, names: Sequence[LineName], apart: float = ONE_LINE) -
 
 
 def spread(places: Sequence[float], apart: float) -> list[float]:
-    """Places moved as little as it takes to be so far apart, in the same order, not below 0."""
+    """Places moved as little as it takes to be so far apart, in the same order, from 0 to 1 where they fit there."""
     order = sorted(range(len(places)), key=lambda row: places[row])
     moved = np.array([places[row] for row in order])
     steps = apart * np.arange(len(moved))
@@ -45,5 +45,6 @@ def spread(places: Sequence[float], apart: float) -> list[float]:
         while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
             last = pools.pop()
             pools[-1] += last
-    found = np.concatenate([np.full(len(pool), max(0.0, float(np.mean(pool)))) for pool in pools]) + steps
+    most = max(0.0, 1.0 - apart * (len(moved) - 1))
+    found = np.concatenate([np.full(len(pool), np.clip(np.mean(pool), 0.0, most)) for pool in pools]) + steps
     return [float(found[order.index(row)]) for row in range(len(places))]

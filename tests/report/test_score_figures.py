@@ -34,7 +34,7 @@ def test_the_scatter_has_a_panel_per_metric_with_every_agent_named(assessment):
         assert sorted(text.get_text() for text in axes.texts) == sorted(assessment.inputs.agents)
 
 
-@pytest.mark.parametrize("agents", [6, 30])
+@pytest.mark.parametrize("agents", [6, MOST])
 def test_no_two_names_overlap_and_none_is_cut_at_85_millimetres(agents):
     values = np.round(np.random.default_rng(1).normal(size=(agents, 3, 2)), 1)
     values[: agents // 2] = 1.0
@@ -91,6 +91,18 @@ def test_the_map_colours_each_pair_once_and_counts_them(assessment):
     assert sum(drawn.values()) == 15
     assert np.isnan(cells[np.triu_indices(6)]).all()
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"{k}: {n}" for k, n in drawn.items()]
+
+
+def test_pairs_of_more_agents_than_can_be_named_are_a_picture_over_ranks_of_the_same_width():
+    found = assess(proxy=table(4, agents=300), target=table(5, agents=300), metrics=M, resamples=2)
+    few, many = (flipped_pairs(one.prpv) for one in (assess(proxy=table(4), target=table(5), metrics=M), found))
+    assert few.get_figwidth() == many.get_figwidth()
+    assert few.get_figwidth() * 25.4 == pytest.approx(85.0)
+    (picture,) = many.axes[0].images
+    reversed_ = list(FLIP_COLOURS).index("reversed")
+    assert (picture.get_array() == reversed_).sum() == sum(pair.flip == "reversed" for pair in found.prpv.pairs) > 0
+    many.draw_without_rendering()
+    assert not any("A" in label.get_text() for label in many.axes[0].get_yticklabels())
 
 
 def test_constant_scores_and_two_agents_are_drawn_too(tmp_path):

@@ -14,14 +14,13 @@ from proxytune.usefulness import Assessment, Comparison, Prpv
 
 PANEL = 2.2
 """Height of a metric's panel, where names do not need more [inch]."""
-MOST = 30
-"""Agents that are named: with more, those whose rank in the proxy is farthest from that on the target."""
+MOST = 28
+"""Agents that can be named at 85 mm. Of more, the scatter names those whose rank in the proxy is farthest from that on
+the target, and pairs are drawn over ranks on the target."""
 LINE = 0.1
 """Height of a name [inch]."""
 LONGEST = 24
 """Characters of a name; of a longer one its end is shown, which tells agents of one module apart."""
-CELL, BESIDE = 0.105, 0.95
-"""Width of a pair of agents, and of the names beside the pairs [inch]."""
 FLIP_COLOURS = {"same": LIGHT_GREY, "lost": BLUE, "invented": ORANGE, "reversed": VERMILLION}
 
 
@@ -52,15 +51,26 @@ def flipped_pairs(prpv: Prpv) -> Figure:
     for pair in prpv.pairs:
         high, low = sorted((place[pair.better], place[pair.worse]))
         cells[low, high] = kinds.index(pair.flip)
-    side = max(COLUMN, CELL * len(order) + BESIDE)
-    figure = Figure(figsize=(side, side), layout="constrained")
+    figure = Figure(figsize=(COLUMN, COLUMN), layout="constrained")
     axes = figure.subplots()
-    colours = ListedColormap(list(FLIP_COLOURS.values()))
-    axes.pcolormesh(cells, cmap=colours, vmin=-0.5, vmax=len(kinds) - 0.5, edgecolor="white", linewidth=1.0)
+    _draw_pairs(axes, cells, named=len(order) <= MOST)
     _name_agents(axes, [_short(agent) for agent in order])
     axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=8)
     axes.legend(handles=_legend(prpv), loc="upper right", fontsize=7, frameon=False)
     return figure
+
+
+def _draw_pairs(axes: Axes, cells: Array, *, named: bool) -> None:
+    """Squares with gaps between them, or a picture where there are more than can be named."""
+    colours, ends = ListedColormap(list(FLIP_COLOURS.values())), (-0.5, len(FLIP_COLOURS) - 0.5)
+    if named:
+        axes.pcolormesh(cells, cmap=colours, vmin=ends[0], vmax=ends[1], edgecolor="white", linewidth=0.8)
+        return
+    # Colours are mixed where squares are smaller than a pixel: none is lost.
+    axes.imshow(
+        cells, cmap=colours, vmin=ends[0], vmax=ends[1], extent=(0, len(cells), 0, len(cells)), origin="lower",
+        interpolation="antialiased", interpolation_stage="rgba",
+    )  # fmt: skip
 
 
 def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
@@ -119,12 +129,14 @@ def _target_order(inputs: Comparison) -> list[str]:
 
 
 def _name_agents(axes: Axes, order: list[str]) -> None:
-    ticks = np.arange(len(order)) + 0.5
-    axes.set_xticks(ticks[:-1], order[:-1], rotation=90, fontsize=6)
-    axes.set_yticks(ticks[1:], order[1:], fontsize=6)
+    """Names beside the pairs, or ranks on the target where they are too many."""
+    if len(order) <= MOST:
+        ticks = np.arange(len(order)) + 0.5
+        axes.set_xticks(ticks[:-1], order[:-1], rotation=90, fontsize=6)
+        axes.set_yticks(ticks[1:], order[1:], fontsize=6)
     axes.invert_yaxis()
     axes.set_aspect("equal")
-    axes.tick_params(length=0)
+    axes.tick_params(length=0, labelsize=6)
     axes.spines[:].set_visible(False)
     axes.set_xlabel("agent (best on the target first)", fontsize=8)
     axes.set_ylabel("agent", fontsize=8)

@@ -17,7 +17,8 @@ SCATTER = (
 )
 FLIPPED = (
     "A square is a pair of agents, in the target's order, best first. Grey pairs are ranked as on the target; coloured "
-    "ones are what PRPV counts: reversed, lost (a tie in the proxy alone) or invented (a tie on the target alone)."
+    "ones are what PRPV counts: reversed, lost (a tie in the proxy alone) or invented (a tie on the target alone). "
+    f"Of more than {MOST} agents the axes are ranks on the target."
 )
 SAID = {
     "scatter": ("Scores in the proxy and on the target", SCATTER),

@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     with Store.read(opened.settings.folder) as store:
         result, curves = _read(StudyRun(as_stored(opened, store), store), metrics)
     folder = _folder(opened.settings.folder, metrics)
-    figures = draw_curves(curves, folder / "figures")
+    figures = draw_curves(curves, folder / "figures", opened.truth)
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())

@@ -74,7 +74,7 @@ def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_cha
     folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
     model.write_text("trim = 0.1\ndelay = 0.12\n")
     before = swept_against(folder, model, capsys, "all")
-    assert {"sweep_trim_delay=0.12_pod.png", "sweep_delay_trim=0.1_pod.png"} < before.keys()
+    assert {"sweep_trim_4e3f5b_pod.png", "sweep_delay_4e3f5b_pod.png"} < before.keys()
     model.unlink()
     monkeypatch.setattr("wobbly.Wobbly.identity", "code of another day")
     assert drawn_again(folder, capsys) == before

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from proxytune.domain import Episode
 from proxytune.errors import EpisodeError
-from proxytune.running.episodes import running
+from proxytune.running.episodes import Watch, running
 from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
@@ -29,7 +29,8 @@ def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, r
     watcher.begin(f"measuring {model.name}", 0)
     metrics = {}
     needed = needed_metrics(settings, family)
-    with running(family, longest_first(list(labels), {}), settings.jobs, needed=needed) as outcomes:
+    watch = Watch(settings.episode_timeout_s)
+    with running(family, longest_first(list(labels), {}), settings.jobs, needed=needed, watch=watch) as outcomes:
         for outcome in outcomes:
             if outcome.metrics is None:
                 raise EpisodeError(failure_of(outcome))

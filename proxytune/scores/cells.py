@@ -9,7 +9,7 @@ from pathlib import Path
 
 from proxytune.errors import ScoresError
 from proxytune.scores.table import LARGEST
-from proxytune.settings import nearest
+from proxytune.settings import nearest, read_text
 
 LABELS = ("agent", "episode", "domain")
 SEPARATORS = (",", ";", "\t")
@@ -39,14 +39,13 @@ class Cells:
         """The number in a cell.
 
         Raises:
-            ScoresError: If it is none, or not finite.
+            ScoresError: If it is none, or its square would not be.
         """
-        try:
-            value = float(cell.replace(self.decimal, "."))
-        except ValueError:
-            value = math.nan
-        if not abs(value) < LARGEST:
-            raise ScoresError(f"{self.path}: line {line}, column '{column}': must be a finite number, got {cell!r}")
+        value = _number(cell.replace(self.decimal, "."))
+        if value and not 1.0 / LARGEST < abs(value) < LARGEST:
+            remedy = "; give it in another unit" if math.isfinite(value) else ""
+            problem = f"must be a finite number, got {cell!r}{remedy}"
+            raise ScoresError(f"{self.path}: line {line}, column '{column}': {problem}")
         return value
 
 
@@ -75,6 +74,14 @@ def read_cells(path: Path, metrics: Sequence[str], columns: Columns | None = Non
     return Cells(path, lines[0][1], header, rows, _decimal(path, rows, metrics) if separator != "," else ".")
 
 
+def _number(text: str) -> float:
+    """A number as tables have it; NaN for what is none, be it one to Python, as 1_000 is."""
+    try:
+        return float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        return math.nan
+
+
 def column_names(path: Path) -> list[str]:
     """The columns of a file, as its first line names them.
 
@@ -87,7 +94,7 @@ def column_names(path: Path) -> list[str]:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return read_text(path, "utf-8-sig")
     except FileNotFoundError:
         raise ScoresError(f"{path}: no such file; check the path") from None
     except OSError as problem:

@@ -12,7 +12,7 @@ import numpy as np
 from proxytune.errors import ScoresError
 from proxytune.scores.metric import Array
 from proxytune.scores.table import LARGEST
-from proxytune.settings import nearest
+from proxytune.settings import nearest, read_text
 
 LABELS = ("agent", "episode", "domain")
 SEPARATORS = (",", ";", "\t")
@@ -59,14 +59,16 @@ class Cells:
         """The numbers of these columns, shape (rows, columns).
 
         Raises:
-            ScoresError: If one is none, or not finite.
+            ScoresError: If one is none, or its square would not be.
         """
         values = np.empty((len(self.lines), len(columns)))
         for place, name in enumerate(columns):
             values[:, place] = [_number(cell.replace(self.decimal, ".")) for cell in self.cells[name]]
-        for row, place in np.argwhere(~(np.abs(values) < LARGEST)):
+        size = np.abs(values)
+        for row, place in np.argwhere(~((size == 0.0) | ((size > 1.0 / LARGEST) & (size < LARGEST)))):
             where, cell = f"line {self.lines[row]}, column '{columns[place]}'", self.cells[columns[place]][row]
-            raise ScoresError(f"{self.path}: {where}: must be a finite number, got {cell!r}")
+            remedy = "; give it in another unit" if math.isfinite(values[row, place]) else ""
+            raise ScoresError(f"{self.path}: {where}: must be a finite number, got {cell!r}{remedy}")
         return values
 
 
@@ -92,6 +94,14 @@ def read_cells(path: Path, metrics: Sequence[str], columns: Columns | None = Non
     return found if separator == "," else replace(found, decimal=_decimal(found, metrics))
 
 
+def _number(text: str) -> float:
+    """A number as tables have it; NaN for what is none, be it one to Python, as 1_000 is."""
+    try:
+        return float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        return math.nan
+
+
 def column_names(path: Path) -> list[str]:
     """The columns of a file, as its first line names them.
 
@@ -104,7 +114,7 @@ def column_names(path: Path) -> list[str]:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return read_text(path, "utf-8-sig")
     except FileNotFoundError:
         raise ScoresError(f"{path}: no such file; check the path") from None
     except OSError as problem:
@@ -155,14 +165,6 @@ def _columns(
         for name, place in places.items():
             cells[name].append(row[place].strip())
     return lines, cells
-
-
-def _number(text: str) -> float:
-    """The number that a text states; NaN if none."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
 
 
 def _no_csv(path: Path) -> ScoresError:

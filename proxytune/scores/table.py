@@ -12,7 +12,7 @@ from proxytune.errors import ScoresError
 from proxytune.scores.metric import Array
 from proxytune.settings import nearest
 
-LARGEST = 1e100
+LARGEST = 1e70
 """A score beyond this is no measurement, and its square would overflow."""
 
 

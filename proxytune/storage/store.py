@@ -12,6 +12,7 @@ from proxytune.errors import InputError
 from proxytune.space import Theta
 from proxytune.storage.database import connect, disconnect, sqlite_errors_as_store_errors
 from proxytune.storage.records import SweepRecord, TrialRecord, episode_of, outcome_of, trial_of
+from proxytune.storage.under_way import UnderWay
 
 FILE_NAME = "study.db"
 OF_EARLIER = "instance IN (SELECT id FROM instances WHERE identity = :earlier)"
@@ -162,6 +163,10 @@ class Store:
             outcomes = [outcome_of(*row) for row in rows]
             self._outcomes[key] = {outcome.episode: outcome for outcome in outcomes}
         return self._outcomes[key]
+
+    def under_way(self, identity: str) -> UnderWay:
+        """Which episode runs of the domain family with this identity."""
+        return UnderWay(self.path, self._connection, identity)
 
     def failed_in_other_code(self, identity: str, code: str) -> set[Episode]:
         """The episodes that failed in other code than this; those of which the code is not known are left out."""

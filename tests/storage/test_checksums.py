@@ -84,7 +84,7 @@ def test_damage_is_told_with_what_is_lost_and_what_to_do(tmp_path, damage, writa
         "UPDATE trials SET score = 'abc' WHERE number = 2",
         "UPDATE trials SET failed_episodes = 'many' WHERE number = 2",
         "UPDATE instances SET theta = '[1]' WHERE id = 2",
-        'UPDATE instances SET theta = \'{"trim": "x"}\'',
+        'UPDATE instances SET theta = \'{"trim": "x"}\' WHERE id = 2',
         "UPDATE episodes SET metrics = '{\"distance\": null}' WHERE start = 2",
         "UPDATE episodes SET metrics = '" + "[" * 3000 + "' WHERE start = 2",
         "UPDATE sweeps SET points = '7'",

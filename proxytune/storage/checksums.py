@@ -64,6 +64,11 @@ def checksum(*values: Any) -> int:
     return zlib.crc32(repr(_as_bytes(values)).encode())
 
 
+def link(before: str, row: tuple[Any, ...]) -> str:
+    """The digest of a trial, of its values as LINKED has them, after the trial with another digest."""
+    return hashlib.sha256(repr((before, *_as_bytes(row))).encode()).hexdigest()[:16]
+
+
 def prepare(connection: sqlite3.Connection) -> None:
     """Let SQL compute checksums."""
     connection.create_function("row_checksum", -1, checksum, deterministic=True)
@@ -88,7 +93,7 @@ def chain(connection: sqlite3.Connection, objective: str, first: int = 1) -> Non
     ).fetchone()
     digest = before[0] if before else ""
     for row in _trials(connection, objective, first):
-        digest = _link(digest, row)
+        digest = link(digest, row)
         values = (digest, objective, row[0])
         connection.execute("UPDATE trials SET digest = ? WHERE objective = ? AND number = ?", values)
     (count,) = connection.execute("SELECT count(*) FROM trials WHERE objective = ?", (objective,)).fetchone()
@@ -130,10 +135,10 @@ def _first_broken(connection: sqlite3.Connection, objective: bytes, count: int, 
     """The number of the first trial from which on the chain does not hold; None if it holds."""
     digest, number, whole = "", 0, 0
     for row in _trials(connection, objective.decode(errors="replace"), 1, "digest"):
-        link = _link(digest, row[:-1])
-        if row[-1] != link.encode():
+        expected = link(digest, row[:-1])
+        if row[-1] != expected.encode():
             return number + 1
-        digest, number, whole = link, row[0], whole + 1
+        digest, number, whole = expected, row[0], whole + 1
     return None if (whole, digest.encode()) == (count, end) else number + 1
 
 
@@ -141,10 +146,6 @@ def _trials(connection: sqlite3.Connection, objective: str, first: int, *more: s
     columns = ", ".join([LINKED, *more])
     query = f"SELECT {columns} FROM trials WHERE objective = ? AND number >= ? ORDER BY number"
     return connection.execute(query, (objective, first)).fetchall()
-
-
-def _link(before: str, row: tuple[Any, ...]) -> str:
-    return hashlib.sha256(repr((before, *_as_bytes(row))).encode()).hexdigest()[:16]
 
 
 def _as_bytes(values: tuple[Any, ...]) -> tuple[Any, ...]:

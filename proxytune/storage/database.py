@@ -47,6 +47,15 @@ def open_file(path: Path, *, writable: bool) -> sqlite3.Connection:
     return connection
 
 
+def check_whole(path: Path) -> None:
+    """Refuse a study's database of which anything is damaged.
+
+    Raises:
+        StoreError: If it is.
+    """
+    connect(path, writable=False).close()
+
+
 def disconnect(connection: sqlite3.Connection) -> None:
     """Close a database, leaving the one file if nobody else has it open."""
     with suppress(sqlite3.Error):
@@ -94,13 +103,19 @@ def _in_present_format(connection: sqlite3.Connection, writable: bool) -> sqlite
     if version_of(connection) == FORMAT:
         return connection
     if not writable:
-        copy = sqlite3.connect(":memory:", isolation_level=None)
-        connection.backup(copy)
-        prepare(copy)
-        connection.close()
-        connection = copy
+        return copy_of_earlier(connection)
     convert(connection)
     return connection
+
+
+def copy_of_earlier(connection: sqlite3.Connection) -> sqlite3.Connection:
+    """A copy in memory of a database of an earlier format, in the present one; the database is closed."""
+    copy = sqlite3.connect(":memory:", isolation_level=None)
+    connection.backup(copy)
+    connection.close()
+    prepare(copy)
+    convert(copy)
+    return copy
 
 
 def check_tables(connection: sqlite3.Connection, path: Path) -> None:
@@ -151,6 +166,25 @@ def sqlite_errors_as_store_errors(path: Path) -> Iterator[None]:
         yield
     except sqlite3.Error as problem:
         raise _explained(path, problem) from problem
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.Connection]:
+    """Have all that is written meanwhile be there at once, or nothing of it.
+
+    Raises:
+        StoreError: In place of any sqlite3.Error.
+    """
+    with sqlite_errors_as_store_errors(path):
+        connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield connection
+            connection.execute("COMMIT")
+        except BaseException:
+            # A full disk may have rolled back already.
+            with suppress(sqlite3.Error):
+                connection.execute("ROLLBACK")
+            raise
 
 
 def _explained(path: Path, problem: sqlite3.Error) -> StoreError:

@@ -3,7 +3,7 @@
 import json
 import sqlite3
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,7 +11,7 @@ from proxytune.domain import Episode, Outcome
 from proxytune.errors import InputError
 from proxytune.space import Theta
 from proxytune.storage.checksums import chain, seal
-from proxytune.storage.database import connect, disconnect, not_ours, sqlite_errors_as_store_errors
+from proxytune.storage.database import connect, disconnect, not_ours, sqlite_errors_as_store_errors, transaction
 from proxytune.storage.records import (
     SweepRecord,
     TrialRecord,
@@ -135,6 +135,13 @@ class Store:
         if objective in self._trials:
             self._trials[objective] |= {trial.number: trial for trial in trials}
 
+    def drop_trials(self, objective: str, first: int) -> None:
+        """Forget the trials of a search from one on; episodes are kept."""
+        with self._transaction() as connection:
+            connection.execute("DELETE FROM trials WHERE objective = ? AND number >= ?", (objective, first))
+            chain(connection, objective, first)
+        self._trials.pop(objective, None)
+
     def save_outcome(self, identity: str, outcome: Outcome, code: str | None = None) -> None:
         """Write an episode, over an earlier failure of the same; of a failure, the code that failed too."""
         episode = outcome.episode
@@ -234,15 +241,5 @@ class Store:
         with sqlite_errors_as_store_errors(self.path):
             return self._connection.execute(query, values).fetchall()
 
-    @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        with sqlite_errors_as_store_errors(self.path):
-            self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._connection
-                self._connection.execute("COMMIT")
-            except BaseException:
-                # A full disk may have rolled back already.
-                with suppress(sqlite3.Error):
-                    self._connection.execute("ROLLBACK")
-                raise
+    def _transaction(self) -> AbstractContextManager[sqlite3.Connection]:
+        return transaction(self._connection, self.path)

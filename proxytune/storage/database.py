@@ -22,6 +22,9 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
     refuse_links(path.parent)
     if path.is_dir():
         raise StoreError(f"{path}: is a folder, not a study's database; move it away")
+    if path.exists() and not path.is_file():
+        # Opening a pipe would wait for ever.
+        raise StoreError(f"{path}: is no file, so no study's database; move it away")
     with sqlite_errors_as_store_errors(path):
         connection = open_file(path, writable=writable)
         try:

@@ -11,7 +11,7 @@ NAMES = ("study.lock", "study.db", "figures", "loop", "rescored", "teaching")
 
 
 def refuse_links(folder: Path) -> None:
-    """Refuse a study in which a symbolic link has the name of something that running it writes to.
+    """Refuse a study in which a symbolic link is in the place of something that running it writes to or into.
 
     Raises:
         StoreError: If there is one.
@@ -19,6 +19,9 @@ def refuse_links(folder: Path) -> None:
     for name in NAMES:
         if (folder / name).is_symlink():
             raise _link(folder / name)
+        for here, folders, _ in os.walk(folder / name):
+            for link in (Path(here, one) for one in folders if Path(here, one).is_symlink()):
+                raise _link(link)
 
 
 def open_own(path: Path) -> int:

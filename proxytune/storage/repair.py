@@ -69,7 +69,8 @@ def _rebuild(path: Path) -> Salvage:
     whole = dict(_whole(rows))
     draft = path.with_name(f".{path.name}.draft")
     try:
-        draft.unlink(missing_ok=True)
+        for left in (draft, draft.with_name(f"{draft.name}-journal")):
+            left.unlink(missing_ok=True)
         _write(draft, whole)
         aside = _set_aside(path)
         draft.replace(path)

@@ -36,24 +36,28 @@ def _lacks(run: StudyRun, trial: TrialRecord) -> str:
     if set(trial.theta) != set(run.settings.space.names):
         return "has other parameters than the study"
     planned = run.episodes_of(trial)
-    missing = len(planned) - len(run.known(planned))
+    known = run.store.outcomes(run.study.identity, trial.theta)
+    missing = sum(episode not in known for episode in planned)
     return f"lacks {missing} of its {len(planned)} episodes" if missing else ""
 
 
 def _scored_otherwise(run: StudyRun, objective: str, trial: TrialRecord) -> str:
     """How a trial's scores differ from what its episodes give; nothing where failures were tried again since."""
-    known = run.known(run.episodes_of(trial)).values()
-    if sum(outcome.metrics is None for outcome in known) != trial.failed_episodes or trial.state == "failed":
+    if trial.state == "failed" or _failed_now(run, trial) != trial.failed_episodes:
         return ""
     if trial.state == "cut":
-        return _differ("its bound of PRPV", trial.bound, by_other_metrics(run, trial).bound)
+        return _differ("a bound of PRPV of", trial.bound, by_other_metrics(run, trial).bound)
     measures = run.evaluation_of(trial).measures
-    score = KEPT[objective].sign * (measures.get(objective) or 0.0) if objective in KEPT else trial.score
-    pairs = [
-        (KEPT[name].label, trial.measures.get(name), measures.get(name)) for name in KEPT if name in trial.measures
-    ]
-    told = (_differ(*pair) for pair in (*pairs, ("its score", trial.score, score)))
-    return next(filter(None, told), "")
+    score = trial.score
+    if objective in KEPT and measures.get(objective) is not None:
+        score = KEPT[objective].sign * float(measures[objective] or 0.0)
+    pairs = [(KEPT[name].label, trial.measures.get(name), measures.get(name)) for name in KEPT]
+    compared = (_differ(*pair) for pair in (*pairs, ("the score", trial.score, score)))
+    return next(filter(None, compared), "")
+
+
+def _failed_now(run: StudyRun, trial: TrialRecord) -> int:
+    return sum(outcome.metrics is None for outcome in run.known(run.episodes_of(trial)).values())
 
 
 def _differ(name: str, stored: float | None, computed: float | None) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from proxytune.errors import RunError, SettingsError
+from proxytune.errors import RunError, SettingsError, StoreError
 from proxytune.search.loop import Propose, Search
 from proxytune.search.proposer import Proposer, Trial
 from proxytune.storage.records import State, TrialRecord
@@ -177,6 +177,8 @@ def as_stored(study: Study, store: Store) -> Study:
 def _facts_before(study: Study, store: Store) -> dict[str, Any]:
     """The facts stored with the trials; databases older than cut_off lack that key."""
     before = {key: value for key, value in store.facts().items() if key not in OTHERS}
+    if not isinstance(before.get("versions", {}), dict):
+        raise StoreError(f"{store.path}: 'versions' is not as proxytune writes it; restore a copy, or move it away")
     return {"cut_off": study.settings.cut_off, **before} if before else {}
 
 

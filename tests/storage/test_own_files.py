@@ -65,3 +65,18 @@ def test_a_link_in_place_of_the_log_of_writes_is_not_followed(study, tmp_path):
     with pytest.raises(StoreError), Store.open(study) as store:
         store.begin({"seed": 1})
     assert (tmp_path / "precious").read_text() == "mine"
+
+
+@pytest.mark.parametrize("place", ["rescored/distance", "loop/extended", "figures/more"])
+def test_a_link_within_what_a_study_makes_is_refused(study, tmp_path, place):
+    (study / place).parent.mkdir()
+    (study / place).symlink_to(tmp_path)
+    with pytest.raises(StoreError, match=f"{place}: is a symbolic link"), Store.open(study):
+        pass
+
+
+def test_a_pipe_in_place_of_the_database_is_refused_and_not_waited_for(study):
+    os.mkfifo(study / "study.db")
+    for opening in (Store.open, Store.read):
+        with pytest.raises(StoreError, match="is no file"), opening(study):
+            pass

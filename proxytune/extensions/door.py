@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from proxytune.errors import ExtensionError, ProxytuneError
 from proxytune.extensions.beside import import_beside
 from proxytune.extensions.plugins import plugins
+from proxytune.extensions.trust import check_permitted
 from proxytune.settings import nearest
 
 NOT_USERS = (
@@ -41,7 +42,7 @@ def load(
         shipped: What proxytune itself has of this kind, by name.
 
     Raises:
-        ExtensionError: If there is no such thing, importing it fails, or it lacks a member.
+        ExtensionError: If there is no such thing, it may not be run, importing it fails, or it lacks a member.
     """
     if ":" in name:
         found = _attribute(name, kind, beside)
@@ -145,6 +146,7 @@ def _attribute(name: str, kind: str, beside: Path | None) -> Any:
 
 
 def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleType:
+    check_permitted(module, beside or Path.cwd())
     try:
         return importlib.import_module(module) if beside is None else import_beside(module, beside)
     except (ProxytuneError, KeyboardInterrupt):

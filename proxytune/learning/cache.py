@@ -71,6 +71,8 @@ def _write(path: Path, arrays: Arrays) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         with draft.open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **arrays)
+            file.flush()
+            os.fsync(file.fileno())
         draft.replace(path)
     except OSError as problem:
         raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None

@@ -125,7 +125,10 @@ def write_scores(table: ScoreTable, path: Path) -> None:
                 writer.writerow([agent, episode, *(repr(float(value)) for value in table.values[row, column])])
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        draft.write_text(text.getvalue(), encoding="utf-8", newline="")
+        with draft.open("w", encoding="utf-8", newline="") as file:
+            file.write(text.getvalue())
+            file.flush()
+            os.fsync(file.fileno())
         draft.replace(path)
     except BaseException as problem:
         with contextlib.suppress(OSError):

@@ -100,7 +100,9 @@ def test_a_sweep_of_an_older_format_is_drawn_without_pod(make_study, capsys):
             "CREATE TABLE old AS SELECT parameter, base, points, identity FROM sweeps; DROP TABLE sweeps;"
             " ALTER TABLE old RENAME TO sweeps; DROP TABLE trials; CREATE TABLE trials (number INTEGER PRIMARY KEY,"
             " instance INTEGER, state TEXT, prpv REAL, ppv REAL, failed_episodes INTEGER, failure TEXT);"
-            " ALTER TABLE episodes DROP COLUMN code; PRAGMA user_version = 1;"
+            " ALTER TABLE episodes DROP COLUMN code; ALTER TABLE episodes DROP COLUMN checksum; DROP TABLE chains;"
+            " ALTER TABLE facts DROP COLUMN checksum; ALTER TABLE instances DROP COLUMN checksum;"
+            " PRAGMA user_version = 1;"
         )
     capsys.readouterr()
     assert drawn_again(folder, capsys) == before

@@ -41,7 +41,7 @@ LOGS_PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
 LONGEST_README = 120
 """Lines: the README is read in one go; the rest is in docs/."""
 RUN_ELSEWHERE = ("extending.md", "logs.md", "own_robot.md")
-"""Their commands need what comes before: test_extending.py, test_logs_page.py and test_own_robot.py run them."""
+"""Their commands need what comes before them; tests of their own run them."""
 COMMAND_LINES = sorted(
     {
         line.removeprefix("$ ")
@@ -69,9 +69,10 @@ def test_every_command_is_documented(command):
 def test_every_option_is_documented(command, option):
     row = next(line for line in COMMANDS_PAGE.splitlines() if line.startswith(f"| `{command}"))
     of_a_source = "what `import` reads, with its options" in row and f"`{option}" in LOGS_PAGE
-    assert f"`{option}" in row or of_a_source or option in ("--json", "--format")
+    assert f"`{option}" in row or of_a_source or option in ("--json", "--format", "--trust")
     assert "`--json`" in COMMANDS_PAGE
     assert "`--format svg,pdf`" in COMMANDS_PAGE
+    assert "`--trust`" in COMMANDS_PAGE
 
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)

@@ -30,13 +30,14 @@ from proxytune.study.history import history_of
 from proxytune.study.knowledge import goal_of
 from proxytune.study.provenance import note_search
 from proxytune.study.result import Best, StudyResult, result_of
-from proxytune.study.run import as_stored, check_facts
+from proxytune.study.run import check_facts, stored_run
 from proxytune.study.run import run_study as run_trials
-from proxytune.study.settings import LEARNING, StudySettings
+from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
 from proxytune.study.spending import with_spending
 from proxytune.study.stages import confirmation, preflight, retrying
 from proxytune.study.study import Study, open_study
 from proxytune.study.study_run import StudyRun
+from proxytune.study.without_code import open_to_look
 
 FIGURES: Mapping[str, Callable[[StudyResult], Figure]] = {
     "convergence": convergence,
@@ -205,9 +206,9 @@ def read_study(path: str | Path) -> StudyReport:
         InputError: If the study has not been run, or was changed since.
         RunError: If no trial has a score yet.
     """
-    opened = open_study(Path(path))
-    with Store.read(opened.settings.folder) as store:
-        return StudyReport(result_of(StudyRun(as_stored(opened, store), store)), Spent())
+    settings = read_study_settings(Path(path))
+    with Store.read(settings.folder) as store:
+        return StudyReport(result_of(stored_run(open_to_look(settings, store), store)), Spent())
 
 
 def most_episodes(settings: StudySettings) -> int:

@@ -23,6 +23,7 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "drive my_study --agent steady",
         "drive my_study --agent daredevil --theta best --against twin.toml --output daredevil.gif",
     ),
+    "repair": ("repair my_study", "repair my_study --json"),
     "loop": (
         "loop my_study --log drive.bag",
         "loop my_study --twin twin.toml",

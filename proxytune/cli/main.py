@@ -1,129 +1,19 @@
 """The entry point: finds the command, prints its answer, and turns our exceptions into one line and an exit status."""
 
 import argparse
-import importlib
-import json
-import os
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from types import ModuleType
-from typing import NamedTuple
-
-from rich.console import Console
 
 import proxytune
+from proxytune.cli.commands import COMMANDS
 from proxytune.cli.examples import epilog
-from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
-from proxytune.errors import InputError, ProxytuneError, RunError
-
-
-class Command(NamedTuple):
-    """A command: its module, loaded only when it is asked for, and its line in the help.
-
-    Attributes:
-        module: Its name in this room.
-        summary: One line for people.
-        resumes: Whether it continues where it was interrupted.
-        kept: What an interruption leaves, in one phrase; everything finished, or nothing, where it does not say.
-        draws: Whether it writes figures.
-    """
-
-    module: str
-    summary: str
-    resumes: bool = False
-    kept: str = ""
-    draws: bool = False
-
-    @property
-    def left(self) -> str:
-        """What an interruption leaves, and what the same command does then."""
-        kept = self.kept or ("everything finished is kept" if self.resumes else "nothing was written")
-        return f"{kept}; run the same command to {'continue' if self.resumes else 'start again'}"
-
-    def load(self) -> ModuleType:
-        """The module."""
-        return importlib.import_module(f"proxytune.cli.{self.module}")
-
-
-COMMANDS: dict[str, Command] = {
-    "study": Command(
-        "study",
-        "run or resume a study: find the θ that makes the simulator most useful",
-        resumes=True,
-        kept="every finished trial and episode is kept",
-        draws=True,
-    ),
-    "score": Command(
-        "score",
-        "measure how useful a simulator is, from two tables of scores",
-        kept="of the output only whole files were written",
-        draws=True,
-    ),
-    "sweep": Command(
-        "sweep",
-        "measure usefulness along one parameter",
-        resumes=True,
-        kept="every finished episode is kept",
-        draws=True,
-    ),
-    "teach": Command(
-        "teach",
-        "measure PLV (proxy learning value): how much a simulator saves in training",
-        resumes=True,
-        kept="every finished point of a learning curve is kept",
-        draws=True,
-    ),
-    "drive": Command(
-        "drive",
-        "show an episode, the proxy beside the target: metrics, a picture or an animation",
-        kept="the picture is the old one or none",
-    ),
-    "import": Command("importing", "make a log of a ROS bag, a CSV, a TUM trajectory or arrays, and say what is in it"),
-    "measure": Command("measure", "drive a study's agents in the domain of a model file and write their scores"),
-    "record": Command(
-        "record",
-        "drive the domain of a model file through manoeuvres and write the log",
-        kept="no log was written, at most some of its pictures",
-    ),
-    "diagnose": Command(
-        "diagnose",
-        "find the effect that the model lacks, from a log of measured drives",
-        kept="findings are written last, each file whole or not at all",
-        draws=True,
-    ),
-    "loop": Command(
-        "loop",
-        "tune, diagnose, extend, tune again: before and after on one page",
-        resumes=True,
-        kept="every finished step, trial and episode is kept",
-        draws=True,
-    ),
-    "predict": Command(
-        "predict",
-        "predict the poses of a log with a fitted model",
-        kept="no table was written, at most some of the pictures",
-    ),
-    "compare": Command(
-        "compare",
-        "compare how fast each search engine finds a good θ",
-        resumes=True,
-        kept="every finished run and episode is kept",
-        draws=True,
-    ),
-    "plot": Command(
-        "plot",
-        "draw a study's figures and report again, without simulating",
-        kept="every file is the old one or the new one",
-        draws=True,
-    ),
-    "new": Command("new", "write a robot, study or domain family to start from"),
-    "export": Command("export", "write what was found for another simulator, the robot or another optimiser"),
-    "list": Command("listing", "list robots, maps, effects, agents, metrics, engines or measures"),
-    "completion": Command("completion", "print a script that completes commands and options in your shell"),
-}
+from proxytune.cli.terminal.own_output import print_answer, prints_to_stderr
+from proxytune.cli.terminal.trouble import stopped_by
+from proxytune.cli.terminal.trusting import only_trusted_code
+from proxytune.errors import InputError, ProxytuneError
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 FORMATS = ("png", "svg", "pdf")
@@ -162,6 +52,10 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
             command.add_argument(
                 "--format", type=formats, default=(), metavar="svg,pdf", help="figures also as SVG or PDF [PNG alone]"
             )
+        if known.runs_code:
+            command.add_argument(
+                "--trust", action="store_true", help="run the code beside the study, from now on without asking"
+            )
         command.add_argument("--json", action="store_true", help="print one JSON document instead of text")
     return top
 
@@ -190,11 +84,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser(words).parse_args(words, argparse.Namespace(words=words))
     command = COMMANDS[arguments.command]
     try:
-        with sigterm_as_interrupt(), _figures(getattr(arguments, "format", ())):
-            _print(command.load().run(arguments), arguments.json)
+        trusting = only_trusted_code(getattr(arguments, "trust", False))
+        with sigterm_as_interrupt(), trusting, _figures(getattr(arguments, "format", ())):
+            with prints_to_stderr():
+                answer = command.load().run(arguments)
+            print_answer(answer, as_json=arguments.json)
     except ProxytuneError as problem:
         _complain(arguments.command, str(problem))
         return BAD_INPUT if isinstance(problem, InputError) else FAILED
+    except (SystemExit, MemoryError, OSError) as problem:
+        _complain(arguments.command, f"{stopped_by(problem)}; {command.left}")
+        return FAILED
     except KeyboardInterrupt as problem:
         word, status = ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
         _complain(arguments.command, f"{word}; {command.left}")
@@ -211,31 +111,5 @@ def _figures(named: Sequence[str]) -> AbstractContextManager[None]:
     return figures_also_as(named)
 
 
-def _print(answer: Answer, as_json: bool) -> None:
-    """Print a command's answer; a closed pipe is not an error.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
-    try:
-        if as_json:
-            print(json.dumps(answer.document, indent=2, allow_nan=False, ensure_ascii=False))
-        elif isinstance(answer.text, str):
-            print(answer.text)
-        else:
-            Console().print(answer.text)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        _discard_the_rest()
-    except OSError as problem:
-        _discard_the_rest()
-        raise RunError(f"standard output: cannot be written ({problem.strerror}); make room and run again") from None
-
-
-def _discard_the_rest() -> None:
-    """Drop what is still in the buffer, which would raise once more when Python ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def _complain(command: str, line: str) -> None:
-    print(f"proxytune {command}: {line}", file=sys.stderr)
+    print(f"proxytune {command}: {' '.join(line.splitlines())}", file=sys.stderr)

@@ -11,8 +11,9 @@ from pathlib import Path
 from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.trusting import remember
 from proxytune.driving.robot import read_robot, robot_names
-from proxytune.errors import InputError, RunError
+from proxytune.errors import InputError, ProxytuneError, RunError
 from proxytune.skeletons.family import family_skeleton
 from proxytune.skeletons.given_urdf import robot_from_urdf
 from proxytune.skeletons.robot import robot_skeleton
@@ -49,6 +50,9 @@ def run(arguments: argparse.Namespace) -> Answer:
     _check(arguments)
     skeleton = _skeleton(arguments)
     write_folder(folder, skeleton)
+    with suppress(ProxytuneError):
+        # Where it cannot be remembered, the first run asks.
+        remember(folder)
     files = [str(folder / name) for name in skeleton.files]
     document = {"kind": arguments.kind, "files": files, "notes": list(skeleton.notes), "next": list(skeleton.next)}
     lines = [*files, *skeleton.notes, "next:", *map(pasteable, skeleton.next)]

@@ -21,9 +21,10 @@ from proxytune.storage.store import Store
 from proxytune.study.evaluation import Spent
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import StudyResult, result_of
-from proxytune.study.run import as_stored
-from proxytune.study.study import open_study
+from proxytune.study.run import stored_run
+from proxytune.study.settings import read_study_settings
 from proxytune.study.study_run import StudyRun
+from proxytune.study.without_code import open_to_look
 from proxytune.sweep.sweep import Curve, all_curves
 
 RESCORED = "rescored"
@@ -48,11 +49,12 @@ def run(arguments: argparse.Namespace) -> Answer:
     With other metrics all that goes into a separate folder.
     """
     metrics = [Metric.parse(text) for text in arguments.metric]
-    opened = open_study(arguments.path)
-    with Store.read(opened.settings.folder) as store:
-        result, curves = _read(StudyRun(as_stored(opened, store), store), metrics)
-    folder = _folder(opened.settings.folder, metrics)
-    figures = draw_curves(curves, folder / "figures")
+    settings = read_study_settings(arguments.path)
+    with Store.read(settings.folder) as store:
+        study = open_to_look(settings, store)
+        result, curves = _read(stored_run(study, store), metrics)
+    folder = _folder(settings.folder, metrics)
+    figures = draw_curves(curves, folder / "figures", study.truth)
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())

@@ -19,6 +19,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from proxytune.extensions.trust import check_permitted
+
 PREFIX = "beside_"
 
 
@@ -26,8 +28,10 @@ def import_beside(module: str, folder: Path) -> ModuleType:
     """Import a module that lies in a folder, or else is installed.
 
     Raises:
+        ExtensionError: If it may not be run.
         Exception: Whatever importing it raises; ModuleNotFoundError where there is none.
     """
+    check_permitted(module, folder)
     home = _home(str(folder.resolve()))
     if str(folder.resolve()) not in sys.path:
         sys.path.append(str(folder.resolve()))

@@ -4,7 +4,6 @@ import contextlib
 import hashlib
 import json
 import os
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,6 +71,8 @@ def _write(path: Path, arrays: Arrays) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         with draft.open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **arrays)
+            file.flush()
+            os.fsync(file.fileno())
         draft.replace(path)
     except OSError as problem:
         raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
@@ -97,5 +98,6 @@ def _read(path: Path) -> Arrays:
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in file.files if name != FACTS}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as problem:
+    # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.
+    except Exception as problem:
         raise StoreError(f"{path}: is damaged ({problem}); delete it, and run again to make it anew") from None

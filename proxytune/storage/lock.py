@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from proxytune.errors import BusyError, StoreError
+from proxytune.storage.own_files import open_own, refuse_links
 
 FILE_NAME = "study.lock"
 
@@ -17,8 +18,9 @@ def locked(folder: Path) -> Iterator[None]:
 
     Raises:
         BusyError: If another process holds it, with that process's id.
-        StoreError: If the folder cannot be written.
+        StoreError: If the folder cannot be written, or has links where a study writes.
     """
+    refuse_links(folder)
     path = folder / FILE_NAME
     descriptor = _acquire(path)
     try:
@@ -30,7 +32,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 def _acquire(path: Path) -> int:
     while True:
-        descriptor = _open(path)
+        descriptor = open_own(path)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -47,13 +49,6 @@ def _acquire(path: Path) -> int:
         os.close(descriptor)
 
 
-def _open(path: Path) -> int:
-    try:
-        return os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError as problem:
-        raise StoreError(f"{path.parent}: cannot be written ({problem.strerror}); copy the study elsewhere") from None
-
-
 def _write(descriptor: int, path: Path) -> None:
     try:
         os.ftruncate(descriptor, 0)
@@ -65,6 +60,6 @@ def _write(descriptor: int, path: Path) -> None:
 
 def _is_at(descriptor: int, path: Path) -> bool:
     try:
-        return os.path.samestat(os.fstat(descriptor), os.stat(path))
+        return os.path.samestat(os.fstat(descriptor), os.lstat(path))
     except FileNotFoundError:
         return False

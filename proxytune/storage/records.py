@@ -1,9 +1,10 @@
 """The rows of study.db as values."""
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from proxytune.domain import Episode, Outcome
 from proxytune.space import Theta
@@ -76,21 +77,68 @@ class SweepRecord:
     replays: str = ""
 
 
+def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
+    """θ in the one form in which it is stored: sorted by name, every digit kept."""
+    return json.dumps({name: float(value) for name, value in sorted(dict(theta).items())}, allow_nan=False)
+
+
+def fact_of(key: str, value: str) -> tuple[str, Any]:
+    """A fact from its row.
+
+    Raises:
+        ValueError: If it is none that proxytune writes; so do the others below.
+    """
+    return key, json.loads(value)
+
+
 def trial_of(number: int, theta: str, *rest: Any) -> TrialRecord:
     """A trial from its row, in the order of its attributes."""
     state, score, measures, failed, failure, decided, bound, seconds = rest
-    counted = (json.loads(measures), failed, failure, tuple(json.loads(decided)), bound, seconds)
-    return TrialRecord(number, json.loads(theta), state, score, *counted)
+    for value in (score, bound):
+        _expect(value is None or _is_number(value), "a score that is no number", value)
+    _expect(type(failed) is int and _is_number(seconds), "a count or time that is no number", (failed, seconds))
+    counted = (_numbers(measures, or_none=True), failed, failure, tuple(_list(decided, str)), bound, seconds)
+    return TrialRecord(number, _numbers(theta), state, score, *counted)
 
 
 def episode_of(theta: str, agent: str, start: int, seed: int) -> Episode:
     """An episode from the columns that determine it."""
-    return Episode(tuple(json.loads(theta).items()), agent, start, seed)
+    return Episode(tuple(_numbers(theta).items()), agent, start, seed)
 
 
 def outcome_of(theta: str, agent: str, start: int, seed: int, *rest: Any) -> Outcome:
     """An episode's outcome from its row."""
     metrics, failure, seconds = rest
-    return Outcome(
-        episode_of(theta, agent, start, seed), json.loads(metrics) if metrics else None, failure or "", seconds
-    )
+    _expect(_is_number(seconds), "a time that is no number", seconds)
+    scored = _numbers(metrics) if metrics else None
+    return Outcome(episode_of(theta, agent, start, seed), scored, failure or "", seconds)
+
+
+def sweep_of(identity: str, parameter: str, base: str, points: str, *pod: str) -> tuple[str, SweepRecord]:
+    """A sweep and the identity of its domain family from its row."""
+    target_model, replays = pod
+    return identity, SweepRecord(parameter, _numbers(base), tuple(_list(points, int, float)), target_model, replays)
+
+
+def _numbers(text: str, or_none: bool = False) -> dict[str, Any]:
+    """Numbers by name."""
+    known = json.loads(text)
+    _expect(isinstance(known, dict), "no numbers by name", text)
+    for value in known.values():
+        _expect(_is_number(value) or (or_none and value is None), "a value that is no number", value)
+    return known  # type: ignore[no-any-return]
+
+
+def _list(text: str, *kinds: type) -> list[Any]:
+    known = json.loads(text)
+    _expect(isinstance(known, list) and all(type(one) in kinds for one in known), "another list", text)
+    return known  # type: ignore[no-any-return]
+
+
+def _is_number(value: object) -> bool:
+    return type(value) in (int, float) and math.isfinite(cast(float, value))
+
+
+def _expect(holds: bool, what: str, found: object) -> None:
+    if not holds:
+        raise ValueError(f"{what}: {found!r:.60}")

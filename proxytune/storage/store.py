@@ -2,39 +2,31 @@
 
 import json
 import sqlite3
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from proxytune.domain import Episode, Outcome
 from proxytune.errors import InputError
 from proxytune.space import Theta
-from proxytune.storage.database import connect, disconnect, sqlite_errors_as_store_errors
-from proxytune.storage.records import SweepRecord, TrialRecord, episode_of, outcome_of, trial_of
+from proxytune.storage.checksums import chain, seal
+from proxytune.storage.database import connect, disconnect, not_ours, sqlite_errors_as_store_errors, transaction
+from proxytune.storage.records import (
+    SweepRecord,
+    TrialRecord,
+    episode_of,
+    fact_of,
+    outcome_of,
+    sweep_of,
+    theta_json,
+    trial_of,
+)
+from proxytune.storage.renaming import RENAMING
+from proxytune.storage.under_way import UnderWay
 
 FILE_NAME = "study.db"
-OF_EARLIER = "instance IN (SELECT id FROM instances WHERE identity = :earlier)"
-SAME_THETA = """
-    (SELECT renamed.id FROM instances AS renamed JOIN instances AS old USING (theta)
-    WHERE renamed.identity = :now AND old.id = instance)"""
-RENAMING = (
-    "INSERT OR IGNORE INTO instances (identity, theta) SELECT :now, theta FROM instances WHERE identity = :earlier",
-    f"UPDATE trials SET instance = {SAME_THETA} WHERE {OF_EARLIER}",
-    f"UPDATE OR IGNORE episodes SET instance = {SAME_THETA} WHERE {OF_EARLIER}",
-    f"DELETE FROM episodes WHERE {OF_EARLIER}",
-    "DELETE FROM instances WHERE identity = :earlier",
-    "UPDATE OR IGNORE sweeps SET identity = :now WHERE identity = :earlier",
-    "DELETE FROM sweeps WHERE identity = :earlier",
-    "UPDATE OR IGNORE sweeps SET replays = :now WHERE replays = :earlier",
-    "DELETE FROM sweeps WHERE replays = :earlier",
-)
-"""What gives one identity's instances, trials, episodes and sweeps to another, step by step."""
-
-
-def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
-    """θ in the one form in which it is stored: sorted by name, every digit kept."""
-    return json.dumps({name: float(value) for name, value in sorted(dict(theta).items())}, allow_nan=False)
+Made = TypeVar("Made")
 
 
 class Store:
@@ -78,22 +70,25 @@ class Store:
 
     def facts(self) -> dict[str, Any]:
         """What determined the finished trials; empty before the first."""
-        return {key: json.loads(value) for key, value in self._all("SELECT key, value FROM facts")}
+        return dict(self._made(fact_of, "SELECT key, value FROM facts"))
 
     def begin(self, facts: Mapping[str, Any], objective: str = "prpv") -> None:
         """Start a search afresh with these facts beside those of others; episodes are kept, its trials are not."""
         with self._transaction() as connection:
             connection.execute("DELETE FROM trials WHERE objective = ?", (objective,))
+            chain(connection, objective)
             connection.execute("DELETE FROM facts")
             rows = [(key, json.dumps(value, allow_nan=False)) for key, value in facts.items()]
-            connection.executemany("INSERT INTO facts VALUES (?, ?)", rows)
+            connection.executemany("INSERT INTO facts (key, value) VALUES (?, ?)", rows)
+            seal(connection, "facts")
         self._trials.pop(objective, None)
 
     def save_fact(self, key: str, value: Any) -> None:
         """Write one more fact, over what it was before; trials are kept."""
         with self._transaction() as connection:
             row = (key, json.dumps(value, allow_nan=False))
-            connection.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", row)
+            connection.execute("INSERT OR REPLACE INTO facts (key, value) VALUES (?, ?)", row)
+            seal(connection, "facts", "key = ?", (key,))
 
     def rename_identity(self, earlier: Collection[str], identity: str) -> None:
         """Make all that is kept under earlier identities of a domain family belong to this one, at once.
@@ -106,17 +101,20 @@ class Store:
                     connection.execute(statement, {"earlier": name, "now": identity})
                 values = (json.dumps(identity), json.dumps(name))
                 connection.execute("UPDATE facts SET value = ? WHERE key = 'identity' AND value = ?", values)
+            for table in ("facts", "instances", "sweeps"):
+                seal(connection, table)
         self._outcomes.clear()
 
     def trials(self, objective: str = "prpv") -> list[TrialRecord]:
         """Every trial of a search, in order; the last ones may be open."""
         if objective not in self._trials:
-            rows = self._all(
+            trials = self._made(
+                trial_of,
                 "SELECT number, theta, state, score, measures, failed_episodes, failure, decided, bound, seconds"
                 " FROM trials JOIN instances ON instances.id = trials.instance WHERE objective = ? ORDER BY number",
                 (objective,),
             )
-            self._trials[objective] = {row[0]: trial_of(*row) for row in rows}
+            self._trials[objective] = {trial.number: trial for trial in trials}
         return [trial for _, trial in sorted(self._trials[objective].items())]
 
     def searches(self) -> list[str]:
@@ -131,11 +129,19 @@ class Store:
                 scored = (trial.state, trial.score, json.dumps(dict(trial.measures), allow_nan=False))
                 rest = (trial.failed_episodes, trial.failure, json.dumps(trial.decided), trial.bound, trial.seconds)
                 connection.execute(
-                    "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                    "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, '')",
                     (objective, trial.number, instance, *scored, *rest),
                 )
+            chain(connection, objective, min((trial.number for trial in trials), default=1))
         if objective in self._trials:
             self._trials[objective] |= {trial.number: trial for trial in trials}
+
+    def drop_trials(self, objective: str, first: int) -> None:
+        """Forget the trials of a search from one on; episodes are kept."""
+        with self._transaction() as connection:
+            connection.execute("DELETE FROM trials WHERE objective = ? AND number >= ?", (objective, first))
+            chain(connection, objective, first)
+        self._trials.pop(objective, None)
 
     def save_outcome(self, identity: str, outcome: Outcome, code: str | None = None) -> None:
         """Write an episode, over an earlier failure of the same; of a failure, the code that failed too."""
@@ -147,35 +153,40 @@ class Store:
             instance = self._instance(connection, identity, theta)
             row = (instance, episode.agent, episode.start, episode.seed, metrics, failure, outcome.seconds)
             failed = None if failure is None else code
-            connection.execute("INSERT OR REPLACE INTO episodes VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (*row, failed))
+            connection.execute("INSERT OR REPLACE INTO episodes VALUES (?, ?, ?, ?, ?, ?, ?, ?, 0)", (*row, failed))
+            seal(connection, "episodes", "instance = ? AND agent = ? AND start = ? AND seed = ?", row[:4])
         self._remember(identity, theta, outcome)
 
     def outcomes(self, identity: str, theta: Theta) -> Mapping[Episode, Outcome]:
         """Every episode known of a domain instance: read once, and kept up with what is written."""
         key = identity, theta_json(theta)
         if key not in self._outcomes:
-            rows = self._all(
+            outcomes = self._made(
+                outcome_of,
                 "SELECT theta, agent, start, seed, metrics, failure, seconds"
                 " FROM episodes JOIN instances ON instances.id = episodes.instance WHERE identity = ? AND theta = ?",
                 key,
             )
-            outcomes = [outcome_of(*row) for row in rows]
             self._outcomes[key] = {outcome.episode: outcome for outcome in outcomes}
         return self._outcomes[key]
 
+    def under_way(self, identity: str) -> UnderWay:
+        """Which episode runs of the domain family with this identity."""
+        return UnderWay(self.path, self._connection, identity)
+
     def failed_in_other_code(self, identity: str, code: str) -> set[Episode]:
         """The episodes that failed in other code than this; those of which the code is not known are left out."""
-        rows = self._all(
+        query = (
             "SELECT theta, agent, start, seed FROM episodes JOIN instances ON instances.id = episodes.instance"
-            " WHERE identity = ? AND failure IS NOT NULL AND code <> ?",
-            (identity, code),
+            " WHERE identity = ? AND failure IS NOT NULL AND code <> ?"
         )
-        return {episode_of(*row) for row in rows}
+        return set(self._made(episode_of, query, (identity, code)))
 
     def forget_failures(self) -> None:
         """Make every failure one of other code, so that it is tried again."""
         with self._transaction() as connection:
             connection.execute("UPDATE episodes SET code = '' WHERE failure IS NOT NULL")
+            seal(connection, "episodes", "failure IS NOT NULL")
 
     def seconds(self) -> dict[tuple[str, int], float]:
         """How long the episodes of each agent and start took on average."""
@@ -198,44 +209,42 @@ class Store:
         with self._transaction() as connection:
             # A sweep asked for again becomes the last one.
             connection.execute(
-                "INSERT OR REPLACE INTO sweeps VALUES (NULL, ?, ?, ?, ?, ?, ?)",
+                "INSERT OR REPLACE INTO sweeps VALUES (NULL, ?, ?, ?, ?, ?, ?, 0)",
                 (*row, sweep.target_model, sweep.replays),
             )
+            seal(connection, "sweeps", "number = last_insert_rowid()")
 
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""
-        rows = self._all("SELECT identity, parameter, base, points, target_model, replays FROM sweeps ORDER BY number")
-        return [
-            (identity, SweepRecord(name, json.loads(base), tuple(json.loads(points)), *pod))
-            for identity, name, base, points, *pod in rows
-        ]
+        query = "SELECT identity, parameter, base, points, target_model, replays FROM sweeps ORDER BY number"
+        return self._made(sweep_of, query)
 
     def _remember(self, identity: str, theta: str, outcome: Outcome) -> None:
-        episode = outcome.episode
+        driven = outcome.episode
         if (identity, theta) in self._outcomes:
-            self._outcomes[identity, theta][episode] = outcome
+            self._outcomes[identity, theta][driven] = outcome
         if self._seconds is not None:
-            total, count = self._seconds.get((episode.agent, episode.start), (0.0, 0))
-            self._seconds[episode.agent, episode.start] = (total + outcome.seconds, count + 1)
+            total, count = self._seconds.get((driven.agent, driven.start), (0.0, 0))
+            self._seconds[driven.agent, driven.start] = (total + outcome.seconds, count + 1)
 
     def _instance(self, connection: sqlite3.Connection, identity: str, theta: str) -> int:
-        connection.execute("INSERT OR IGNORE INTO instances (identity, theta) VALUES (?, ?)", (identity, theta))
+        made = connection.execute("INSERT OR IGNORE INTO instances (identity, theta) VALUES (?, ?)", (identity, theta))
+        if made.rowcount > 0:
+            seal(connection, "instances", "identity = ? AND theta = ?", (identity, theta))
         query = "SELECT id FROM instances WHERE identity = ? AND theta = ?"
         return int(connection.execute(query, (identity, theta)).fetchone()[0])
+
+    def _made(self, make: Callable[..., Made], query: str, values: tuple[Any, ...] = ()) -> list[Made]:
+        """What rows are made into; a row that is whole and none of ours is damage too."""
+        rows = self._all(query, values)
+        try:
+            return [make(*row) for row in rows]
+        except (ValueError, TypeError, AttributeError, RecursionError) as problem:
+            raise not_ours(self.path, problem) from None
 
     def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         with sqlite_errors_as_store_errors(self.path):
             return self._connection.execute(query, values).fetchall()
 
-    @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        with sqlite_errors_as_store_errors(self.path):
-            self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._connection
-                self._connection.execute("COMMIT")
-            except BaseException:
-                # A full disk may have rolled back already.
-                with suppress(sqlite3.Error):
-                    self._connection.execute("ROLLBACK")
-                raise
+    def _transaction(self) -> AbstractContextManager[sqlite3.Connection]:
+        return transaction(self._connection, self.path)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import EpisodeError
-from proxytune.running.episodes import running
+from proxytune.running.episodes import Watch, running
 from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
@@ -40,7 +40,8 @@ def _drive(
     """The metrics of every episode; an agent's last one is told."""
     needed, left = needed_metrics(settings, family), Counter(episode.agent for episode in episodes)
     metrics: dict[Episode, Mapping[str, float]] = {}
-    with running(family, longest_first(episodes, {}), settings.jobs, needed=needed) as outcomes:
+    watch = Watch(settings.episode_timeout_s)
+    with running(family, longest_first(episodes, {}), settings.jobs, needed=needed, watch=watch) as outcomes:
         for outcome in outcomes:
             if outcome.metrics is None:
                 raise EpisodeError(failure_of(outcome))

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from proxytune.errors import StoreError
 from proxytune.search.engines.registry import engine_code
 from proxytune.storage.store import Store
 from proxytune.study.study import Study
@@ -45,13 +46,29 @@ def note_search(study: Study, store: Store) -> str:
     library = engine.needs
     needs = library.modules if library else ()
     now = {"first_trial": first, "code": engine_code(engine), "versions": versions_of((*PACKAGES, *needs))}
-    known = [one for one in store.facts().get(SEARCH, []) if one["first_trial"] < first]
+    known = [one for one in _searches(store) if one["first_trial"] < first]
     changed = _changes(known[-1], now) if known else []
     if changed or not known:
         store.save_fact(SEARCH, [*known, now])
     if not changed:
         return ""
     return f"trials from {first} on are proposed by another search than those before: {', '.join(changed)}"
+
+
+def _searches(store: Store) -> list[dict[str, Any]]:
+    """Which code has proposed trials so far.
+
+    Raises:
+        StoreError: If that is not as we write it.
+    """
+    known = store.facts().get(SEARCH, [])
+    try:
+        whole = all(int(one["first_trial"]) and one["code"] and dict(one["versions"]) for one in known)
+    except (TypeError, ValueError, KeyError):
+        whole = False
+    if not whole or not isinstance(known, list):
+        raise StoreError(f"{store.path}: '{SEARCH}' is not as proxytune writes it; restore a copy, or move it away")
+    return known
 
 
 def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:

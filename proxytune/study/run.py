@@ -4,12 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from proxytune.errors import RunError, SettingsError
+from proxytune.errors import RunError, SettingsError, StoreError
 from proxytune.search.loop import Propose, Search
 from proxytune.search.proposer import Proposer, Trial
 from proxytune.storage.records import State, TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import Evaluation
+from proxytune.study.founded import check_scores
 from proxytune.study.objective import Objective
 from proxytune.study.provenance import CODE, SEARCH, adopt, differ
 from proxytune.study.settings import LEARNING
@@ -18,9 +19,10 @@ from proxytune.study.stages.failing import check_some_work
 from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study, changes, facts
 from proxytune.study.study_run import StudyRun
+from proxytune.study.without_code import DESCRIBED, describe
 
-OTHERS = (LEARNING, SEARCH)
-"""Facts that the trials do not depend on: of a search for learning value, and which code proposed what."""
+OTHERS = (LEARNING, SEARCH, DESCRIBED)
+"""Facts that the trials do not depend on: of a search for learning value, which code proposed what, how it is shown."""
 
 
 def run_study(run: StudyRun, proposer: Proposer) -> None:
@@ -136,11 +138,26 @@ def check_facts(run: StudyRun) -> None:
     adopt(study, store)
     before, after = _facts_before(study, store), facts(study)
     if before == after:
+        describe(study, store)
+        check_scores(run)
         return
     if set(store.searches()) - {LEARNING}:
         raise _changed(study, store, before)
     others = {key: value for key, value in store.facts().items() if key in OTHERS}
     store.begin({**after, **others}, study.objective.name)
+    describe(study, store)
+
+
+def stored_run(study: Study, store: Store) -> StudyRun:
+    """What is to be seen of a study: its run, of which nothing is simulated.
+
+    Raises:
+        SettingsError: If anything that the finished trials depend on has changed, apart from code.
+        StoreError: If a score is not what its episodes give.
+    """
+    run = StudyRun(as_stored(study, store), store)
+    check_scores(run)
+    return run
 
 
 def as_stored(study: Study, store: Store) -> Study:
@@ -160,6 +177,8 @@ def as_stored(study: Study, store: Store) -> Study:
 def _facts_before(study: Study, store: Store) -> dict[str, Any]:
     """The facts stored with the trials; databases older than cut_off lack that key."""
     before = {key: value for key, value in store.facts().items() if key not in OTHERS}
+    if not isinstance(before.get("versions", {}), dict):
+        raise StoreError(f"{store.path}: 'versions' is not as proxytune writes it; restore a copy, or move it away")
     return {"cut_off": study.settings.cut_off, **before} if before else {}
 
 

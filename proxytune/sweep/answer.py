@@ -4,10 +4,9 @@ from proxytune.errors import InputError, SettingsError
 from proxytune.space import Theta
 from proxytune.storage.store import FILE_NAME, Store
 from proxytune.study.result import result_of
-from proxytune.study.run import as_stored
+from proxytune.study.run import stored_run
 from proxytune.study.settings import LEARNING
 from proxytune.study.study import Study
-from proxytune.study.study_run import StudyRun
 
 
 def has_answer(study: Study) -> bool:
@@ -29,7 +28,7 @@ def best_theta(study: Study, option: str = "--at") -> Theta:
         raise InputError(f"{folder}: has no finished trial; run it first (python -m proxytune study {folder})")
     with Store.read(study.settings.folder) as store:
         try:
-            run = StudyRun(as_stored(study, store), store)
+            run = stored_run(study, store)
         except SettingsError as problem:
             raise InputError(f"{problem}; or hold other values: {option} nominal") from None
         return dict(result_of(run).best.trial.theta)

@@ -74,7 +74,7 @@ def test_pod_is_drawn_again_without_the_target_model_also_after_the_code_has_cha
     folder, model = make_study(family='"echo:echo"'), tmp_path / "truth.toml"
     model.write_text("trim = 0.1\ndelay = 0.12\n")
     before = swept_against(folder, model, capsys, "all")
-    assert {"sweep_trim_delay=0.12_pod.png", "sweep_delay_trim=0.1_pod.png"} < before.keys()
+    assert {"sweep_trim_4e3f5b_pod.png", "sweep_delay_4e3f5b_pod.png"} < before.keys()
     model.unlink()
     monkeypatch.setattr("wobbly.Wobbly.identity", "code of another day")
     assert drawn_again(folder, capsys) == before
@@ -100,7 +100,9 @@ def test_a_sweep_of_an_older_format_is_drawn_without_pod(make_study, capsys):
             "CREATE TABLE old AS SELECT parameter, base, points, identity FROM sweeps; DROP TABLE sweeps;"
             " ALTER TABLE old RENAME TO sweeps; DROP TABLE trials; CREATE TABLE trials (number INTEGER PRIMARY KEY,"
             " instance INTEGER, state TEXT, prpv REAL, ppv REAL, failed_episodes INTEGER, failure TEXT);"
-            " ALTER TABLE episodes DROP COLUMN code; PRAGMA user_version = 1;"
+            " ALTER TABLE episodes DROP COLUMN code; ALTER TABLE episodes DROP COLUMN checksum; DROP TABLE chains;"
+            " ALTER TABLE facts DROP COLUMN checksum; ALTER TABLE instances DROP COLUMN checksum;"
+            " PRAGMA user_version = 1;"
         )
     capsys.readouterr()
     assert drawn_again(folder, capsys) == before

@@ -13,14 +13,14 @@ from stopping import Stopping
 
 from proxytune.cli.main import main
 from proxytune.search.engines.registry import make_proposer
-from proxytune.storage.database import FORMAT
+from proxytune.storage.formats import FORMAT
 from proxytune.storage.store import Store
 from proxytune.study.run import run_study
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 
 slow = pytest.mark.slow
-DAMAGED = r"is damaged \([^)]+\); restore a copy, or move it away to start again"
+DAMAGED = r"is damaged \([^)]+\); restore a copy, or keep what is whole: python -m proxytune repair \S+"
 
 
 def interrupted_after(folder, count):

@@ -4,7 +4,9 @@ import sqlite3
 import pytest
 
 from proxytune.errors import StoreError
-from proxytune.storage.database import FORMAT, TRIALS_3, connect, disconnect, sqlite_errors_as_store_errors
+from proxytune.storage.checksums import COLUMNS
+from proxytune.storage.database import connect, disconnect, sqlite_errors_as_store_errors
+from proxytune.storage.formats import FORMAT, TRIALS_3
 
 
 def made(path):
@@ -17,23 +19,23 @@ def test_a_database_is_made_with_its_format_and_plain_tables(tmp_path):
     with sqlite3.connect(path) as plain:
         assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
         names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    assert names == {"facts", "instances", "trials", "episodes", "sweeps"}
+    assert names == {"facts", "instances", "trials", "chains", "episodes", "sweeps"}
 
 
 def test_a_clean_end_leaves_the_one_file(tmp_path):
     connection = connect(tmp_path / "study.db", writable=True)
-    connection.execute("INSERT INTO facts VALUES ('seed', '1')")
+    connection.execute("INSERT INTO facts VALUES ('seed', '1', row_checksum('seed', '1'))")
     disconnect(connection)
     assert [path.name for path in tmp_path.iterdir()] == ["study.db"]
     with sqlite3.connect(tmp_path / "study.db") as plain:
-        assert plain.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
+        assert plain.execute("SELECT key, value FROM facts").fetchall() == [("seed", "1")]
 
 
 def test_it_can_be_read_while_it_is_written(tmp_path):
     writer = connect(tmp_path / "study.db", writable=True)
-    writer.execute("INSERT INTO facts VALUES ('seed', '1')")
+    writer.execute("INSERT INTO facts VALUES ('seed', '1', row_checksum('seed', '1'))")
     writer.execute("BEGIN IMMEDIATE")
-    writer.execute("INSERT INTO facts VALUES ('starts', '3')")
+    writer.execute("INSERT INTO facts VALUES ('starts', '3', row_checksum('starts', '3'))")
     reader = connect(tmp_path / "study.db", writable=False)
     assert reader.execute("SELECT key FROM facts").fetchall() == [("seed",)]
     reader.close()
@@ -71,23 +73,31 @@ def test_a_newer_format_is_refused(tmp_path):
     refused(path, f"has format {FORMAT + 1}, this proxytune reads up to {FORMAT}; install a newer one")
 
 
-OLD_TRIALS = """
+UNDO_5 = "DROP TABLE chains; ALTER TABLE trials DROP COLUMN digest;" + "".join(
+    f"ALTER TABLE {table} DROP COLUMN checksum;" for table in COLUMNS
+)
+"""Makes a database of format 5 of a new one."""
+
+OLD_TRIALS = f"""
+{UNDO_5}
 ALTER TABLE episodes DROP COLUMN code;
 DROP TABLE trials;
 CREATE TABLE trials (
     number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
     state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed')),
     prpv REAL, ppv REAL, failed_episodes INTEGER NOT NULL DEFAULT 0, failure TEXT NOT NULL DEFAULT '');
-INSERT INTO instances VALUES (1, 'identity', '{}');
+INSERT INTO instances VALUES (1, 'identity', '{{}}');
 INSERT INTO trials VALUES (1, 1, 'finished', 4.0, 0.25, 1, ''), (2, 1, 'failed', NULL, NULL, 3, 'it fell');
 PRAGMA user_version = 2;
 """
-TRIALS_OF_2 = "SELECT * FROM trials ORDER BY number"
+TRIAL = "objective, number, instance, state, score, measures, failed_episodes, failure, decided, bound, seconds"
+TRIALS_OF_2 = f"SELECT {TRIAL} FROM trials ORDER BY number"
 CONVERTED_TRIALS = [
     ("prpv", 1, 1, "finished", 4.0, '{"prpv": 4.0, "ppv": 0.25}', 1, "", "[]", None, 0.0),
     ("prpv", 2, 1, "failed", None, "{}", 3, "it fell", "[]", None, 0.0),
 ]
 TRIALS_OF_3 = f"""
+{UNDO_5}
 ALTER TABLE episodes DROP COLUMN code;
 DROP TABLE trials;
 {TRIALS_3}
@@ -159,9 +169,9 @@ def test_format_1_becomes_the_present_one_when_opened_for_writing_and_keeps_what
         assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
         assert plain.execute(SWEEPS_OF_1).fetchall() == CONVERTED
         assert plain.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
-        assert plain.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
+        assert plain.execute("SELECT key, value FROM facts").fetchall() == [("seed", "1")]
         names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    assert names == {"facts", "instances", "trials", "episodes", "sweeps"}
+    assert names == {"facts", "instances", "trials", "chains", "episodes", "sweeps"}
 
 
 @pytest.mark.parametrize("writable", [True, False])
@@ -205,7 +215,7 @@ def filled(path):
     connection = connect(path, writable=True)
     rows = [(number, f"identity {number}", "{}") for number in range(3000)]
     connection.execute("BEGIN")
-    connection.executemany("INSERT INTO instances VALUES (?, ?, ?)", rows)
+    connection.executemany("INSERT INTO instances VALUES (?1, ?2, ?3, row_checksum(?2, ?3))", rows)
     connection.execute("COMMIT")
     disconnect(connection)
     return path
@@ -233,6 +243,9 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
         connect(tmp_path / "nowhere" / "study.db", writable=True)
 
 
+ONE_MORE = "INSERT INTO instances VALUES (?1, ?2, '{}', row_checksum(?2, '{}'))"
+
+
 def test_a_full_disk_is_told_and_what_was_committed_stays(tmp_path):
     path = tmp_path / "study.db"
     connection = connect(path, writable=True)
@@ -244,7 +257,7 @@ def test_a_full_disk_is_told_and_what_was_committed_stays(tmp_path):
         sqlite_errors_as_store_errors(path),
     ):
         for number in range(10_000):
-            connection.execute("INSERT INTO instances VALUES (?, ?, '{}')", (number, f"identity {number}"))
+            connection.execute(ONE_MORE, (number, f"identity {number}"))
             written += 1
     connection.close()
     again = connect(path, writable=True)
@@ -271,11 +284,11 @@ def test_a_part_of_a_page_is_refused_but_not_beside_the_log_that_has_the_whole_o
     refused(path, "is damaged (its end has been cut off)")
     path.write_bytes(content)
     writer = connect(path, writable=True)
-    writer.execute("INSERT INTO facts VALUES ('seed', '1')")
+    writer.execute("INSERT INTO facts VALUES ('seed', '1', row_checksum('seed', '1'))")
     with path.open("ab") as main_file:
         main_file.write(b"?" * 100)
     reader = connect(path, writable=False)
-    assert reader.execute("SELECT * FROM facts").fetchall() == [("seed", "1")]
+    assert reader.execute("SELECT key, value FROM facts").fetchall() == [("seed", "1")]
     assert reader.execute("SELECT count(*) FROM instances").fetchall() == [(3000,)]
     reader.close()
     writer.close()
@@ -296,7 +309,7 @@ def test_format_4_knew_nothing_of_the_code_of_failures(tmp_path):
     path = made(tmp_path / "study.db")
     with sqlite3.connect(path) as plain:
         plain.executescript(
-            "ALTER TABLE episodes DROP COLUMN code; PRAGMA user_version = 4;"
+            f"{UNDO_5} ALTER TABLE episodes DROP COLUMN code; PRAGMA user_version = 4;"
             " INSERT INTO instances VALUES (1, 'i', '{}');"
             " INSERT INTO episodes VALUES (1, 'a', 0, 1, NULL, 'it fell', 0.5), (1, 'a', 1, 1, '{}', NULL, 0.5);"
         )

@@ -8,7 +8,7 @@ from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import result_of
-from proxytune.study.settings import StopRules
+from proxytune.study.stop_rules import StopRules
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

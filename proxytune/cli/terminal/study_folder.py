@@ -6,7 +6,8 @@ import shutil
 import sys
 from pathlib import Path
 
-from proxytune.errors import InputError, StoreError
+from proxytune.cli.terminal.trusting import remember
+from proxytune.errors import InputError, ProxytuneError, StoreError
 from proxytune.settings import nearest
 from proxytune.shipped import shipped
 from proxytune.study.settings import FILE_NAME
@@ -35,6 +36,9 @@ def study_folder(path: Path) -> Path:
         hint = nearest(folder.name, studies)
         raise InputError(f"{folder}: no such folder, and no study of that name comes with proxytune; {hint}")
     _copy(studies[folder.name], folder)
+    with contextlib.suppress(ProxytuneError):
+        # Where it cannot be remembered, its code is still known by its contents.
+        remember(folder)
     print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
     return folder
 

@@ -21,7 +21,7 @@ SIDE = 4
 SURE, SURE_OF_A_JUMP = 5.0, 8.0
 """Standard deviations; a jump is looked for at every time, so more of them."""
 
-SURE_BESIDE_OTHERS, SHARE_BESIDE_OTHERS = 5.5, 0.12
+SURE_BESIDE_OTHERS, SHARE_BESIDE_OTHERS = 5.5, 0.15
 """The same where one side of the jump answers as the other drives do; NEAR_S apart, or two deviations, is the same."""
 
 NEAR_S = 0.02
@@ -69,7 +69,7 @@ def stretches(log: Log, blocks: Blocks, latencies: Floats) -> tuple[list[tuple[f
     usual = _usual([blocks.squares[blocks.episode == e] for e in range(len(log.episodes))], latencies)
     for e, episode in enumerate(log.episodes):
         own = np.flatnonzero(blocks.episode == e)
-        found = _jumps(blocks.squares[own], latencies, MOST_JUMPS, usual)
+        found = _all_jumps(blocks.squares[own], latencies, usual)
         edges = [0.0, *(float(blocks.number[own[at]] * BLOCK_S) for at, _ in found), np.inf]
         margin = [0.0, *([BLOCK_S] * len(found)), 0.0]
         end = float(episode.times[-1] - episode.times[0])
@@ -80,6 +80,18 @@ def stretches(log: Log, blocks: Blocks, latencies: Floats) -> tuple[list[tuple[f
         kept.append(max(spans, key=lambda span: min(span[1], end) - span[0]))
         jumps += [Jump(episode.name, float(episode.times[0]) + edges[1 + k], by) for k, (_, by) in enumerate(found)]
     return kept, tuple(jumps)
+
+
+def _all_jumps(squares: Floats, latencies: Floats, usual: float | None) -> list[tuple[int, float]]:
+    """The jumps of a drive; small ones alone where none is found among all.
+
+    What a robot does in its last seconds may look like something that it did long before.
+    """
+    found = _jumps(squares, latencies, MOST_JUMPS, usual)
+    if found or not len(squares):
+        return found
+    near = np.abs(latencies - latencies[int(squares.sum(axis=0).argmin())]) < FAR_S
+    return _jumps(squares[:, near], latencies[near], MOST_JUMPS, usual)
 
 
 def _jumps(squares: Floats, latencies: Floats, most: int, usual: float | None) -> list[tuple[int, float]]:

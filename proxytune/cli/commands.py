@@ -1,0 +1,137 @@
+"""Every command: what it is called, does, leaves when it is stopped, and may run."""
+
+import importlib
+from types import ModuleType
+from typing import NamedTuple
+
+
+class Command(NamedTuple):
+    """A command: its module, loaded only when it is asked for, and its line in the help.
+
+    Attributes:
+        module: Its name in this room.
+        summary: One line for people.
+        resumes: Whether it continues where it was interrupted.
+        kept: What an interruption leaves, in one phrase; everything finished, or nothing, where it does not say.
+        draws: Whether it writes figures.
+        runs_code: Whether it may run a study's own code.
+    """
+
+    module: str
+    summary: str
+    resumes: bool = False
+    kept: str = ""
+    draws: bool = False
+    runs_code: bool = False
+
+    @property
+    def left(self) -> str:
+        """What an interruption leaves, and what the same command does then."""
+        kept = self.kept or ("everything finished is kept" if self.resumes else "nothing was written")
+        return f"{kept}; run the same command to {'continue' if self.resumes else 'start again'}"
+
+    def load(self) -> ModuleType:
+        """The module."""
+        return importlib.import_module(f"proxytune.cli.{self.module}")
+
+
+COMMANDS: dict[str, Command] = {
+    "study": Command(
+        "study",
+        "run or resume a study: find the θ that makes the simulator most useful",
+        resumes=True,
+        kept="every finished trial and episode is kept",
+        draws=True,
+        runs_code=True,
+    ),
+    "score": Command(
+        "score",
+        "measure how useful a simulator is, from two tables of scores",
+        kept="of the output only whole files were written",
+        draws=True,
+    ),
+    "sweep": Command(
+        "sweep",
+        "measure usefulness along one parameter",
+        resumes=True,
+        kept="every finished episode is kept",
+        draws=True,
+        runs_code=True,
+    ),
+    "teach": Command(
+        "teach",
+        "measure PLV (proxy learning value): how much a simulator saves in training",
+        resumes=True,
+        kept="every finished point of a learning curve is kept",
+        draws=True,
+        runs_code=True,
+    ),
+    "drive": Command(
+        "drive",
+        "show an episode, the proxy beside the target: metrics, a picture or an animation",
+        kept="the picture is the old one or none",
+        runs_code=True,
+    ),
+    "import": Command("importing", "make a log of a ROS bag, a CSV, a TUM trajectory or arrays, and say what is in it"),
+    "measure": Command(
+        "measure",
+        "drive a study's agents in the domain of a model file and write their scores",
+        runs_code=True,
+    ),
+    "record": Command(
+        "record",
+        "drive the domain of a model file through manoeuvres and write the log",
+        kept="no log was written, at most some of its pictures",
+        runs_code=True,
+    ),
+    "diagnose": Command(
+        "diagnose",
+        "find the effect that the model lacks, from a log of measured drives",
+        kept="findings are written last, each file whole or not at all",
+        draws=True,
+        runs_code=True,
+    ),
+    "loop": Command(
+        "loop",
+        "tune, diagnose, extend, tune again: before and after on one page",
+        resumes=True,
+        kept="every finished step, trial and episode is kept",
+        draws=True,
+        runs_code=True,
+    ),
+    "predict": Command(
+        "predict",
+        "predict the poses of a log with a fitted model",
+        kept="no table was written, at most some of the pictures",
+        runs_code=True,
+    ),
+    "compare": Command(
+        "compare",
+        "compare how fast each search engine finds a good θ",
+        resumes=True,
+        kept="every finished run and episode is kept",
+        draws=True,
+        runs_code=True,
+    ),
+    "plot": Command(
+        "plot",
+        "draw a study's figures and report again, without simulating",
+        kept="every file is the old one or the new one",
+        draws=True,
+        runs_code=True,
+    ),
+    "new": Command("new", "write a robot, study or domain family to start from"),
+    "repair": Command(
+        "repair",
+        "keep what is whole of a damaged study.db, and say what the study does again",
+        kept="study.db is the old one or the repaired one",
+        runs_code=True,
+    ),
+    "export": Command(
+        "export",
+        "write what was found for another simulator, the robot or another optimiser",
+        runs_code=True,
+    ),
+    "list": Command("listing", "list robots, maps, effects, agents, metrics, engines or measures"),
+    "completion": Command("completion", "print a script that completes commands and options in your shell"),
+}

@@ -1,0 +1,99 @@
+"""Looking at a study without running any of its own code: study.db has what its code had said of itself."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, NoReturn, cast
+
+from proxytune.domain import DomainFamily
+from proxytune.errors import StoreError
+from proxytune.search.engines.engine import Engine
+from proxytune.search.engines.registry import NAMES, engine_of
+from proxytune.space import Parameter
+from proxytune.storage.store import Store
+from proxytune.study.objective import objective_of
+from proxytune.study.settings import StudySettings
+from proxytune.study.study import Study, open_study
+from proxytune.study.target import read_target, with_scores
+
+DESCRIBED = "described"
+"""The fact that tells what figures and tables need of a study's code."""
+
+
+@dataclass(frozen=True)
+class DescribedFamily:
+    """What a domain family had said of itself when its study was run; it can drive nothing."""
+
+    identity: str
+    metrics: Mapping[str, str]
+    parameters: Mapping[str, Parameter]
+    starts: int
+
+
+def describe(study: Study, store: Store) -> None:
+    """Keep what is needed to look at a study without its own code, if it names any."""
+    if not names_own_code(study.settings):
+        return
+    family = study.family
+    described = {
+        "metrics": {name: str(unit) for name, unit in family.metrics.items()},
+        "units": {name: str(parameter.unit) for name, parameter in family.parameters.items()},
+        "starts": int(family.starts),
+        "learns_from": study.engine.learns_from,
+        "truth": dict(study.truth) if study.truth is not None else None,
+    }
+    if store.facts().get(DESCRIBED) != described:
+        store.save_fact(DESCRIBED, described)
+
+
+def open_to_look(settings: StudySettings, store: Store) -> Study:
+    """A study to look at; of one that names code of its own, as that had described itself.
+
+    An objective of one's own is computed anew for figures, so that its code is needed.
+
+    Raises:
+        InputError: If anything in it cannot be used.
+        StoreError: If the description is none.
+    """
+    described = store.facts().get(DESCRIBED)
+    if described is None or ":" in settings.objective or not names_own_code(settings):
+        return open_study(settings.path)
+    try:
+        family, engine, truth = _described(settings, store, described)
+    except (TypeError, ValueError, KeyError, AttributeError) as problem:
+        raise StoreError(f"{store.path}: '{DESCRIBED}' is not as proxytune writes it ({problem!r:.80})") from None
+    known, left_out = with_scores(settings)
+    target, unused = read_target(known, cast(DomainFamily, family))
+    objective = objective_of(settings)
+    cautions = (*left_out, *unused)
+    return Study(known, cast(DomainFamily, family), target, family.identity, truth, cautions, objective, engine)
+
+
+def names_own_code(settings: StudySettings) -> bool:
+    """Whether study.toml itself names code that is not proxytune's."""
+    names = (settings.family, settings.engine, settings.objective, *settings.loaded_agents)
+    return any(":" in name and not name.startswith("proxytune.") for name in names)
+
+
+def _described(
+    settings: StudySettings, store: Store, described: Mapping[str, Any]
+) -> tuple[DescribedFamily, Engine, Mapping[str, float] | None]:
+    parameters = {
+        name: Parameter(name=name, unit=str(unit), low=-math.inf, high=math.inf, neutral=0.0)
+        for name, unit in described["units"].items()
+    }
+    metrics = {str(name): str(unit) for name, unit in described["metrics"].items()}
+    identity = str(store.facts().get("identity", ""))
+    family = DescribedFamily(identity, metrics, MappingProxyType(parameters), int(described["starts"]))
+    truth = described["truth"]
+    return family, _engine(settings.engine, described["learns_from"]), dict(truth) if truth is not None else None
+
+
+def _engine(name: str, learns_from: Any) -> Engine:
+    """The shipped engine, or the place of one that is not."""
+    return engine_of(name) if name in NAMES else Engine(name, name, "", _proposes_nothing, learns_from)
+
+
+def _proposes_nothing(*_: Any) -> NoReturn:
+    raise StoreError("a study that is only looked at proposes nothing")

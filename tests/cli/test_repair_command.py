@@ -1,0 +1,139 @@
+"""What is whole of a damaged study is kept, and the study ends as if nothing had happened."""
+
+import json
+import shutil
+import sqlite3
+
+import pytest
+from edited import edited
+from processes import episodes, trials
+
+from proxytune.cli.main import main
+from proxytune.storage.store import Store
+
+DAMAGES = {
+    "a score": ("UPDATE trials SET score = score + 7 WHERE number = 3", 2, 0),
+    "a trial that is gone": ("DELETE FROM trials WHERE number = 5", 4, 0),
+    "the last trial gone": ("DELETE FROM trials WHERE number = 7", 6, 0),
+    "a trial with another number": ("UPDATE trials SET number = 77 WHERE number = 2", 1, 0),
+    "an episode": ("UPDATE episodes SET metrics = '{}' WHERE instance = 4 AND agent = 'agent1' AND start = 1", 3, 1),
+    "θ": ("UPDATE instances SET theta = '{' WHERE id = 2", 1, 18),
+    "a fact": ("UPDATE facts SET value = 'x' WHERE key = 'seed'", 0, 0),
+    "an episode that is gone": ("DELETE FROM episodes WHERE instance = 3 AND agent = 'agent1' AND start = 1", 2, 1),
+}
+
+
+def damaged(folder, statement):
+    with sqlite3.connect(folder / "study.db") as plain:
+        plain.execute(statement)
+
+
+def repaired(folder, capsys):
+    capsys.readouterr()
+    assert main(["repair", str(folder), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def goes_on_as_if_nothing_had_happened(folder, finished, capsys):
+    """The episodes that were driven again."""
+    capsys.readouterr()
+    assert main(["study", str(folder), "--json"]) == 0
+    assert trials(folder) == trials(finished)
+    assert episodes(folder) == episodes(finished)
+    return json.loads(capsys.readouterr().out)["episodes"]["run"]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_what_is_whole_is_kept_and_the_rest_is_made_again_to_the_last_bit(finished, finished_once, capsys, damage):
+    statement, kept, again = DAMAGES[damage]
+    damaged(finished, statement)
+    before = (finished / "study.db").read_bytes()
+    assert main(["study", str(finished)]) == 1
+    assert f"python -m proxytune repair {finished}" in capsys.readouterr().err
+    found = repaired(finished, capsys)
+    assert (found["damaged"], found["trials"]) == (True, kept)
+    if found["aside"]:
+        assert (finished / "study.db.damaged").read_bytes() == before
+    assert goes_on_as_if_nothing_had_happened(finished, finished_once, capsys) == again
+
+
+@pytest.mark.parametrize("edit", ['score = score + 7, measures = \'{"prpv": 99.0, "ppv": 0.5}\'', "measures = '{}'"])
+def test_a_score_that_its_episodes_do_not_give_is_told_also_where_every_checksum_fits(
+    finished, finished_once, capsys, edit
+):
+    with edited(finished / "study.db") as plain:
+        plain.execute(
+            f"UPDATE trials SET {edit}, score = score + 7 WHERE number = 3".replace("score = score + 7, ", "", 1)
+        )
+    for command in ("study", "plot"):
+        assert main([command, str(finished)]) == 1
+        assert "was damaged or edited: trial 3 has" in capsys.readouterr().err
+    found = repaired(finished, capsys)
+    assert (found["aside"], found["trials"]) == (None, 2)
+    assert goes_on_as_if_nothing_had_happened(finished, finished_once, capsys) == 0
+
+
+def test_a_whole_study_is_left_as_it_is(finished, capsys):
+    before = (finished / "study.db").read_bytes()
+    assert main(["repair", str(finished)]) == 0
+    assert "study.db is whole; nothing was changed" in capsys.readouterr().out
+    assert sorted(path.name for path in finished.iterdir()) == ["study.db", "study.toml", "target.csv"]
+    assert (finished / "study.db").read_bytes() == before
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
+def test_a_database_that_was_cut_off_is_rebuilt_of_what_can_be_read(finished, finished_once, capsys, share):
+    content = (finished / "study.db").read_bytes()
+    (finished / "study.db").write_bytes(content[: int(share * len(content))])
+    assert main(["plot", str(finished)]) == 1
+    found = repaired(finished, capsys)
+    assert found["damaged"]
+    again = goes_on_as_if_nothing_had_happened(finished, finished_once, capsys)
+    assert again == 7 * 18 - found["kept"]["episodes"]
+
+
+def test_a_spoilt_page_costs_what_is_on_it(finished, finished_once, capsys):
+    content = bytearray((finished / "study.db").read_bytes())
+    page = len(content) // 4096 // 2
+    content[page * 4096 : (page + 1) * 4096] = b"?" * 4096
+    (finished / "study.db").write_bytes(content)
+    found = repaired(finished, capsys)
+    assert found["kept"]["episodes"] > 0
+    goes_on_as_if_nothing_had_happened(finished, finished_once, capsys)
+
+
+def test_writes_that_are_still_in_the_log_are_kept_and_the_log_is_set_aside(finished, capsys):
+    with Store.read(finished) as store:
+        before = store.trials()
+    plain = sqlite3.connect(finished / "study.db")
+    plain.execute("PRAGMA journal_mode = WAL")
+    plain.execute("UPDATE facts SET value = '7' WHERE key = 'nothing'")
+    plain.execute("UPDATE trials SET score = 0 WHERE number = 7")
+    plain.commit()
+    copy = finished.with_name("copy")
+    shutil.copytree(finished, copy)
+    plain.close()
+    assert (copy / "study.db-wal").stat().st_size
+    assert repaired(copy, capsys)["trials"] == 6
+    assert (copy / "study.db.damaged-wal").exists()
+    assert not (copy / "study.db-wal").exists()
+    with Store.read(copy) as store:
+        assert store.trials() == before[:6]
+
+
+def test_what_was_set_aside_before_is_kept(finished, capsys):
+    for _ in range(2):
+        damaged(finished, "UPDATE trials SET score = score + 7 WHERE number = 3 OR number = 1")
+        repaired(finished, capsys)
+        assert main(["study", str(finished)]) == 0
+    assert {path.name for path in finished.glob("study.db.*")} == {"study.db.damaged", "study.db.damaged1"}
+
+
+def test_somebody_else_s_database_and_none_are_refused(finished, make_study, capsys):
+    (finished / "study.db").unlink()
+    assert main(["repair", str(finished)]) == 2
+    assert "no such file; there is nothing to repair" in capsys.readouterr().err
+    with sqlite3.connect(finished / "study.db") as plain:
+        plain.execute("CREATE TABLE photos (name TEXT)")
+    assert main(["repair", str(finished)]) == 1
+    assert "is not a study's database" in capsys.readouterr().err

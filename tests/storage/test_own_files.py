@@ -1,0 +1,82 @@
+"""A stranger's study cannot lead what is written to it elsewhere."""
+
+import os
+
+import pytest
+
+from proxytune.errors import StoreError
+from proxytune.storage.lock import locked
+from proxytune.storage.own_files import NAMES
+from proxytune.storage.store import Store
+
+
+@pytest.fixture
+def study(tmp_path):
+    folder = tmp_path / "study"
+    folder.mkdir()
+    return folder
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_symbolic_link_in_place_of_what_is_written_to_is_refused_and_not_followed(study, tmp_path, name):
+    victim = tmp_path / "precious"
+    victim.write_text("mine")
+    (study / name).symlink_to(victim)
+    for opening in (locked, Store.open):
+        with pytest.raises(StoreError, match=f"{name}: is a symbolic link"), opening(study):
+            pass
+    assert victim.read_text() == "mine"
+    assert [path.name for path in study.iterdir()] == [name]
+
+
+def test_a_dangling_link_makes_no_file_elsewhere(study, tmp_path):
+    (study / "study.db").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(StoreError, match="is a symbolic link"), Store.open(study):
+        pass
+    assert not (tmp_path / "elsewhere").exists()
+
+
+def test_a_lock_with_another_name_elsewhere_is_refused(study, tmp_path):
+    victim = tmp_path / "precious"
+    victim.write_text("mine")
+    os.link(victim, study / "study.lock")
+    with pytest.raises(StoreError, match="has another name elsewhere"), locked(study):
+        pass
+    assert victim.read_text() == "mine"
+
+
+def test_a_lock_that_is_no_file_is_refused(study):
+    os.mkfifo(study / "study.lock")
+    with pytest.raises(StoreError, match="is no file"), locked(study):
+        pass
+
+
+def test_a_study_whose_folder_is_reached_by_a_link_is_fine(study, tmp_path):
+    (tmp_path / "link").symlink_to(study)
+    with locked(tmp_path / "link"), Store.open(tmp_path / "link") as store:
+        assert store.trials() == []
+
+
+def test_a_link_in_place_of_the_log_of_writes_is_not_followed(study, tmp_path):
+    with Store.open(study):
+        pass
+    (tmp_path / "precious").write_text("mine")
+    (study / "study.db-wal").symlink_to(tmp_path / "precious")
+    with pytest.raises(StoreError), Store.open(study) as store:
+        store.begin({"seed": 1})
+    assert (tmp_path / "precious").read_text() == "mine"
+
+
+@pytest.mark.parametrize("place", ["rescored/distance", "loop/extended", "figures/more"])
+def test_a_link_within_what_a_study_makes_is_refused(study, tmp_path, place):
+    (study / place).parent.mkdir()
+    (study / place).symlink_to(tmp_path)
+    with pytest.raises(StoreError, match=f"{place}: is a symbolic link"), Store.open(study):
+        pass
+
+
+def test_a_pipe_in_place_of_the_database_is_refused_and_not_waited_for(study):
+    os.mkfifo(study / "study.db")
+    for opening in (Store.open, Store.read):
+        with pytest.raises(StoreError, match="is no file"), opening(study):
+            pass

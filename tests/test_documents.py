@@ -40,7 +40,7 @@ LOGS_PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
 
 LONGEST_README = 120
 """Lines: the README is read in one go; the rest is in docs/."""
-RUN_ELSEWHERE = ("extending.md", "logs.md", "own_robot.md")
+RUN_ELSEWHERE = ("cluster.md", "extending.md", "logs.md", "own_robot.md")
 """Their commands need what comes before them; tests of their own run them."""
 COMMAND_LINES = sorted(
     {

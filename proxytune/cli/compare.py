@@ -11,6 +11,7 @@ from rich.text import Text
 
 from proxytune.cli.compare_objective import BUDGET, INITIAL, STAND_INS, Arena, check_truths, objective_of
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
 from proxytune.cli.terminal.typed import typed
 from proxytune.comparison.analytic import Objective
 from proxytune.comparison.judgement import judging_code
@@ -61,8 +62,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="with --truths: a model.toml whose effects the targets have and the proxy lacks; repeat for several",
     )
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for runs and figure [./compare_STUDY]")
+    configure_cluster(parser)
 
 
+@on_its_cluster
 def run(arguments: argparse.Namespace) -> Answer:
     """Run what is missing of every engine and seed, and sum all up."""
     name = Path(arguments.study).absolute().name

@@ -9,6 +9,7 @@ from typing import Any
 from proxytune.api.studies import StudyReport, most_episodes, run_opened
 from proxytune.cli.learning_value import search_by_plv
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
 from proxytune.cli.terminal.live_page import renewed_page
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.report.study.table import study_table
@@ -35,8 +36,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--budget", type=int, metavar="N", help="how many trials [study.toml's]")
     parser.add_argument("--jobs", type=int, metavar="N", help="how many processes run episodes [study.toml's]")
+    configure_cluster(parser)
 
 
+@on_its_cluster
 def run(arguments: argparse.Namespace) -> Answer:
     """Run what is left of a study; a finished one is summed up again without simulating."""
     begun = time.perf_counter()

@@ -10,6 +10,7 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.cli.terminal.theta import read_theta
 from proxytune.cli.terminal.typed import typed
@@ -68,8 +69,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " replayed in both domains",
     )
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the curves [the study's figures]")
+    configure_cluster(parser)
 
 
+@on_its_cluster
 def run(arguments: argparse.Namespace) -> Answer:
     """Simulate what is missing of the sweeps, and draw them."""
     folder = study_folder(arguments.path)

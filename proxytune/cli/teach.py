@@ -7,6 +7,7 @@ from rich.console import Group
 from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.cli.terminal.typed import typed
 from proxytune.report.page import foot_of, html_of
@@ -32,8 +33,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "path", type=Path, metavar="PATH", help="a study's folder; its study.toml needs a [teaching] table"
     )
+    configure_cluster(parser)
 
 
+@on_its_cluster
 def run(arguments: argparse.Namespace) -> Answer:
     """Run what is left of the experiment; a finished one is summed up again without training or driving."""
     folder = study_folder(arguments.path)

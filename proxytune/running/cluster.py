@@ -1,28 +1,25 @@
 """Doing pieces of work on the machines of a Dask cluster, where every worker has the same code."""
 
-import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache, partial
-from pathlib import Path
-from platform import python_version
 from typing import Any
 
 from joblib import parallel_config
 
 from proxytune.errors import ExtensionError, InputError, RunError
-from proxytune.running.workers import elsewhere
-from proxytune.versions import version_changes, versions_of
+from proxytune.running.same_code import check_code, made_by
+from proxytune.running.workers import Elsewhere, elsewhere
 
-PACKAGES = ("numpy", "scipy", "scikit-learn", "pybullet", "joblib", "distributed")
-CONNECT_S = 10.0
-JOINED_S = 30.0
+CONNECT_S, JOINED_S = 10.0, 30.0
 """So long it is waited for a connection, and for the first worker [s]."""
 
 
 @contextmanager
 def on_cluster(address: str) -> Iterator[None]:
-    """Have all pieces of work done by a cluster's workers meanwhile, as many at once as those have cores.
+    """Have all pieces of work done by a cluster's workers meanwhile, as many at once as there are workers.
+
+    Workers may leave and join: what a lost one was doing is done by another, and new ones have work from the next
+    trial, point or step on.
 
     Args:
         address: Of the cluster's scheduler, as in tcp://127.0.0.1:8786.
@@ -32,66 +29,37 @@ def on_cluster(address: str) -> Iterator[None]:
         InputError: If nothing answers there, or a worker has other code, other packages or several threads.
         RunError: If no worker joins.
     """
-    client = _connect(address)
+    client, killed = _connect(address)
     with client:
-        _check(client)
-        with elsewhere(partial(_cores, client)), parallel_config(backend="dask", client=client):
+        _check(client, address)
+        place = Elsewhere(lambda: max(1, len(client.nthreads())), killed, made_by())
+        with elsewhere(place), parallel_config(backend="dask", client=client):
             yield
 
 
-def made_by() -> dict[str, str]:
-    """What results depend on besides their settings: proxytune's own code, Python and packages."""
-    return {"proxytune": _digest(), "Python": python_version(), **versions_of(PACKAGES)}
-
-
-def _connect(address: str) -> Any:
+def _connect(address: str) -> tuple[Any, tuple[type[BaseException], ...]]:
+    """A client, and what it raises of a piece that has ended several workers."""
     try:
-        from distributed import Client
+        from distributed import Client, KilledWorker
     except ModuleNotFoundError:
         line = '--backend dask needs distributed; install it: pip install "proxytune[dask]"'
         raise ExtensionError(line) from None
     try:
-        return Client(address, timeout=CONNECT_S, set_as_default=False)
+        connect: Any = Client
+        return connect(address, timeout=CONNECT_S, set_as_default=False), (KilledWorker,)
     except (OSError, ValueError) as problem:
         line = f"--address {address}: no scheduler answers ({type(problem).__name__})"
         raise InputError(f"{line}; start one with `dask scheduler`, and give the address that it prints") from None
 
 
-def _check(client: Any) -> None:
+def _check(client: Any, address: str) -> None:
     try:
         client.wait_for_workers(1, timeout=JOINED_S)
     except TimeoutError:
-        line = f"no worker has joined {client.scheduler.address} within {JOINED_S:.0f} s"
-        raise RunError(f"{line}; start one: dask worker {client.scheduler.address} --nthreads 1") from None
-    threads = client.nthreads()
-    several = [worker for worker, count in threads.items() if count != 1]
-    if several:
-        line = f"worker {several[0]} has {threads[several[0]]} threads, and PyBullet is for one in a process"
-        raise InputError(f"{line}; start it with --nthreads 1 and as many --nworkers as it has cores")
-    for worker, theirs in client.run(made_by).items():
-        check_code(theirs, worker)
-
-
-def check_code(theirs: Mapping[str, str], worker: str) -> None:
-    """Refuse a worker whose results may differ.
-
-    Raises:
-        InputError: If it has another version of anything.
-    """
-    changes = version_changes(made_by(), theirs)
-    if changes:
-        raise InputError(f"worker {worker} has {', '.join(changes)}; install the same there as here")
-
-
-def _cores(client: Any) -> int:
-    """How many pieces the workers of this moment can do at once."""
-    return max(1, len(client.nthreads()))
-
-
-@cache
-def _digest() -> str:
-    home = Path(__file__).resolve().parent.parent
-    paths = sorted(home.rglob("*.py"))
-    own = {path.relative_to(home).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
-    own = {name: digest for name, digest in own.items() if not name.startswith(("robots/", "studies/"))}
-    return hashlib.sha256(repr(own).encode()).hexdigest()[:12]
+        line = f"--address {address}: no worker has joined within {JOINED_S:.0f} s"
+        raise RunError(f"{line}; start one: dask worker {address} --nthreads 1") from None
+    for worker, threads in client.nthreads().items():
+        if threads != 1:
+            line = f"worker {worker} has {threads} threads, and a simulator is for one in a process"
+            raise InputError(f"{line}; start it with --nthreads 1, and --nworkers for more cores")
+    client.run(check_code, made_by())

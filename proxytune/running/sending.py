@@ -7,14 +7,16 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, cast
 
 from proxytune.errors import RunError
 from proxytune.extensions import describe, place_of
 from proxytune.extensions.beside import folders, open_folders
+from proxytune.extensions.travelling import Packed, pack, unpack
+from proxytune.running.same_code import check_code
 
 WATCH_S = 0.5
 
@@ -25,25 +27,36 @@ class NotSendableError(RunError):
 
 @dataclass(frozen=True)
 class Recipe:
-    """Work pickled once, and where its modules are found: a process unpickles it once."""
+    """Work pickled once, and where its modules are found: a process unpickles it once.
+
+    Attributes:
+        pickled: The work.
+        path: Where modules are looked for here.
+        own: The user's folders whose modules it may need.
+        packed: The modules of these, for a machine that does not have the folders.
+        made_by: The code that another machine must have, by names and versions; none for processes of this one.
+    """
 
     pickled: bytes
     path: tuple[str, ...]
     own: tuple[str, ...]
+    packed: Packed = ()
+    made_by: tuple[tuple[str, str], ...] = ()
 
 
-def recipe_of(work: Callable[..., Any]) -> Recipe:
-    """Work as it is sent.
+def recipe_of(work: Callable[..., Any], made_by: Mapping[str, str] | None = None) -> Recipe:
+    """Work as it is sent; with the user's modules where it goes to machines of which `made_by` is asked.
 
     Raises:
         NotSendableError: If it cannot be pickled.
     """
     try:
-        return Recipe(pickle.dumps(work), tuple(sys.path), folders())
+        recipe = Recipe(pickle.dumps(work), tuple(sys.path), folders())
     except Exception as problem:
         remedy = "make it of classes and functions that a module has by name, without open files, or set jobs = 1"
         line = f"what is to be run cannot be sent to other processes ({describe(problem)}){place_of(problem)}"
         raise NotSendableError(f"{line}; {remedy}") from problem
+    return replace(recipe, packed=pack(recipe.own), made_by=tuple(made_by.items())) if made_by else recipe
 
 
 def do_sent(recipe: Recipe, piece: Any) -> Any:
@@ -61,9 +74,12 @@ def load_sent(recipe: Recipe) -> Callable[[Any], Any]:
 
     Raises:
         NotSendableError: If that fails.
+        InputError: If this machine has other code.
     """
+    if recipe.made_by:
+        check_code(dict(recipe.made_by))
     sys.path.extend(folder for folder in recipe.path if folder not in sys.path)
-    open_folders(recipe.own)
+    unpack(recipe.packed) if recipe.made_by else open_folders(recipe.own)
     try:
         return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
     except Exception as problem:

@@ -3,9 +3,10 @@
 import functools
 import os
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import closing, contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from multiprocessing import TimeoutError as ParallelTimeoutError
 from typing import Any, Generic, TypeVar, cast
@@ -41,6 +42,34 @@ class Rescue(Generic[Piece, Result]):
     timeout_s: float | None = None
     suspect: Callable[[Piece], bool] = lambda _: False
     begins: Callable[[Piece], None] = lambda _: None
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """Where pieces are done instead of in processes of this machine.
+
+    Attributes:
+        cores: How many are done at once there, asked whenever there are pieces to do.
+        killed: What is raised of a piece that has ended several processes there.
+        made_by: The code that must be there, by names and versions.
+    """
+
+    cores: Callable[[], int]
+    killed: tuple[type[BaseException], ...]
+    made_by: Mapping[str, str]
+
+
+_elsewhere: ContextVar[Elsewhere | None] = ContextVar("elsewhere", default=None)
+
+
+@contextmanager
+def elsewhere(place: Elsewhere) -> Iterator[None]:
+    """Have all pieces done there meanwhile, by joblib's backend of the moment."""
+    before = _elsewhere.set(place)
+    try:
+        yield
+    finally:
+        _elsewhere.reset(before)
 
 
 @contextmanager
@@ -87,7 +116,7 @@ def _no_rescue(piece: Any, lost: Lost) -> Any:
 def _results(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int, rescue: Rescue[Piece, Result]
 ) -> Generator[Result, None, None]:
-    if jobs > 1:
+    if jobs > 1 or _elsewhere.get():
         return _spread(work, pieces, jobs, rescue)
     return _here(work, pieces, rescue) if rescue.timeout_s is None else _apart(work, pieces, rescue)
 
@@ -118,16 +147,19 @@ def _spread(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int, rescue: Rescue[Piece, Result]
 ) -> Generator[Result, None, None]:
     """Do them in several processes; where one dies or hangs, what was under way is done apart, then the rest."""
-    recipe, left, begun = recipe_of(work), enumerate(pieces), _Begun(rescue.suspect)
+    place, left, begun = _elsewhere.get(), enumerate(pieces), _Begun(rescue.suspect)
+    recipe = recipe_of(work, place.made_by if place else None)
+    ended: tuple[type[BaseException], ...] = (BrokenExecutor, ParallelTimeoutError, *(place.killed if place else ()))
     broken = True
     while broken:
         try:
+            jobs = place.cores() if place else jobs
             with closing(_in_processes(recipe, begun.of(left), jobs, rescue.timeout_s)) as results:
                 for number, result in results:
                     del begun.pieces[number]
                     yield result
             broken = False
-        except (BrokenExecutor, ParallelTimeoutError):
+        except ended:
             broken = True
         yield from _apart(work, list(begun.pieces.values()), rescue)
         begun.pieces.clear()

@@ -10,9 +10,10 @@ of the times that were measured here, one after the other, to whichever worker i
 import argparse
 import heapq
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from distributed import LocalCluster
@@ -30,6 +31,7 @@ NOTHING = 400
 """Pieces that do nothing, for the scheduler's cost."""
 PLANNED = (1, 2, 4, 8, 16, 32, 64, 100)
 BATCHES = (1, 2, 4, 8, 16)
+TRIALS = 64
 PROPOSAL_S = 0.1
 """A Gaussian process's proposal at some hundred trials."""
 
@@ -53,20 +55,21 @@ def episodes_of(settings: StudySettings, count: int) -> list[Episode]:
 
 def measured(family: DomainFamily, episodes: Sequence[Episode], workers: int) -> tuple[float, float]:
     """Seconds that episodes take together, and that a piece costs which does nothing."""
-    with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
-        with on_cluster(cluster.scheduler_address):
-            with working(nothing, range(2 * workers), workers) as done:
-                list(done)
-            with working(partial(run_episode, family), episodes[: 2 * workers], workers) as done:
-                list(done)
-            began = time.perf_counter()
-            with working(partial(run_episode, family), episodes, workers) as done:
-                list(done)
-            busy = time.perf_counter() - began
-            began = time.perf_counter()
-            with working(nothing, range(NOTHING), workers) as done:
-                list(done)
-    return busy, (time.perf_counter() - began) / NOTHING
+    drive = partial(run_episode, family)
+    cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+    with cluster, on_cluster(cluster.scheduler_address):
+        seconds_of(drive, episodes[: 2 * workers], workers)
+        seconds_of(nothing, range(2 * workers), workers)
+        return seconds_of(drive, episodes, workers), seconds_of(nothing, range(NOTHING), workers) / NOTHING
+
+
+def seconds_of(work: Callable[[Any], Any], pieces: Sequence[Any], workers: int) -> float:
+    """How long pieces take, start to end."""
+    began = time.perf_counter()
+    with working(work, pieces, workers) as done:
+        for _ in done:
+            pass
+    return time.perf_counter() - began
 
 
 def makespan(times: Sequence[float], workers: int, each_s: float) -> float:
@@ -85,23 +88,22 @@ def makespan(times: Sequence[float], workers: int, each_s: float) -> float:
     return max(free)
 
 
-def planned(times: Sequence[float], settings: StudySettings, workers: int, batch: int, each_s: float) -> float:
+def planned(times: Sequence[float], per_trial: int, workers: int, batch: int, each_s: float) -> float:
     """How long a study takes whose trials are proposed by the batch [s]."""
     random = np.random.default_rng(0)
-    per_trial = len(settings.agents) * settings.starts
-    rounds = -(-settings.budget // batch)
+    trials = [min(batch, TRIALS - first) for first in range(0, TRIALS, batch)]
     return sum(
-        PROPOSAL_S * batch + makespan(random.choice(times, per_trial * batch), workers, each_s) for _ in range(rounds)
+        PROPOSAL_S * count + makespan(random.choice(times, per_trial * count), workers, each_s) for count in trials
     )
 
 
-def print_plan(times: Sequence[float], settings: StudySettings, each_s: float) -> None:
+def print_plan(times: Sequence[float], per_trial: int, each_s: float) -> None:
     """The table of speed-ups, by workers and batch."""
-    alone = planned(times, settings, 1, 1, 0.0)
-    print(f"plan for {settings.budget} trials of {len(settings.agents) * settings.starts} episodes: {alone:.0f} s alone")
+    alone = planned(times, per_trial, 1, 1, 0.0)
+    print(f"plan for {TRIALS} trials of {per_trial} episodes: {alone:.0f} s alone; times faster than that:")
     print("workers  " + "".join(f"batch {batch:<4}" for batch in BATCHES))
     for workers in PLANNED:
-        faster = [alone / planned(times, settings, workers, batch, each_s) for batch in BATCHES]
+        faster = [alone / planned(times, per_trial, workers, batch, each_s) for batch in BATCHES]
         print(f"{workers:>7}  " + "".join(f"{factor:<10.1f}" for factor in faster))
 
 
@@ -121,7 +123,7 @@ def main() -> None:
     for workers in map(int, arguments.workers.split(",")):
         busy, each_s = measured(family, episodes, workers)
         print(f"{workers} workers: {len(episodes) / busy:.2f} episodes a second, {1e3 * each_s:.1f} ms for nothing")
-    print_plan(times, settings, each_s)
+    print_plan(times, len(settings.agents) * settings.starts, each_s)
 
 
 if __name__ == "__main__":

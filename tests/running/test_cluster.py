@@ -1,0 +1,104 @@
+"""A Dask cluster gives the results of one machine, to the bit, whoever leaves or joins."""
+
+import json
+import os
+from functools import partial
+
+import pytest
+
+from proxytune.cli.main import main
+from proxytune.errors import InputError
+from proxytune.running.cluster import on_cluster
+from proxytune.running.same_code import check_code, made_by
+from proxytune.running.workers import working
+
+distributed = pytest.importorskip("distributed")
+
+OWN_FAMILY = """
+from helper import shift
+from wobbly import wobbly
+
+
+def family(domain, *, model):
+    return shift(wobbly(domain, model=model))
+"""
+HELPER = "def shift(family):\n    return family\n"
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A scheduler with two workers, which are processes of their own."""
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as running:
+        yield running
+
+
+def doubled(piece):
+    return 2 * piece
+
+
+def ends_its_worker_once(flag, piece):
+    if piece == 3 and not flag.exists():
+        flag.touch()
+        os._exit(1)
+    return 2 * piece
+
+
+def test_other_code_on_a_worker_is_refused_by_name():
+    check_code(made_by())
+    with pytest.raises(InputError, match=r"has NumPy [\d.]+ \(was 1\.0\); install the same there as here"):
+        check_code({**made_by(), "numpy": "1.0"})
+
+
+def test_where_nothing_answers_the_user_is_told_in_one_line(make_study, capsys, monkeypatch):
+    monkeypatch.setattr("proxytune.running.cluster.CONNECT_S", 0.5)
+    assert main(["study", str(make_study()), "--backend", "dask", "--address", "tcp://127.0.0.1:9"]) == 2
+    last = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "--address tcp://127.0.0.1:9: no scheduler answers" in last
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--backend", "dask"], "--backend dask: give --address too"),
+        (["--address", "tcp://h:1"], "is for --backend dask"),
+    ],
+)
+def test_backend_and_address_go_together(make_study, capsys, words, complaint):
+    assert main(["study", str(make_study()), *words]) == 2
+    assert complaint in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_workers_do_all_pieces_and_one_that_dies_is_made_up_for(cluster, tmp_path):
+    with on_cluster(cluster.scheduler_address):
+        with working(doubled, range(20), jobs=1) as results:
+            assert sorted(results) == [2 * piece for piece in range(20)]
+        with working(partial(ends_its_worker_once, tmp_path / "flag"), range(20), jobs=1) as results:
+            assert sorted(results) == [2 * piece for piece in range(20)]
+    assert (tmp_path / "flag").exists()
+
+
+@pytest.mark.slow
+def test_a_worker_of_several_threads_is_refused():
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=2, dashboard_address=None) as several,
+        pytest.raises(InputError, match="has 2 threads.*start it with --nthreads 1"),
+        on_cluster(several.scheduler_address),
+    ):
+        pass
+
+
+@pytest.mark.slow
+def test_a_study_with_its_own_modules_gives_the_same_trials_while_a_worker_joins(cluster, make_study, capsys):
+    answers = []
+    for name, words in (("here", ()), ("there", ("--backend", "dask", "--address", cluster.scheduler_address))):
+        folder = make_study(name, family='"mine:family"')
+        (folder / "mine.py").write_text(OWN_FAMILY)
+        (folder / "helper.py").write_text(HELPER)
+        cluster.scale(3 if words else 2)
+        assert main(["study", str(folder), "--json", *words]) == 0
+        answers.append(json.loads(capsys.readouterr().out))
+    here, there = answers
+    assert here["best"] == there["best"]
+    for key in ("number", "theta", "score"):
+        assert [trial.get(key) for trial in here["trials"]] == [trial.get(key) for trial in there["trials"]]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
@@ -98,7 +99,18 @@ def test_brightness_has_no_floor_where_none_is_known(diagnosis):
 
 def test_there_are_four_figures_for_a_column(figures):
     assert set(figures) == {"camera_markings", "camera_displacement", "camera_ranking", "camera_error"}
-    assert all(3.4 <= figure.get_figwidth() <= 7.0 for figure in figures.values())
+    assert all(figure.get_figwidth() * 25.4 == pytest.approx(85.0) for figure in figures.values())
+    texts = [text for figure in figures.values() for text in figure.findobj(Text) if text.get_text()]
+    assert min(text.get_fontsize() for text in texts) >= 6.0
+
+
+def test_no_label_is_cut_and_the_legend_stands_on_none(figures):
+    for figure in figures.values():
+        labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, axes.title)]
+        boxes = [label.get_window_extent() for label in labels if label.get_text()]
+        assert all(figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1 for box in boxes)
+        for legend in figure.legends:
+            assert not any(legend.get_window_extent().overlaps(box) for box in boxes)
 
 
 def test_axes_say_what_they_show_in_which_unit(figures):
@@ -108,8 +120,8 @@ def test_axes_say_what_they_show_in_which_unit(figures):
     (ranking,) = figures["camera_ranking"].axes
     assert "[nats]" in ranking.get_xlabel()
     place, grey = figures["camera_error"].axes
-    assert place.get_ylabel() == "displacement of markings [px]"
-    assert grey.get_ylabel() == "difference in brightness [grey levels]"
+    assert place.get_ylabel() == "displacement\nof markings [px]"
+    assert grey.get_ylabel() == "difference in brightness\n[grey levels]"
 
 
 def test_the_markings_are_drawn_before_and_after_on_two_frames(figures, clean):

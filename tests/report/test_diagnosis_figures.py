@@ -90,22 +90,33 @@ def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(figure
         assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 6.0
 
 
-def test_the_legend_lies_within_its_figure(figures):
+def test_the_legend_lies_within_its_figure_and_on_no_label(figures):
     for figure in figures.values():
         figure.draw_without_rendering()
+        labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label) if label.get_text()]
         for legend in figure.legends:
             box = legend.get_window_extent()
             assert box.x0 >= 0
             assert box.x1 <= figure.bbox.x1
+            assert not any(box.overlaps(label.get_window_extent()) for label in labels)
+
+
+def test_no_label_is_cut_by_the_figure_s_edge(figures):
+    for name, figure in figures.items():
+        figure.draw_without_rendering()
+        for axes in figure.axes:
+            for text in filter(Text.get_text, (axes.xaxis.label, axes.yaxis.label, axes.title)):
+                box = text.get_window_extent()
+                assert figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1, (name, text.get_text())
 
 
 def test_axes_say_what_they_show_in_which_unit(figures):
     labels = {name: [(a.get_xlabel(), a.get_ylabel()) for a in figure.axes] for name, figure in figures.items()}
     assert labels["residual_over_time"] == [("time in the episode [s]", "distance to prediction\nin 2-s windows [mm]")]
     assert labels["residual_map"][-1][0] == "distance to prediction in 2-s windows [mm]"
-    assert "[nats]" in figures["ranking"].get_supxlabel()
+    assert "[nats]" in labels["ranking"][-1][0]
     assert [y for _, y in labels["error"]] == ["position error, RMS [mm]", "heading error, RMS [deg]"]
-    assert all(x == "length of prediction [s]" for x, _ in labels["error"])
+    assert all(x == "prediction length [s]" for x, _ in labels["error"])
     assert [y for _, y in labels["effect_curve"]][::2] == ["steady speed [m/s]", "speed − declared\n[mm/s]"]
     assert [x for x, _ in labels["effect_curve"]][2:] == ["command [duty]"] * 2
 

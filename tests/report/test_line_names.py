@@ -23,3 +23,10 @@ def test_places_are_moved_as_little_as_it_takes_and_keep_their_order():
     found = spread([0.0, 0.01, 0.0], 0.1)
     assert min(found) == 0.0
     assert sorted(found) == [found[0], found[2], found[1]]
+
+
+def test_places_stay_within_the_panel_where_they_fit():
+    np.testing.assert_allclose(spread([1.0, 1.0, 1.0], 0.1), [0.8, 0.9, 1.0])
+    np.testing.assert_allclose(spread([0.0, 1.0, 1.0], 0.4), [0.0, 0.6, 1.0])
+    assert max(spread([0.3] * 5, 0.25)) == 1.0
+    assert spread([0.5] * 3, 1.0) == [0.0, 1.0, 2.0]

@@ -29,7 +29,7 @@ def error_figure(diagnosis: Diagnosis) -> Figure:
         _scale(axes)
         axes.set_xticks(range(len(errors)), [f"{error.horizon_s:g}" for error in errors])
         axes.set_xlim(-0.5, len(errors) - 0.5)
-        axes.set_xlabel("length of prediction [s]", fontsize=8)
+        axes.set_xlabel("prediction length [s]", fontsize=8)
         dress(axes)
     place.set_ylabel("position error, RMS [mm]", fontsize=8)
     heading.set_ylabel("heading error, RMS [deg]", fontsize=8)

@@ -1,6 +1,8 @@
 """The learnt curves: what they add to the motion, over the signal that each depends on."""
 
 from collections.abc import Sequence
+from math import ceil
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +12,7 @@ from proxytune.diagnosis.remainder.learning import Learning
 from proxytune.effects.learnt.effect import Curve, Learnt
 from proxytune.effects.learnt.features import GROUPS, HEADING, LEVEL
 from proxytune.effects.learnt.table import learnt_effect
-from proxytune.report.style import BLUE, GREY, dress
+from proxytune.report.style import BLUE, COLUMN, GREY, dress, plain
 
 SHOWN_AS = {
     "m/s": (1e3, "mm/s"),
@@ -31,26 +33,27 @@ FADING = {
 
 PAIRS = "speed_and_turn"
 
+COLUMNS = 2
+
+WIDEST, HIGHEST = 24, 18
+"""Characters in a line below a panel, and beside it."""
+
 
 def learnt_figure(learning: Learning) -> Figure | None:
-    """A row of panels for each learnt group, largest share first; nothing where none is used."""
+    """A panel for each learnt curve, two in a row, largest share first; nothing where none is used."""
     effect = learnt_effect(learning.theta)
     if effect is None:
         return None
     order = list(learning.remainder.share)
     members = {curve.group for curve in effect.curves} - {LEVEL}
     groups = sorted(members, key=lambda group: order.index(GROUPS[group].title))
-    rows = [[curve for curve in effect.curves if curve.group == group] for group in groups]
-    rows = [_courses(row) if row[0].group == HEADING else row for row in rows]
-    across = max(len(row) for row in rows)
-    figure = Figure(figsize=(0.6 + 2.3 * across, 0.5 + 1.9 * len(rows)), layout="constrained")
-    grid = figure.subplots(len(rows), across, squeeze=False)
-    for row, panels in zip(rows, grid, strict=True):
-        for curve, axes in zip(row, panels, strict=False):
-            _draw(axes, effect, curve)
-        for axes in panels[len(row) :]:
-            axes.set_visible(False)
-    figure.suptitle("learnt from drives, not physics: what is added", fontsize=9)
+    by_group = [[curve for curve in effect.curves if curve.group == group] for group in groups]
+    curves = [one for row in by_group for one in (_courses(row) if row[0].group == HEADING else row)]
+    rows, across = ceil(len(curves) / COLUMNS), min(COLUMNS, len(curves))
+    figure = Figure(figsize=(COLUMN, 1.65 * rows + 0.25), layout="constrained")
+    for place, curve in enumerate(curves):
+        _draw(figure.add_subplot(rows, across, place + 1), effect, curve)
+    figure.suptitle("learnt from drives, not physics: what is added", fontsize=8)
     return figure
 
 
@@ -72,13 +75,13 @@ def _draw(axes: Axes, effect: Learnt, curve: Curve) -> None:
     group = GROUPS[curve.group]
     unit = group.channels[curve.channel if curve.group != HEADING else f"{curve.channel}_cos"].unit
     factor, label_unit = SHOWN_AS.get(unit, (100.0, f"% {unit}"))
-    label = f"{curve.channel} [{label_unit}]"
+    label = fill(f"{plain(curve.channel)} [{label_unit}]", HIGHEST)
     if curve.group == PAIRS:
         _surface(axes, curve, factor, label)
     else:
         _line(axes, curve, factor)
         of = f"{group.title}, {FADING[curve.group]}" if curve.group in FADING else group.title
-        axes.set_xlabel(f"{of} [{'deg' if curve.group == HEADING else group.unit}]", fontsize=8)
+        axes.set_xlabel(fill(f"{of} [{'deg' if curve.group == HEADING else group.unit}]", WIDEST), fontsize=7)
         axes.set_ylabel(label, fontsize=8)
         axes.axhline(0.0, color=GREY, lw=0.6)
     if curve.group == "turn_rate":

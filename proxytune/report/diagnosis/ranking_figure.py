@@ -67,7 +67,7 @@ def ranking_figure(found: Findings) -> Figure | None:
         axes.axvline(LEAST_GAIN, color="0.45", lw=1.0, ls=":", label=f"least to be added: {LEAST_GAIN:g} nats")
         axes.set_title(title, fontsize=7, loc="left", pad=2)
     _scale(panels[-1], [row.gain for rows in parts.values() for row in rows])
-    figure.supxlabel("evidence on drives left out [nats]", fontsize=8)
+    panels[-1].set_xlabel("evidence on drives left out [nats]", fontsize=8, loc="right")
     legend_below(figure, *panels, without=[ADDED.name, SIGNAL.name])
     return figure
 

@@ -91,7 +91,8 @@ def _trials(axes: Axes, result: StudyResult, points: Array, norm: Normalize) -> 
     cut = np.array([trial.state == "cut" for trial in result.trials])
     if cut.any():
         # Hollow: their colour is an estimate.
-        axes.scatter(*points[cut & scored].T, color="white", s=4, linewidths=0, clip_on=False, zorder=3)
+        across, up = points[cut & scored].T
+        axes.scatter(across, up, color="white", s=4, linewidths=0, clip_on=False, zorder=3)
         axes.scatter([], [], facecolors="white", edgecolors="0.4", s=10, linewidths=1.2, label="stopped early")
     if not scored.all():
         across, up = points[~scored].T

@@ -1,5 +1,6 @@
 """How far markings lie from where the model has them, over the picture."""
 
+from textwrap import fill
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from proxytune.diagnosis.camera.model.projection import project
 from proxytune.diagnosis.camera.naming.gate import Leftover
 from proxytune.diagnosis.camera.result import CameraDiagnosis
 from proxytune.report.diagnosis.camera.models import COLOURS, camera_models, label_places
+from proxytune.report.style import COLUMN
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +33,10 @@ KEYS_PX = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Lengths that the scale may show [pixel]."""
 
 
+TITLE = 28
+"""Characters in a line above a panel."""
+
+
 class Arrows(NamedTuple):
     """Displacements (n, 2), right and down [pixel], at places (n, 2) [pixel]."""
 
@@ -44,17 +50,17 @@ def displacement_figure(diagnosis: CameraDiagnosis) -> Figure:
     measured = [measured_displacements(fit) for fit in models.values()]
     gates = diagnosis.gates if len(models) > 1 else diagnosis.gates[1:]
     arrows = [*measured, *(_field(diagnosis, gate, own.places) for gate, own in zip(gates, measured, strict=True))]
-    names = [*(f"markings, {name}" for name in models), *(_say(gate) for gate in gates)]
+    names = [*(fill(f"markings, {name}", TITLE) for name in models), *(_say(gate) for gate in gates)]
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
     top = max(0.0, min(float(one.places[:, 1].min(initial=rows)) for one in measured) - 2.0 * columns / ACROSS)
     down = 2 if len(models) > 1 else 1
-    height = 0.6 + down * (0.25 + 2.35 * (rows - top) / columns)
-    figure = Figure(figsize=(5.2, height), layout="constrained")
+    height = 0.45 + down * (0.35 + 1.45 * (rows - top) / columns)
+    figure = Figure(figsize=(COLUMN, height), layout="constrained")
     panels = figure.subplots(down, 2, sharex=True, sharey=True, squeeze=False)
     longest = max(float(np.hypot(*one.lengths.T).max(initial=0.0)) for one in arrows)
     for number, (axes, one) in enumerate(zip(panels.ravel(), arrows, strict=True)):
         axes.set(xlim=(0, columns), ylim=(rows, top), aspect="equal")
-        axes.set_title(names[number], fontsize=8)
+        axes.set_title(names[number], fontsize=7)
         _draw(axes, one, COLOURS[number % len(models)], longest, columns / ACROSS)
     label_places(panels)
     return figure
@@ -92,7 +98,7 @@ def _field(diagnosis: CameraDiagnosis, gate: Leftover, places: Floats) -> Arrows
 
 def _say(gate: Leftover) -> str:
     share = max(0.0, 100.0 * gate.share)
-    return f"fixed to the camera: {gate.rms_px:.2f} px, {share:.0f} % of cost"
+    return f"fixed to the camera:\n{gate.rms_px:.2f} px, {share:.0f} % of cost"
 
 
 def _draw(axes: Axes, arrows: Arrows, colour: str, longest: float, room: float) -> None:

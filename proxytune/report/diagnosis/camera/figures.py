@@ -12,7 +12,7 @@ from proxytune.diagnosis.camera.result import CameraDiagnosis, Comparison
 from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure
 from proxytune.report.diagnosis.camera.markings_figure import markings_figure
 from proxytune.report.diagnosis.model_names import BEFORE
-from proxytune.report.style import BLUE, GREEN, GREY, LIGHT_BLUE, VERMILLION, dress, legend_below, plain
+from proxytune.report.style import BLUE, COLUMN, GREEN, GREY, LIGHT_BLUE, VERMILLION, dress, legend_below, plain
 
 LEAST_LOSS = 1.0
 """Losses below this are all alike [nats]."""
@@ -35,7 +35,7 @@ def _ranking(diagnosis: CameraDiagnosis) -> Figure | None:
     if not tried:
         return None
     nothing = loss_of_nothing(diagnosis)
-    figure = Figure(figsize=(5.2, 1.1 + 0.17 * len(tried)), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 1.3 + 0.16 * len(tried)), layout="constrained")
     axes = figure.subplots()
     for place, one in enumerate(tried):
         name, colour = _role(diagnosis, one.effects)
@@ -48,7 +48,8 @@ def _ranking(diagnosis: CameraDiagnosis) -> Figure | None:
     axes.set_ylim(len(tried) - 0.4, -0.6)
     axes.set_xscale("symlog", linthresh=10.0 * LEAST_LOSS, linscale=0.7)
     axes.set_xlim(-0.5, 1.5 * max(10.0 * LEAST_LOSS, nothing, *(one.loss for one in tried)))
-    axes.set_xlabel("evidence lost if only this effect is added [nats]; 0: none against all effects", fontsize=8)
+    label = "evidence lost if only this effect is added [nats]\n0: none against all effects"
+    axes.set_xlabel(label, fontsize=8, loc="right")
     dress(axes)
     legend_below(figure, axes)
     return figure
@@ -70,7 +71,7 @@ def _role(diagnosis: CameraDiagnosis, effects: Sequence[str]) -> tuple[str, str]
 
 def _errors(diagnosis: CameraDiagnosis) -> Figure:
     """Frame by frame on frames kept aside: displacement of markings, and brightness."""
-    figure = Figure(figsize=(5.2, 2.7), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
     place, grey = figure.subplots(1, 2)
     bent = [effect.effect for effect in diagnosis.effects if effect.nats is not None]
     every = [effect.effect for effect in diagnosis.effects]
@@ -78,8 +79,8 @@ def _errors(diagnosis: CameraDiagnosis) -> Figure:
     if diagnosis.pixels.floor is not None:
         place.axhline(diagnosis.pixels.floor.value, color=GREEN, lw=1.4, label="floor: any camera, mean")
     _draw_frames(grey, diagnosis.grey, every)
-    place.set_ylabel("displacement of markings [px]", fontsize=8)
-    grey.set_ylabel("difference in brightness [grey levels]", fontsize=8)
+    place.set_ylabel("displacement\nof markings [px]", fontsize=8)
+    grey.set_ylabel("difference in brightness\n[grey levels]", fontsize=8)
     legend_below(figure, place, grey)
     return figure
 
@@ -94,6 +95,6 @@ def _draw_frames(axes: Axes, error: Comparison, effects: list[str]) -> None:
     axes.plot(spots, before[order], ".", color=VERMILLION, ms=3, label=BEFORE)
     if effects:
         axes.plot(spots, after[order], ".", color=BLUE, ms=3, label="with effects added")
-    axes.set_xlabel("frames kept aside, by error before", fontsize=8)
+    axes.set_xlabel("frames kept aside,\nby error before", fontsize=8)
     axes.set_ylim(bottom=0.0)
     dress(axes)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,11 +14,15 @@ from proxytune.diagnosis.camera.model.fitting import CameraFit
 from proxytune.diagnosis.camera.model.projection import project
 from proxytune.diagnosis.camera.result import CameraDiagnosis
 from proxytune.report.diagnosis.camera.models import COLOURS, camera_models, label_places
+from proxytune.report.style import COLUMN
 
 Floats = NDArray[np.float64]
 
 SHOWN = 2
 """Frames, one of each half of the log."""
+
+TITLE = 28
+"""Characters in a line above a panel."""
 
 
 def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
@@ -25,14 +30,14 @@ def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
     models, frames = list(camera_models(diagnosis).items()), telling_frames(diagnosis)
     down, across = (SHOWN, len(models)) if len(models) > 1 else (1, SHOWN)
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
-    height = 0.35 + down * 2.45 * rows / columns
-    figure = Figure(figsize=(5.2, height), layout="constrained")
+    height = 0.35 + down * (0.2 + 1.4 * rows / columns)
+    figure = Figure(figsize=(COLUMN, height), layout="constrained")
     panels = figure.subplots(down, across, squeeze=False)
     shown = product(frames, zip(models, COLOURS, strict=False))
     for axes, (frame, ((name, fit), colour)) in zip(panels.ravel(), shown, strict=True):
         axes.imshow(diagnosis.gathered.pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest")
         draw_outlines(axes, fit, frame, colour)
-        axes.set_title(f"{name}, frame {diagnosis.gathered.numbers[frame]}", fontsize=8)
+        axes.set_title(fill(f"{name}, frame {diagnosis.gathered.numbers[frame]}", TITLE), fontsize=7)
     label_places(panels)
     return figure
 

@@ -121,8 +121,7 @@ class _View:
     def pass_by(self, poses: Signal) -> None:
         """Let the shutter see the poses of the next ticks."""
         self._waiting = np.concatenate((self._waiting, poses))
-        # Without effects only the last sub-frame of each picture is seen
-        wanted = self._every if self._chain.effects else 1
+        wanted = self._every if self._chain.effects else 1  # without effects only the last sub-frame is seen
         while len(self._waiting) >= self._every:
             seen, self._waiting = self._waiting[: self._every], self._waiting[self._every :]
             self.picture = self._develop(self._camera.render(seen[-wanted:]))

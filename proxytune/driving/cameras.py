@@ -164,6 +164,7 @@ class GroundPlaneCamera:
         self._side = copies.sides[copy].astype(np.int32)
         self._texels = copies.texels
         self._shape = (figures.rows, figures.columns)
+        self._keep_from(int(np.argmax(on_floor)) if on_floor.any() else len(on_floor))
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
@@ -171,22 +172,31 @@ class GroundPlaneCamera:
         row *= self._side
         row += column
         row += self._first
-        texels = self._texels.take(row, mode="clip").view(np.uint8).reshape(len(poses), *self._shape, 4)
-        pictures = np.empty((len(poses), *self._shape, 3), dtype=np.uint8)
+        texels = self._texels.take(row, mode="clip").view(np.uint8).reshape(*row.shape, 4)
+        pictures = np.empty((len(poses), self._shape[0] * self._shape[1], 3), dtype=np.uint8)
+        pictures.reshape(len(poses), -1)[:, : self._sky.size] = self._sky
         for colour in range(3):  # four times as fast as one copy of [..., :3]
-            pictures[..., colour] = texels[..., colour]
-        return pictures
+            pictures[:, self._sky.size // 3 :, colour] = texels[..., colour]
+        return pictures.reshape(len(poses), *self._shape, 3)
+
+    def _keep_from(self, pixel: int) -> None:
+        """Look up only the pixels from this one on: all before it are sky."""
+        self._sky = np.array(SKY * pixel, dtype=np.uint8)
+        self._plane, self._last = np.ascontiguousarray(self._plane[:, pixel:]), self._last[pixel:]
+        self._first, self._side = self._first[pixel:], self._side[pixel:]
 
     def _look(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.int32]:
         """Column and row (2, n, pixels) of each pixel's texel in its copy."""
         cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-        ahead, left = np.stack((cos, sin), dtype=np.float32), np.stack((-sin, cos), dtype=np.float32)
+        ahead, left = np.array((cos, sin), dtype=np.float32), np.array((-sin, cos), dtype=np.float32)
         place = poses[:, :2].T.astype(np.float32) - self._origin
         # Not a matrix product: BLAS rounds differently from processor to processor, and so would the pictures
         where: NDArray[np.float32] = ahead[..., None] * self._plane[0]
         where += left[..., None] * self._plane[1]
         where += place[..., None] * self._plane[2]
-        np.clip(where, 0.0, self._last, out=where)
+        # Both at once, np.clip, takes twice as long
+        np.maximum(where, 0.0, out=where)
+        np.minimum(where, self._last, out=where)
         return where.astype(np.int32)
 
 

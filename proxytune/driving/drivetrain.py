@@ -44,7 +44,7 @@ class Drivetrain:
     def apply(self, signal: Signal, memory: Progress) -> tuple[Signal, Progress]:
         """The twists that the next chunk of duties leads to."""
         arrived, command = self.command.apply(signal, memory.command)
-        wheels, actuation = self.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)
+        wheels, actuation = self.actuation.apply(np.minimum(np.maximum(arrived, -1.0), 1.0), memory.actuation)
         twists, motion = self.motion.apply(self.ideal(wheels), memory.motion)
         return twists, Progress(command, actuation, motion)
 

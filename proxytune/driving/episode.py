@@ -121,15 +121,16 @@ class _View:
     def pass_by(self, poses: Signal) -> None:
         """Let the shutter see the poses of the next ticks."""
         self._waiting = np.concatenate((self._waiting, poses))
+        wanted = self._every if self._chain.effects else 1  # without effects only the last sub-frame is seen
         while len(self._waiting) >= self._every:
             seen, self._waiting = self._waiting[: self._every], self._waiting[self._every :]
-            self.picture = self._develop(self._camera.render(seen))
+            self.picture = self._develop(self._camera.render(seen[-wanted:]))
 
     def _develop(self, pictures: NDArray[np.uint8]) -> Picture:
         signal = pictures.reshape(len(pictures), -1)
         if self._chain.effects:
-            developed, self._memory = self._chain.apply(signal.astype(np.float32), self._memory)
-            signal = np.clip(np.rint(developed[-1:]), 0, 255).astype(np.uint8)
+            developed, self._memory = self._chain.newest(signal.astype(np.float32), self._memory)
+            return np.asarray(np.minimum(np.maximum(np.rint(developed), 0), 255).astype(np.uint8).reshape(self._shape))
         return np.asarray(signal[-1].reshape(self._shape))
 
 

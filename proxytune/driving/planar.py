@@ -20,14 +20,18 @@ def integrate(start: Signal, twists: Signal, tick_s: float) -> Signal:
         Poses (…, time, 3), headings unwrapped.
     """
     turns = twists[..., 2] * tick_s
-    headings = start[..., None, 2] + np.cumsum(turns, axis=-1)
+    headings = start[..., None, 2] + turns.cumsum(axis=-1)
     middles = headings - turns / 2.0
-    chord = tick_s * np.sinc(turns / (2.0 * np.pi))
+    half = np.pi * (turns / (2.0 * np.pi))
+    half[half == 0.0] = np.finfo(float).eps
+    chord = tick_s * (np.sin(half) / half)
     forward, sideways = twists[..., 0] * chord, twists[..., 1] * chord
     cosine, sine = np.cos(middles), np.sin(middles)
-    x = start[..., None, 0] + np.cumsum(forward * cosine - sideways * sine, axis=-1)
-    y = start[..., None, 1] + np.cumsum(forward * sine + sideways * cosine, axis=-1)
-    return np.stack((x, y, headings), axis=-1)
+    x = start[..., None, 0] + (forward * cosine - sideways * sine).cumsum(axis=-1)
+    y = start[..., None, 1] + (forward * sine + sideways * cosine).cumsum(axis=-1)
+    poses = np.empty((*headings.shape, 3))
+    poses[..., 0], poses[..., 1], poses[..., 2] = x, y, headings
+    return poses
 
 
 class PlanarPlant:

@@ -47,6 +47,18 @@ class Chain:
             after.append(kept)
         return signal, tuple(after)
 
+    def newest(self, signal: Signal, memories: tuple[Memory, ...]) -> tuple[Signal, tuple[Memory, ...]]:
+        """The last sample (…, channels) of what the next chunk of whole numbers becomes.
+
+        An effect that makes it for less than the whole chunk has a method `newest` of its own.
+        """
+        newest = getattr(self.effects[0], "newest", None) if len(self.effects) == 1 else None
+        if newest:
+            sample, memory = newest(signal, memories[0])
+            return sample, (memory,)
+        filtered, memories = self.apply(signal, memories)
+        return filtered[..., -1, :], memories
+
 
 def stage_chain(effects: Iterable[Effect], stage: Stage) -> Chain:
     """The effects of one stage, in the order given."""

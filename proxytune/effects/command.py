@@ -53,7 +53,7 @@ class Delay:
         length = signal.shape[-2]
         joined = np.concatenate((memory.samples, signal), axis=-2)
         late = (1.0 - memory.fraction) * joined[..., 1 : length + 1, :] + memory.fraction * joined[..., :length, :]
-        return late, memory._replace(samples=joined[..., length:, :])
+        return late, History(joined[..., length:, :], memory.fraction)
 
 
 @dataclass(frozen=True)

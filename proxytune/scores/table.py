@@ -15,6 +15,9 @@ from proxytune.settings import nearest
 LARGEST = 1e70
 """A score beyond this is no measurement, and its square would overflow."""
 
+MOST_CELLS = 10**8
+"""More scores, driven or not, fit into no table: 0.8 GB."""
+
 
 @dataclass(frozen=True, eq=False)
 class ScoreTable:
@@ -59,9 +62,12 @@ class ScoreTable:
             episodes: The episode of each row.
             metrics: What was scored.
             values: Finite, shape (rows, metrics).
+
+        Raises:
+            ScoresError: If agents have so many episodes of their own that the table would fill the memory.
         """
         rows, columns = _places(agents), _places(episodes)
-        table = np.full((len(rows), len(columns), len(metrics)), np.nan)
+        table = _empty(len(rows), len(columns), len(metrics))
         table[[rows[name] for name in agents], [columns[label] for label in episodes]] = values
         table.setflags(write=False)
         return cls(tuple(rows), tuple(columns), tuple(metrics), table)
@@ -87,10 +93,14 @@ class ScoreTable:
         return bool(self.driven.all())
 
     def unpaired(self) -> "ScoreTable":
-        """The same scores with a number of its own for each agent's every episode, so that no start is shared."""
+        """The same scores with a number of its own for each agent's every episode, so that no start is shared.
+
+        Raises:
+            ScoresError: If that table would fill the memory.
+        """
         rows, columns = np.nonzero(self.driven)
         labels = tuple(map(str, range(len(rows))))
-        values = np.full((len(self.agents), len(labels), len(self.metrics)), np.nan)
+        values = _empty(len(self.agents), len(labels), len(self.metrics))
         values[rows, np.arange(len(labels))] = self.values[rows, columns]
         return ScoreTable(self.agents, labels, self.metrics, values)
 
@@ -122,3 +132,10 @@ class ScoreTable:
 def _places(names: Iterable[str]) -> dict[str, int]:
     """The place of each name among them, each once."""
     return {name: place for place, name in enumerate(dict.fromkeys(names))}
+
+
+def _empty(agents: int, episodes: int, metrics: int) -> Array:
+    if agents * episodes * metrics > MOST_CELLS:
+        few = "compare fewer agents, or label by the same start what is from the same start"
+        raise ScoresError(f"{agents} agents × {episodes} episodes that they do not share are too large a table; {few}")
+    return np.full((agents, episodes, metrics), np.nan)

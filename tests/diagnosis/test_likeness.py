@@ -11,6 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 import hidden
 from planted import TRUTH, drives_of, fitted, planted_log
 
+from proxytune.diagnosis.naming import likeness
 from proxytune.diagnosis.naming.likeness import two_robots
 
 SHORT = {"episodes": 6, "seconds": 20.0}
@@ -64,3 +65,13 @@ def test_a_single_drive_of_another_kind_is_no_second_robot():
 def test_three_drives_are_too_few_to_tell():
     log = mixed({"trim": -0.06})
     assert unlike(replace(log, episodes=log.episodes[:3])) is None
+
+
+def test_many_drives_are_looked_at_a_few_at_a_time_with_the_same_result(monkeypatch):
+    drives = drives_of(mixed({"wheel_gain.left": 0.88}))
+    model = fitted(drives)
+    together = two_robots(drives, model)
+    monkeypatch.setattr(likeness, "AT_ONCE", len(drives.episode) // 3)
+    apart = two_robots(drives, model)
+    assert apart.groups == together.groups
+    assert apart.gains == pytest.approx(together.gains, rel=1e-9)

@@ -10,6 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import ROBOT, TRUTH, planted_log, with_poses
 
+from proxytune.diagnosis.measured import split as splitting
 from proxytune.diagnosis.measured.split import BLOCK_S, BLOCKS, split
 from proxytune.errors import LogError
 
@@ -68,3 +69,13 @@ def test_half_of_the_measured_motion_not_of_the_time_is_fitted():
     fitted, tested = split(with_poses(planted_log(TRUTH, episodes=1, seconds=120.0), lost), ROBOT, None)
     assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2)
     assert len(np.unique(fitted.block)) >= 6
+
+
+def test_of_very_many_drives_no_more_are_tested_on_than_needed_spread_over_all(monkeypatch):
+    log = planted_log(TRUTH, episodes=36, seconds=10.0)
+    whole = split(log, ROBOT, None).tested
+    monkeypatch.setattr(splitting, "MOST_TESTED_S", 60.0)
+    some = split(log, ROBOT, None).tested
+    assert (len(whole.duties), len(some.duties)) == (12, 7)
+    kept = [int(np.flatnonzero((whole.headings == own).all(axis=1))[0]) for own in some.headings]
+    assert kept == [0, 1, 3, 5, 6, 8, 10]

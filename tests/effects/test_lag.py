@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from proxytune.effects.lag import follow, lag_of
+from proxytune.effects.lag import FEW, follow, lag_of
 
 
 def test_no_time_constant_follows_at_once():
@@ -17,3 +19,17 @@ def test_after_one_time_constant_63_percent_of_a_step_are_done():
     mean, end = follow(np.ones((10, 1)), np.zeros(1), lag_of(10.0))
     assert end[0] == pytest.approx(1.0 - np.exp(-1.0))
     assert mean.sum() == pytest.approx(10.0 - 10.0 * (1.0 - np.exp(-1.0)))
+
+
+@given(
+    st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_size=1, max_size=FEW),
+    st.floats(0.0, 40.0),
+    st.floats(-2.0, 2.0),
+)
+@settings(max_examples=100, derandomize=True)
+def test_a_few_samples_follow_to_the_last_bit_as_many_do(samples, lasts, before):
+    signal, value = np.array(samples), np.array([before, -before])
+    one = follow(signal, value, lag_of(lasts))
+    many = follow(signal[None], value[None], lag_of(lasts))
+    for few, filtered in zip(one, many, strict=True):
+        assert few.tobytes() == filtered[0].tobytes()

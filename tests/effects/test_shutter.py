@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxytune.effects import Setting
+from proxytune.effects.chain import Chain
 from proxytune.effects.sight.shutter import Blur, CameraLatency, RollingShutter
 
 ROWS, COLUMNS, RATE_HZ = 6, 4, 10.0
@@ -69,3 +70,23 @@ def test_it_does_not_matter_which_mixture_of_pictures_comes_first(latency, reado
 def test_a_scene_that_stands_still_hides_the_shutter(effect):
     still = np.repeat(np.arange(ROWS * COLUMNS * 3, dtype=np.float32)[None], 12, axis=0)
     np.testing.assert_allclose(run(effect, still), still, atol=1e-4)
+
+
+@given(st.floats(0.0, 0.9), st.lists(st.integers(1, 5), min_size=1, max_size=6))
+@settings(max_examples=60, derandomize=True)
+def test_the_newest_blurred_picture_alone_is_that_of_the_whole_chunk_to_the_last_bit(blur, chunks):
+    pictures = np.random.default_rng(0).integers(0, 256, (sum(chunks), 12)).astype(np.float32)
+    chain = Chain((Blur(blur),))
+    whole = alone = chain.begin(Setting(RATE_HZ, pictures[0], NOMINAL))
+    for chunk in np.split(pictures, np.cumsum(chunks)[:-1]):
+        developed, whole = chain.apply(chunk, whole)
+        newest, alone = chain.newest(chunk, alone)
+        np.testing.assert_array_equal(newest, developed[-1])
+
+
+def test_blur_behind_another_effect_is_of_the_whole_chunk():
+    """Half grey levels do not add up exactly, so their order must stay what it was."""
+    pictures = np.random.default_rng(0).integers(0, 256, (7, 12)).astype(np.float32)
+    chain = Chain((CameraLatency(0.123), Blur(0.21)))
+    memory = chain.begin(Setting(RATE_HZ, pictures[0], NOMINAL))
+    np.testing.assert_array_equal(chain.newest(pictures, memory)[0], chain.apply(pictures, memory)[0][-1])

@@ -38,3 +38,14 @@ def test_arranging_moves_values_with_their_names():
     table = ScoreTable.from_episodes({(a, e): {"m": 10.0 * i + e} for i, a in enumerate("AB") for e in (1, 2)})
     moved = table.arrange(agents=("B", "A"), episodes=("2", "1"))
     assert moved.values[:, :, 0].tolist() == [[12.0, 11.0], [2.0, 1.0]]
+
+
+def test_agents_with_too_many_episodes_of_their_own_are_refused_before_they_fill_the_memory():
+    agents = [f"A{number}" for number in range(20_000)]
+    alike = ScoreTable.from_rows(agents, ["0"] * len(agents), ["m"], np.ones((len(agents), 1)))
+    assert alike.values.shape == (20_000, 1, 1)
+    with pytest.raises(ScoresError, match="compare fewer agents") as problem:
+        alike.unpaired()
+    assert "\n" not in str(problem.value)
+    with pytest.raises(ScoresError, match="20000 agents × 20000 episodes"):
+        ScoreTable.from_rows(agents, agents, ["m"], np.ones((len(agents), 1)))

@@ -127,6 +127,13 @@ class Drives:
         after = None if self.after is None else self.after[kept]
         return replace(self, **parts, linked=self.linked[kept] & follows, block=block, after=after)
 
+    def some(self, episodes: Whole) -> "Drives":
+        """The same drives with some of their episodes (K,), in ascending order, numbered anew."""
+        rest = self.only(np.isin(self.episode, episodes))
+        parts = {name: getattr(self, name)[episodes] for name in ("duties", "issued", "rest", "headings")}
+        wheels = None if self.wheels is None else self.wheels[episodes]
+        return replace(rest, **parts, wheels=wheels, episode=np.searchsorted(episodes, rest.episode))
+
 
 def relative(origin: Floats, pose: Floats) -> Floats:
     """Poses (…, 3) seen from the frame of others."""

@@ -23,6 +23,9 @@ LEAST_S = 20.0
 MOST_S = 900.0
 """No more seconds are fitted where there are drives to choose from: every replay takes all of them."""
 
+MOST_TESTED_S = 1800.0
+"""No more seconds are tested on in the same way: the bullet plant drives them all, twice."""
+
 BLOCKS = 16
 """Each part has at least about so many blocks, if they last BLOCK_S."""
 
@@ -56,9 +59,10 @@ def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = (
             _gather_on_one_clock(test, robot, range(len(test.episodes)), clocks[1:]),
         )
     elif len(log.episodes) >= FEWEST_EPISODES:
-        fitted = _choose_some(log, [i for i in every if i % 3 != 2])
+        fitted = _choose_some(log, [i for i in every if i % 3 != 2], MOST_S)
+        tested = _choose_some(log, every[2::3], MOST_TESTED_S)
         parts = Parts(
-            _gather_on_one_clock(log, robot, fitted, clocks), _gather_on_one_clock(log, robot, every[2::3], clocks)
+            _gather_on_one_clock(log, robot, fitted, clocks), _gather_on_one_clock(log, robot, tested, clocks)
         )
     else:
         parts = _halve(_gather_on_one_clock(log, robot, every, clocks))
@@ -71,10 +75,10 @@ def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = (
     return Parts(thin(cut_into_blocks(parts.fitted)), cut_into_blocks(parts.tested))
 
 
-def _choose_some(log: Log, chosen: Sequence[int]) -> list[int]:
-    """Choose some of these drives, spread evenly, so that MOST_S are fitted; the rest is not needed."""
+def _choose_some(log: Log, chosen: Sequence[int], most_s: float) -> list[int]:
+    """Choose some of these drives, spread evenly, of about so many seconds; the rest is not needed."""
     seconds = sum(float(log.episodes[i].times[-1] - log.episodes[i].times[0]) for i in chosen)
-    wanted = max(FEWEST_EPISODES, math.ceil(len(chosen) * min(1.0, MOST_S / max(seconds, 1.0))))
+    wanted = max(FEWEST_EPISODES, math.ceil(len(chosen) * min(1.0, most_s / max(seconds, 1.0))))
     count = min(len(chosen), wanted)
     return [chosen[number * len(chosen) // count] for number in range(count)]
 

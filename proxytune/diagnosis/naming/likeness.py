@@ -14,6 +14,10 @@ from proxytune.diagnosis.rules import RULES
 GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
 
 
+AT_ONCE = 100_000
+"""About so many increments are looked at together: what is computed of each takes a kilobyte."""
+
+
 class Unlike(NamedTuple):
     """Drives that fall in two groups.
 
@@ -33,12 +37,11 @@ def two_robots(drives: Drives, model: Fit) -> Unlike | None:
 
     Effects of one robot that a model lacks spread the drives' gains too, but do not leave a gap between two groups.
     """
-    neutral = {name: model.theta.get(name, 1.0) for (name,) in GAINS}
-    whole = evaluate(drives, {**model.theta, **neutral}, (), model.noise)
     episodes = np.unique(drives.episode)
     if len(episodes) < 2 * RULES.robot_drives:
         return None
-    gains, deviations = _own_gains(whole, episodes)
+    batches = np.array_split(episodes, math.ceil(len(drives.episode) / AT_ONCE))
+    gains, deviations = np.concatenate([_own_gains(drives.some(batch), model) for batch in batches], axis=1)
     found = [_groups(episodes, gains[:, side], deviations[:, side]) for side in range(2)]
     clearest, side = max(((clear, side) for side, (clear, _) in enumerate(found)), key=lambda pair: pair[0])
     if clearest < 1.0:
@@ -48,16 +51,17 @@ def two_robots(drives: Drives, model: Fit) -> Unlike | None:
     return Unlike(("left", "right")[side], (means[0], means[1]), groups)
 
 
-def _own_gains(whole: Fit, episodes: Floats) -> tuple[Floats, Floats]:
+def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
     """Each drive's own gains and their deviations (E, 2): one Newton step from the gains of all."""
-    drives = whole.drives
+    neutral = {name: model.theta.get(name, 1.0) for (name,) in GAINS}
+    whole, count = evaluate(drives, {**model.theta, **neutral}, (), model.noise), len(drives.duties)
     columns = slopes(drives, whole.theta, GAINS, whole.whiten)
-    label = np.repeat(np.searchsorted(episodes, drives.episode), 3)
+    label = np.repeat(drives.episode, 3)
     z = whole.innovations
-    pull = sum_by(label, columns * clip_outliers(z)[:, None], len(episodes))
+    pull = sum_by(label, columns * clip_outliers(z)[:, None], count)
     inner = columns * (np.abs(z) < HUBER)[:, None]
-    curve = sum_by(label, columns[:, :, None] * inner[:, None, :], len(episodes)) + KEPT_SOLVABLE * np.eye(2)
-    loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, len(episodes)) / np.bincount(label))
+    curve = sum_by(label, columns[:, :, None] * inner[:, None, :], count) + KEPT_SOLVABLE * np.eye(2)
+    loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, count) / np.bincount(label))
     inverse = np.linalg.inv(curve)
     step = -np.einsum("eij,ej->ei", inverse, pull)
     low, high = np.array([span(coordinate, drives.robot) for coordinate in GAINS]).T

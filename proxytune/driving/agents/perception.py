@@ -65,14 +65,14 @@ def yellow_pixels(picture: Picture, eye: Eye, *, contrast: float = 60.0) -> Pixe
     looked = picture[eye.first_row :].reshape(-1, 3)
     blue = looked[:, 2].astype(np.int16)
     yellow = np.minimum(looked[:, 0], looked[:, 1]) - blue > contrast
-    return np.flatnonzero(yellow & eye.near)
+    return (yellow & eye.near).nonzero()[0]
 
 
 def white_pixels(picture: Picture, eye: Eye, *, brightness: float = 150.0) -> Pixels:
     """Pixels of the solid edge lines: every colour brighter than `brightness` (of 255)."""
     looked = picture[eye.first_row :].reshape(-1, 3)
     darkest = np.minimum(np.minimum(looked[:, 0], looked[:, 1]), looked[:, 2])
-    return np.flatnonzero((darkest > brightness) & eye.near)
+    return ((darkest > brightness) & eye.near).nonzero()[0]
 
 
 def fit_lane(eye: Eye, *, yellow: Pixels, white: Pixels, half_lane_m: float) -> Lane | None:

@@ -43,9 +43,9 @@ def _begin(robot: Robot, reach_m: float) -> Sight:
 
 def duties(speed: float, yaw_rate: float, *, full_speed: float, baseline: float) -> Command:
     """Duties for a forward speed [m/s] and a yaw rate [rad/s]; where a wheel saturates, turning goes first."""
-    turn = float(np.clip(yaw_rate * baseline / 2.0, -full_speed, full_speed))
+    turn = min(max(float(yaw_rate * baseline / 2.0), -full_speed), full_speed)
     room = full_speed - abs(turn)
-    ahead = float(np.clip(speed, -room, room))
+    ahead = min(max(float(speed), -room), room)
     return np.array((ahead - turn, ahead + turn)) / full_speed
 
 
@@ -83,7 +83,7 @@ class LanePilot:
         lane = fit_lane(eye, yellow=yellow, white=white, half_lane_m=HALF_LANE_M) or memory.lane
         yaw_rate = self.offset_gain * lane.offset + self.slope_gain * lane.slope
         command = duties(self.speed, yaw_rate, full_speed=memory.full_speed, baseline=memory.baseline)
-        return command, memory._replace(lane=lane)
+        return command, Sight(eye, memory.full_speed, memory.baseline, lane)
 
 
 @dataclass(frozen=True)
@@ -113,4 +113,4 @@ class PursuitPilot:
         curvature = 2.0 * left / (self.look_ahead_m**2 + left**2)
         speed = self.speed / (1.0 + self.caution * abs(curvature) * self.look_ahead_m)
         command = duties(speed, speed * curvature, full_speed=memory.full_speed, baseline=memory.baseline)
-        return command, memory._replace(lane=lane)
+        return command, Sight(eye, memory.full_speed, memory.baseline, lane)

@@ -31,20 +31,20 @@ class BulletPlant:
         self._tick_s = tick_s
         self._radius = robot.figures["wheel_radius"]
         self._half_distance = robot.figures["wheel_distance"] / 2.0
-        self._torque = robot.figures["wheel_torque"]
+        self._torques = [robot.figures["wheel_torque"]] * 2
         self._body = self._build(urdf, start)
         self._heading = float(start[2])
 
     def move(self, twists: Signal) -> tuple[Signal, bool]:
         """Follow twists, each for one tick."""
-        poses = np.empty((len(twists), 3))
-        for index, (forward, sideways, yaw) in enumerate(twists.tolist()):
+        poses = []
+        for forward, sideways, yaw in twists.tolist():
             self._spin(forward, yaw)
             pybullet.stepSimulation(self._world)
             if sideways:
                 self._shift(sideways * self._tick_s)
-            poses[index] = self._pose()
-        return poses, self._crashed()
+            poses.append(self._pose())
+        return np.array(poses), self._crashed()
 
     def _build(self, urdf: Path, start: Signal) -> int:
         world: dict[str, Any] = {"physicsClientId": self._world}
@@ -62,8 +62,8 @@ class BulletPlant:
         body: int = pybullet.loadURDF(str(urdf), (0.0, 0.0, 0.0), **world)
         self._wheels = self._find_wheels(body)
         self._floor = floor
-        self._offset = np.array(pybullet.getDynamicsInfo(body, -1, **world)[3])
-        centre = np.array((start[0], start[1], 0.0)) + pybullet.rotateVector(turn, self._offset.tolist())
+        self._offset = pybullet.getDynamicsInfo(body, -1, **world)[3]
+        centre = np.array((start[0], start[1], 0.0)) + pybullet.rotateVector(turn, list(self._offset))
         pybullet.resetBasePositionAndOrientation(body, centre.tolist(), turn, **world)
         for link in range(-1, pybullet.getNumJoints(body, **world)):
             pybullet.changeDynamics(body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, **world)
@@ -81,7 +81,7 @@ class BulletPlant:
             self._wheels,
             pybullet.VELOCITY_CONTROL,
             targetVelocities=[(forward - difference) / self._radius, (forward + difference) / self._radius],
-            forces=[self._torque, self._torque],
+            forces=self._torques,
             physicsClientId=self._world,
         )
 
@@ -99,7 +99,7 @@ class BulletPlant:
         heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         self._heading += math.remainder(heading - self._heading, math.tau)
         cosine, sine = math.cos(heading), math.sin(heading)
-        ahead, left = float(self._offset[0]), float(self._offset[1])
+        ahead, left, _ = self._offset
         return centre[0] - cosine * ahead + sine * left, centre[1] - sine * ahead - cosine * left, self._heading
 
     def _crashed(self) -> bool:

@@ -149,7 +149,7 @@ class MotorLag:
         """The mean speed over each sample, exact for a command that holds over it."""
         if len(memory.lags) == 1:
             mean, speed = follow(signal, memory.speed, memory.lags[0])
-            return mean, memory._replace(speed=speed)
+            return mean, Spin(speed, memory.lags)
         sides = [
             follow(signal[..., side : side + 1], memory.speed[..., side : side + 1], lag)
             for side, lag in enumerate(memory.lags)

@@ -65,6 +65,13 @@ class Blur:
             band[row, row : row + past + 1] = memory.weights
         return band @ joined, memory._replace(pictures=joined[..., length:, :])
 
+    def newest(self, signal: Signal, memory: Exposed) -> tuple[Signal, Exposed]:
+        """The average over the window that ends with the last picture: of whole numbers, exact in any order."""
+        past = memory.weights.size - 1
+        new = signal[..., -past - 1 :, :]
+        joined = np.concatenate((memory.pictures[..., new.shape[-2] - 1 :, :], new), axis=-2)
+        return memory.weights @ joined, Exposed(joined[..., 1:, :], memory.weights)
+
 
 @dataclass(frozen=True)
 class RollingShutter:

@@ -15,12 +15,13 @@ from proxytune.study.provenance import CODE, SEARCH, adopt, differ
 from proxytune.study.settings import LEARNING
 from proxytune.study.stages.cutting import Cut, reference, run_or_cut
 from proxytune.study.stages.failing import check_some_work
+from proxytune.study.stages.repeatable import FACT as NOT_REPEATABLE
 from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study, changes, facts
 from proxytune.study.study_run import StudyRun
 
-OTHERS = (LEARNING, SEARCH)
-"""Facts that the trials do not depend on: of a search for learning value, and which code proposed what."""
+OTHERS = (LEARNING, SEARCH, NOT_REPEATABLE)
+"""Facts that the trials do not depend on: of a search for learning value, which code proposed what, and of agents."""
 
 
 def run_study(run: StudyRun, proposer: Proposer) -> None:

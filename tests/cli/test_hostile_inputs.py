@@ -7,10 +7,8 @@ import warnings
 import pytest
 from processes import besides_progress
 
-from proxytune.cli import listing
 from proxytune.cli.compare import read_runs
 from proxytune.cli.main import main
-from proxytune.cli.terminal.answer import Answer
 from proxytune.report.writing import file_names
 
 TABLE = "agent,episode,d\n" + "".join(f"{a},{e},{i + 0.1 * e}\n" for i, a in enumerate("ABC") for e in (0, 1))
@@ -64,11 +62,10 @@ def test_names_that_are_alike_in_file_names_have_files_of_their_own(table, tmp_p
     assert len(figures) == len(set(figures)) == 4 == len(list((tmp_path / "F").glob("*.png")))
 
 
-def test_a_number_that_is_none_is_null_in_json(monkeypatch, capsys):
-    document = {"a": float("nan"), "b": [float("inf"), 1.0], "c": (1, "x")}
-    monkeypatch.setattr(listing, "run", lambda arguments: Answer(document, ""))
-    assert main(["list", "maps", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"a": None, "b": [None, 1.0], "c": [1, "x"]}
+def test_numbers_whose_squares_are_none_are_refused(table, tmp_path, capsys):
+    for spoilt in ("1e-320", "1e99"):
+        (tmp_path / "t.csv").write_text(TABLE.replace("0.1\n", f"{spoilt}\n", 1))
+        assert f"got '{spoilt}'; give it in another unit" in refused(capsys, *table, "d:max")
 
 
 ENDLESS = {

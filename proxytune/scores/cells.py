@@ -42,7 +42,7 @@ class Cells:
             ScoresError: If it is none, or its square would not be.
         """
         value = _number(cell.replace(self.decimal, "."))
-        if value and not 1.0 / LARGEST < abs(value) < LARGEST:
+        if not abs(value) < LARGEST:
             remedy = "; give it in another unit" if math.isfinite(value) else ""
             problem = f"must be a finite number, got {cell!r}{remedy}"
             raise ScoresError(f"{self.path}: line {line}, column '{column}': {problem}")

@@ -62,10 +62,15 @@ def test_names_that_are_alike_in_file_names_have_files_of_their_own(table, tmp_p
     assert len(figures) == len(set(figures)) == 4 == len(list((tmp_path / "F").glob("*.png")))
 
 
-def test_numbers_whose_squares_are_none_are_refused(table, tmp_path, capsys):
-    for spoilt in ("1e-320", "1e99"):
-        (tmp_path / "t.csv").write_text(TABLE.replace("0.1\n", f"{spoilt}\n", 1))
-        assert f"got '{spoilt}'; give it in another unit" in refused(capsys, *table, "d:max")
+def test_scores_whose_squares_are_no_numbers_are_refused_or_have_no_spread(table, tmp_path, capsys):
+    (tmp_path / "t.csv").write_text(TABLE.replace("0.1\n", "1e99\n", 1))
+    assert "got '1e99'; give it in another unit" in refused(capsys, *table, "d:max")
+    rows = [f"{agent},{number}e-320" for number, agent in enumerate("ABCD", start=1)]
+    (tmp_path / "t.csv").write_text("\n".join(["agent,d", *rows]) + "\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert main([*table, "d:max", "--resamples", "100", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["prpv"] is not None
 
 
 ENDLESS = {

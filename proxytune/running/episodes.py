@@ -3,13 +3,15 @@
 import errno
 import functools
 import math
+import random
 import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from proxytune.domain import DomainFamily, Episode, Outcome
@@ -80,6 +82,8 @@ def _lost(watch: Watch, episode: Episode, lost: Lost) -> Outcome:
 def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] = ()) -> Outcome:
     """Run one episode on one thread; what the agent or the domain does wrong is its outcome.
 
+    What it draws from `random` and `numpy.random`, which belong to the whole process, follows from the episode's seed.
+
     Args:
         family: Where it runs.
         episode: Which one.
@@ -92,7 +96,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     metrics: Mapping[str, float] | None = None
     failure = ""
     try:
-        with _libraries(len(sys.modules)).limit(limits=1):
+        with _libraries(len(sys.modules)).limit(limits=1), _seeded(episode.seed):
             metrics = _checked(family, episode, family.run(episode), needed)
     except KeyboardInterrupt:
         raise
@@ -124,6 +128,19 @@ def _check_machine(episode: Episode, problem: BaseException | None) -> None:
                 f"{place_of(problem)}; run again to continue, with more room or without that agent"
             ) from None
         problem = problem.__cause__ or problem.__context__
+
+
+@contextmanager
+def _seeded(seed: int) -> Iterator[None]:
+    """Let the generators of the whole process draw from a seed, and go on afterwards as if they had not."""
+    plain, array = random.getstate(), np.random.get_state()
+    random.seed(seed)
+    np.random.seed(seed % 2**32)
+    try:
+        yield
+    finally:
+        random.setstate(plain)
+        np.random.set_state(array)
 
 
 @functools.lru_cache(maxsize=1)

@@ -59,13 +59,12 @@ class Cells:
         """The numbers of these columns, shape (rows, columns).
 
         Raises:
-            ScoresError: If one is none, or its square would not be.
+            ScoresError: If one is none, or too large.
         """
         values = np.empty((len(self.lines), len(columns)))
         for place, name in enumerate(columns):
             values[:, place] = [_number(cell.replace(self.decimal, ".")) for cell in self.cells[name]]
-        size = np.abs(values)
-        for row, place in np.argwhere(~((size == 0.0) | ((size > 1.0 / LARGEST) & (size < LARGEST)))):
+        for row, place in np.argwhere(~(np.abs(values) < LARGEST)):
             where, cell = f"line {self.lines[row]}, column '{columns[place]}'", self.cells[columns[place]][row]
             remedy = "; give it in another unit" if math.isfinite(values[row, place]) else ""
             raise ScoresError(f"{self.path}: {where}: must be a finite number, got {cell!r}{remedy}")

@@ -16,13 +16,14 @@ from proxytune.study.provenance import CODE, SEARCH, adopt, differ
 from proxytune.study.settings import LEARNING
 from proxytune.study.stages.cutting import Cut, reference, run_or_cut
 from proxytune.study.stages.failing import check_some_work
+from proxytune.study.stages.repeatable import FACT as NOT_REPEATABLE
 from proxytune.study.stages.stopping import stopped
 from proxytune.study.study import Study, changes, facts
 from proxytune.study.study_run import StudyRun
 from proxytune.study.without_code import DESCRIBED, describe
 
-OTHERS = (LEARNING, SEARCH, DESCRIBED)
-"""Facts that the trials do not depend on: of a search for learning value, which code proposed what, how it is shown."""
+OTHERS = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE)
+"""Facts that trials do not depend on: of a search for learning value, which code proposed what, looks, and agents."""
 
 
 def run_study(run: StudyRun, proposer: Proposer) -> None:

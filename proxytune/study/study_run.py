@@ -1,6 +1,7 @@
 """A study under way: what it needs of its domain family is simulated once, kept in the store, and remembered."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 
 from proxytune.domain import Episode, Instance, Outcome, instance_of
@@ -111,17 +112,25 @@ class StudyRun:
         ended = {theta for theta in {episode.theta for episode in planned} if enough and enough(theta, known)}
         order = self._order(planned, missing, by_agent=enough is not None)
         family, needed = self.study.family, needed_metrics(self.settings, self.study.family)
-        under_way = self.store.under_way(self.study.identity)
-        left, agents = under_way.left(), under_way.agents_that_failed(ENDED, ENDLESS)
-        watch = Watch(self.settings.episode_timeout_s, lambda one: one in left or one.agent in agents, under_way.begin)
-        episodes = running(family, order, self.settings.jobs, lambda one: one.theta in ended, needed, watch)
-        with under_way.ended(), episodes as outcomes:
+        with (
+            self.watched() as watch,
+            running(family, order, self.settings.jobs, lambda one: one.theta in ended, needed, watch) as outcomes,
+        ):
             for outcome in outcomes:
                 self._keep(outcome)
                 known[outcome.episode] = outcome
                 theta = outcome.episode.theta
                 if enough and theta not in ended and enough(theta, known):
                     ended.add(theta)
+
+    @contextmanager
+    def watched(self) -> Iterator[Watch]:
+        """How episodes are watched: one that ends this process is known to the next, and its agent runs apart then."""
+        under_way = self.store.under_way(self.study.identity)
+        left, agents = under_way.left(), under_way.agents_that_failed(ENDED, ENDLESS)
+        timeout_s = self.settings.episode_timeout_s
+        with under_way.ended():
+            yield Watch(timeout_s, lambda one: one in left or one.agent in agents, under_way.begin)
 
     def _order(self, planned: Sequence[Episode], missing: Sequence[Episode], *, by_agent: bool) -> list[Episode]:
         """The longest first; or agent by agent as planned, and only within an agent the longest first."""

@@ -11,6 +11,8 @@ from proxytune.scores import Array, Metric, ScoreTable, varies
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, compare
 
+SMALLEST_SPREAD = 1e-150
+
 
 @dataclass(frozen=True)
 class Ppv:
@@ -88,9 +90,10 @@ def weights_of_spread(target: Array) -> Array:
         target: Mean scores, shape (…, agents, metrics).
 
     Returns:
-        Shape (…, metrics), 0 where all agents score alike.
+        Shape (…, metrics), 0 where all agents score alike, or so nearly that squares of it are none.
     """
-    spreads, varied = target.std(axis=-2, ddof=1), varies(target)
+    spreads = target.std(axis=-2, ddof=1)
+    varied = varies(target) & (spreads > SMALLEST_SPREAD)
     return np.where(varied, 1.0 / np.where(varied, spreads, 1.0), 0.0)
 
 

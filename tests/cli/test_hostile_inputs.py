@@ -7,10 +7,8 @@ import warnings
 import pytest
 from processes import besides_progress
 
-from proxytune.cli import listing
 from proxytune.cli.compare import read_runs
 from proxytune.cli.main import main
-from proxytune.cli.terminal.answer import Answer
 from proxytune.report.writing import file_names
 
 TABLE = "agent,episode,d\n" + "".join(f"{a},{e},{i + 0.1 * e}\n" for i, a in enumerate("ABC") for e in (0, 1))
@@ -64,11 +62,15 @@ def test_names_that_are_alike_in_file_names_have_files_of_their_own(table, tmp_p
     assert len(figures) == len(set(figures)) == 4 == len(list((tmp_path / "F").glob("*.png")))
 
 
-def test_a_number_that_is_none_is_null_in_json(monkeypatch, capsys):
-    document = {"a": float("nan"), "b": [float("inf"), 1.0], "c": (1, "x")}
-    monkeypatch.setattr(listing, "run", lambda arguments: Answer(document, ""))
-    assert main(["list", "maps", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"a": None, "b": [None, 1.0], "c": [1, "x"]}
+def test_scores_whose_squares_are_no_numbers_are_refused_or_have_no_spread(table, tmp_path, capsys):
+    (tmp_path / "t.csv").write_text(TABLE.replace("0.1\n", "1e99\n", 1))
+    assert "got '1e99'; give it in another unit" in refused(capsys, *table, "d:max")
+    rows = [f"{agent},{number}e-320" for number, agent in enumerate("ABCD", start=1)]
+    (tmp_path / "t.csv").write_text("\n".join(["agent,d", *rows]) + "\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert main([*table, "d:max", "--resamples", "100", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["prpv"] is not None
 
 
 ENDLESS = {

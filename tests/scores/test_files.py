@@ -64,7 +64,6 @@ def test_domains_are_read_apart(csv):
         ("agent,distance\nA,1_000\n", "must be a finite number, got '1_000'"),
         ("agent,distance\nA,٣\n", "must be a finite number, got '٣'"),
         ("agent,distance\nA,1e99\n", "must be a finite number, got '1e99'; give it in another unit"),
-        ("agent,distance\nA,1e-320\n", "must be a finite number, got '1e-320'; give it in another unit"),
         ("agent,distance\nA\n", "line 2: has 1 cells, but the first line names 2"),
         ("agent,distance\nA,1,2\n", "line 2: has 3 cells, but the first line names 2"),
         ("agent,distance\n,1\n", "line 2, column 'agent': is empty"),

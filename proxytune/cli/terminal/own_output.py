@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 import os
 import sys
 from collections.abc import Iterator
@@ -67,22 +66,12 @@ def print_answer(answer: Answer, *, as_json: bool) -> None:
 
 def _json_text(document: dict[str, Any]) -> str:
     """The document; in ASCII, as JSON escapes it, where standard output cannot hold its letters."""
-    document = _defined(document)
     text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False)
     try:
         text.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:
         return json.dumps(document, indent=2, allow_nan=False)
     return text
-
-
-def _defined(value: Any) -> Any:
-    """A document whose numbers are finite: what has no value, or too large a one, is None."""
-    if isinstance(value, dict):
-        return {key: _defined(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_defined(one) for one in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _discard_the_rest() -> None:

@@ -10,7 +10,7 @@ already shows to matter is left out of the second look.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
 from typing import NamedTuple
@@ -24,6 +24,7 @@ from proxytune.space import Interval, Theta
 from proxytune.study.settings import StudySettings
 from proxytune.study.stages.failing import check_some_work
 from proxytune.study.stages.movement import LOOKS, Movement, judge
+from proxytune.study.stages.repeatable import check_repeatable, not_repeatable
 from proxytune.study.study import Study
 from proxytune.study.study_run import StudyRun
 
@@ -49,19 +50,24 @@ class Preflight:
         movements: One per parameter, in the order of the box.
         episodes: How many episodes it took.
         failure: Why the first of them failed, where all of them did; else empty.
+        not_repeatable: One line for each agent that scores otherwise when it drives the same episode again.
     """
 
     base: Theta
     movements: tuple[Movement, ...]
     episodes: int
     failure: str = ""
+    not_repeatable: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One line for each parameter that does nothing beyond noise, or a single one if every episode failed."""
+        """One line for each agent that is not repeatable, and for each parameter that does nothing beyond noise.
+
+        A single one if every episode failed.
+        """
         if self.failure:
             return (f"pre-flight: every agent fails everywhere, first with: {self.failure}; correct it",)
-        return tuple(movement.warning for movement in self.movements if not movement.moves)
+        return self.not_repeatable + tuple(one.warning for one in self.movements if not one.moves)
 
 
 def run_preflight(run: StudyRun) -> Preflight | None:
@@ -73,7 +79,14 @@ def run_preflight(run: StudyRun) -> Preflight | None:
         EpisodeError: If an episode fails and the study is to stop then.
         RunError: If every episode fails alike.
     """
-    return None if run.finished_trials() else _preflight(run, partial(_simulate, run))
+    if run.finished_trials():
+        return None
+    learnt = _preflight(run, partial(_simulate, run))
+    if learnt is None or learnt.failure:
+        return learnt
+    first = _places(run.settings, 0)[0]
+    check_repeatable(run, [_episode(run.settings, learnt.base, agent, first) for agent in run.settings.agents])
+    return replace(learnt, not_repeatable=not_repeatable(run.store))
 
 
 def preflight_of(run: StudyRun) -> Preflight | None:
@@ -107,7 +120,7 @@ def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]
         movements |= {i.name: _movement(run.study, look, i, known) for i in undecided}
         undecided = tuple(i for i in undecided if not movements[i.name].moves)
     moved = tuple(movements[name] for name in settings.space.names)
-    return Preflight(_base(settings), moved, len(driven), _failure(driven))
+    return Preflight(_base(settings), moved, len(driven), _failure(driven), not_repeatable(run.store))
 
 
 def _failure(driven: Mapping[Episode, Outcome]) -> str:

@@ -1,9 +1,9 @@
 """What tells a damaged study.db: a checksum over every row, and a chain over the trials of each search.
 
 A row's checksum is the CRC-32 of its values as Python writes them in ASCII. That of an episode covers the θ of its
-instance, so that it holds wherever instances are numbered anew. A trial's digest is the SHA-256 of its values and of the
-digest before it: a trial that is changed, deleted or renumbered breaks the chain from there on. This tells damage and
-careless edits; who wants to deceive can compute it as well.
+instance, so that it holds wherever instances are numbered anew. A trial's digest is the SHA-256 of its values and of
+the digest before it: a trial that is changed, deleted or renumbered breaks the chain from there on. This tells damage
+and careless edits; who wants to deceive can compute it as well.
 """
 
 import hashlib

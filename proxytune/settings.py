@@ -1,7 +1,10 @@
 """Strict reading of TOML settings: every complaint is one line with file, key and what to do."""
 
 import difflib
+import errno
 import math
+import re
+import stat
 import tomllib
 from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping
 from dataclasses import dataclass
@@ -9,6 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.errors import SettingsError
+
+PIPES = ("/dev/stdin", "/dev/fd/", "/proc/self/fd/")
+"""Where a shell puts what another command prints."""
+MOST_DOTS = 100
+"""In one key: the time to read a dotted key grows with the square of its parts."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -74,7 +82,7 @@ class Section:
         value = self._get(key, default)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f"must be a number, got {value!r}")
-        if not math.isfinite(value):
+        if not _is_finite(value):
             raise self.error(key, f"must be finite, got {value}")
         if not low <= value <= high:
             raise self.error(key, f"must be between {low:g} and {high:g}, got {value}")
@@ -101,6 +109,8 @@ class Section:
         value = self._get(key, default)
         if not isinstance(value, str):
             raise self.error(key, f"must be text in quotes, got {value!r}")
+        if "\0" in value:
+            raise self.error(key, f"must not contain the character NUL, got {value!r}")
         names = list(choices)
         if names and value not in names:
             raise self.error(key, f"unknown value '{value}'; {nearest(value, names)}")
@@ -121,9 +131,9 @@ class Section:
         pair = value if isinstance(value, list) and len(value) == 2 else None
         if pair is None or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in pair):
             raise self.error(key, f"must be [low, high], got {value!r}")
-        low, high = float(pair[0]), float(pair[1])
-        if not (math.isfinite(low) and math.isfinite(high)):
+        if not (_is_finite(pair[0]) and _is_finite(pair[1])):
             raise self.error(key, f"bounds must be finite, got {value!r}")
+        low, high = float(pair[0]), float(pair[1])
         if low >= high:
             raise self.error(key, f"the lower bound must be below the upper one, got {value!r}")
         return low, high
@@ -150,10 +160,49 @@ def read_settings(path: Path) -> Section:
         SettingsError: If the file is missing, unreadable or not TOML.
     """
     try:
-        return Section(path, "", tomllib.loads(path.read_text(encoding="utf-8")))
+        text = read_text(path)
+        _check_dots(text)
+        return Section(path, "", tomllib.loads(text))
     except FileNotFoundError:
         raise SettingsError(f"{path}: no such file; check the path") from None
     except (OSError, UnicodeDecodeError) as problem:
         raise SettingsError(f"{path}: cannot be read ({problem})") from None
-    except tomllib.TOMLDecodeError as problem:
+    except RecursionError:
+        raise SettingsError(f"{path}: is nested too deeply; write fewer brackets in one another") from None
+    except ValueError as problem:  # TOML that is none, or numbers of more digits than Python reads.
         raise SettingsError(f"{path}: is not valid TOML: {problem}") from None
+
+
+def read_text(path: Path, encoding: str = "utf-8") -> str:
+    """The text of a file, or of what another command prints.
+
+    Raises:
+        OSError: If it cannot be read, or is a device or a named pipe, which may have no end.
+        UnicodeDecodeError: If it is no text.
+    """
+    try:
+        regular = stat.S_ISREG(path.stat().st_mode) or path.is_dir() or str(path).startswith(PIPES)
+    except ValueError as problem:  # A character that no path has.
+        raise OSError(errno.EINVAL, str(problem), str(path)) from None
+    if not regular:
+        raise OSError(errno.EINVAL, "it is a device or a pipe, not a file", str(path))
+    return path.read_text(encoding=encoding)
+
+
+def _check_dots(text: str) -> None:
+    """Refuse keys of more parts than anyone writes.
+
+    Raises:
+        ValueError: With the line.
+    """
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.count(".") > MOST_DOTS and max(part.count(".") for part in re.split("[,=]", line)) > MOST_DOTS:
+            raise ValueError(f"a key of more than {MOST_DOTS} parts (at line {number})")
+
+
+def _is_finite(value: float) -> bool:
+    """Whether a number is finite as a float; a whole number may have too many digits."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False

@@ -16,6 +16,15 @@ os.environ["PROXYTUNE_TRUST"] = "1"
 STATE = tempfile.TemporaryDirectory()
 os.environ["XDG_STATE_HOME"] = STATE.name
 
+FUZZ = 1000
+"""How many files of each kind are spoilt in tests/fuzzing, if nobody says otherwise."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a nightly run spoil more files."""
+    parser.addoption("--fuzz", type=int, default=FUZZ, metavar="N", help=f"spoilt files of each kind [{FUZZ}]")
+
+
 STUDY = {
     "format": "1",
     "name": '"wobbly"',
@@ -65,6 +74,18 @@ def study_maker(parent: Path) -> MakeStudy:
         return folder
 
     return make
+
+
+@pytest.fixture
+def write_file(tmp_path: Path) -> Callable[..., Path]:
+    """Write a text or bytes into a file of the test's folder."""
+
+    def write(content: str | bytes, name: str) -> Path:
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write
 
 
 @pytest.fixture

@@ -107,6 +107,7 @@ def test_drawing_convergence_loads_no_simulator_and_no_search():
     assert "matplotlib" in drawn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["score", "log_of", "SearchBox", "run_study", "read_study"])
 def test_a_name_that_simulates_nothing_by_itself_loads_no_simulator(name):
     assert "pybullet" not in loaded(f"from proxytune import {name}")

@@ -90,11 +90,13 @@ def test_the_effect_is_found_by_diagnose_and_written_to_its_model(follow, tmp_pa
     assert model.theta["weak_reverse:WeakReverse"] == pytest.approx(0.3, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_agent_drives_in_a_study(follow, tmp_path):
     assert len(follow("An agent")["study ."]["trials"]) == 4
     assert "grey:Grey,0," in (tmp_path / "target.csv").read_text()
 
 
+@pytest.mark.slow
 def test_the_robot_is_listed_and_drives_on_the_map(follow, tmp_path):
     answers = follow("A robot and a map")
     assert "my_robot" in [row["name"] for row in answers["list robots"]["robots"]]
@@ -103,6 +105,7 @@ def test_the_robot_is_listed_and_drives_on_the_map(follow, tmp_path):
     assert (family.robot, family.map.size, family.starts) == ("my_robot", (2.4, 1.755), 2)
 
 
+@pytest.mark.slow
 def test_the_measure_is_the_objective_of_a_study(follow, tmp_path):
     assert len(follow("A measure, also as the objective")["study ."]["trials"]) == 4
     assert open_study(tmp_path).objective.label == "Worst"
@@ -123,6 +126,7 @@ def test_the_learner_is_taught(follow):
     assert np.isfinite(taught["proxies"]["nominal"]["zero_shot"])
 
 
+@pytest.mark.slow
 def test_the_other_simulator_is_tuned(follow):
     answered = follow("Another simulator")["study swing"]
     assert len(answered["trials"]) == 10
@@ -142,6 +146,7 @@ def everything(tmp_path, monkeypatch):
         sys.modules.pop(Path(block.path).stem, None)
 
 
+@pytest.mark.slow
 def test_what_the_page_makes_keeps_the_promises_that_its_tests_check(everything):
     mine = load("test_mine:__dict__", kind="test")
     tests = {name: test for name, test in mine.items() if name.startswith("test_")}

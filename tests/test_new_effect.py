@@ -62,6 +62,7 @@ def test_an_effect_that_is_added_in_one_place_is_found_fitted_and_drawn(folder):
     assert any(name.endswith("effect_curve.png") for name in found["files"])
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_added_in_one_place_is_listed(folder):
     rows = json.loads(run(folder, "-m", "proxytune", "list", "effects", "--json").stdout)["effects"]
     (row,) = [row for row in rows if row["effect"] == "weak_reverse"]

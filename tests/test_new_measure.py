@@ -47,6 +47,7 @@ def folder(tmp_path_factory, make_studies):
     return folder
 
 
+@pytest.mark.slow
 def test_score_tells_a_new_measure_in_its_document_and_its_table(folder):
     words = ("-m", "proxytune", "score", "--proxy", "sim.csv", "--target", "real.csv", "--metric", "distance:max")
     document = json.loads(run(folder, *words, "--json").stdout)

@@ -1,11 +1,12 @@
 """Settings files are read strictly: each mistake is one line with file, key and remedy."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from proxytune.errors import SettingsError
-from proxytune.settings import Section, nearest, read_settings
+from proxytune.settings import Section, nearest, read_settings, read_text
 
 
 def section(path, **values):
@@ -83,3 +84,51 @@ def test_a_section_reads_like_a_mapping_of_plain_values():
     assert (section["body"], section.get("gain"), section.get("mass", 3)) == ({"mass": 1.0}, 2.0, 3)
     with pytest.raises(SettingsError, match=r"study.toml: domain.mass: is missing; add it"):
         section["mass"]
+
+
+TRAPS = {
+    "more digits than Python reads": ("x = " + "9" * 5000, "is not valid TOML: Exceeds the limit"),
+    "brackets in brackets": ("x = " + "[" * 20_000, "is nested too deeply"),
+    "a key of very many parts": (".".join("a" * 100_000) + " = 1", r"a key of more than 100 parts \(at line 1\)"),
+    "a table of very many parts": ("[" + ".".join("a" * 100_000) + "]", r"a key of more than 100 parts \(at line 1\)"),
+}
+
+
+@pytest.mark.parametrize("trap", TRAPS)
+def test_a_trap_in_toml_is_one_line_at_once(tmp_path, trap):
+    text, says = TRAPS[trap]
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    with pytest.raises(SettingsError, match=says):
+        read_settings(path)
+
+
+def test_long_rows_of_numbers_are_no_long_keys(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(f"weights = [{', '.join(['0.25'] * 500)}]\nrows = [\n[{', '.join(['0.5'] * 500)}],\n]\n")
+    assert len(read_settings(path)["weights"]) == 500
+
+
+def test_numbers_too_large_for_a_float_and_texts_that_no_file_can_have_are_refused():
+    section = Section(Path("study.toml"), "", {"n": 10**400, "pair": [0, 10**400], "name": "a\0b"})
+    for read, says in (
+        (lambda: section.number("n"), "n: must be finite"),
+        (lambda: section.bounds("pair"), "pair: bounds must be finite"),
+        (lambda: section.text("name"), "name: must not contain the character NUL"),
+    ):
+        with pytest.raises(SettingsError, match=says):
+            read()
+
+
+def test_devices_and_named_pipes_are_no_files_but_what_a_shell_pipes_in_is(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero")):
+        with pytest.raises(OSError, match="a device or a pipe"):
+            read_text(path)
+    out, into = os.pipe()
+    os.write(into, b"x = 1")
+    os.close(into)
+    assert read_text(Path(f"/dev/fd/{out}")) == "x = 1"
+    os.close(out)
+    with pytest.raises(OSError, match="null"):
+        read_text(tmp_path / "a\0b")

@@ -1,11 +1,13 @@
 """A log from DataFrames."""
 
-import json
 from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
+import tomlkit
 
 from proxytune.api.frames import as_files
+from proxytune.errors import LogError
 from proxytune.logs import Log, read_log
 
 Description = Mapping[str, str | float]
@@ -24,8 +26,14 @@ def log_of(samples: pd.DataFrame, description: Description, commands: pd.DataFra
     """
     frames = {"samples": samples} if commands is None else {"samples": samples, "commands": commands}
     stated = {"name": "log", **description}
-    values = {key: json.dumps(value, ensure_ascii=False, default=float) for key, value in stated.items()}
-    text = "".join(f"{json.dumps(key)} = {value}\n" for key, value in values.items())
     with as_files(frames) as folder:
-        (folder / "log.toml").write_text(text, encoding="utf-8")
+        (folder / "log.toml").write_text(_toml(stated), encoding="utf-8")
         return read_log(folder)
+
+
+def _toml(stated: Description) -> str:
+    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in stated.items()}
+    try:
+        return tomlkit.dumps(plain)
+    except TypeError as problem:
+        raise LogError(f"log.toml: {problem}; give texts and numbers") from None

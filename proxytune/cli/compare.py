@@ -28,6 +28,8 @@ from proxytune.search.engines.registry import NAMES, STUDY_ENGINES, engine_code,
 from proxytune.storage.lock import locked
 
 FILE_NAME = "runs.jsonl"
+MOST = 100_000
+"""Of seeds and of trials, as study.toml has it too."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -122,8 +124,8 @@ def _beside(arguments: argparse.Namespace) -> Path:
 def _check(arguments: argparse.Namespace) -> None:
     for name, least in (("seeds", 2), ("budget", 2), ("initial", 1)):
         value = getattr(arguments, name)
-        if value is not None and value < least:
-            raise InputError(f"--{name} {value}: give at least {least}")
+        if value is not None and not least <= value <= MOST:
+            raise InputError(f"--{name} {value}: give at least {least} and at most {MOST}")
     check_truths(arguments)
 
 
@@ -162,10 +164,10 @@ def _finish(objective: Objective, beside: Path, piece: tuple[RunKey, Run | None]
 def read_runs(path: Path) -> dict[RunKey, Run]:
     """Read the finished runs from a file of JSON lines; a line left unfinished by an interruption is skipped."""
     runs = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+    for line in path.read_bytes().splitlines() if path.exists() else []:
         try:
             run = run_from(json.loads(line))
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             continue
         runs[run.key] = run
     return runs

@@ -3,12 +3,13 @@
 import argparse
 from pathlib import Path
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.cli.terminal.theta import ChosenTheta, choose_theta
+from proxytune.cli.terminal.waiting import waiting
 from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import InputError
 from proxytune.report.drive.document import episode_document, episode_table, parting
@@ -70,7 +71,7 @@ def _drive(
     agent, start = arguments.agent, arguments.start
     check_episode(family, agent, theta, start)
     episode = make_episode(theta, agent=agent, start=start, seed=episode_seed(seed, start))
-    with Console(stderr=True).status("driving"):
+    with waiting("driving"):
         return drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
 
 

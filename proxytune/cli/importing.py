@@ -4,12 +4,13 @@ import argparse
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
+from proxytune.cli.terminal.waiting import waiting
 from proxytune.importing.opening import source_without_unnamed_pictures
 from proxytune.importing.reading import read_source
 from proxytune.importing.source import Source, Survey
@@ -32,7 +33,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Answer:
     """List what the source holds, and write the log."""
     facts = facts_of(arguments)
-    with Console(stderr=True).status(f"reading {arguments.source}"):
+    with waiting(f"reading {arguments.source}"):
         whole = read_source(arguments.source, wanted_of(arguments), facts.offset_s)
         source = source_without_unnamed_pictures(whole, facts)
         if arguments.output is not None:

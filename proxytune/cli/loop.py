@@ -18,7 +18,8 @@ from proxytune.cli.diagnose import shares
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.steps import Steps
 from proxytune.cli.terminal.study_folder import study_folder
-from proxytune.closing.loop import Closed, close_loop
+from proxytune.closing.closed import Closed
+from proxytune.closing.loop import close_loop
 from proxytune.closing.opening import open_loop
 from proxytune.closing.report import COLUMNS, document_of, notes_of, page_of, rows_of, table_rows
 from proxytune.logs import Log

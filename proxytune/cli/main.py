@@ -1,22 +1,19 @@
 """The entry point: finds the command, prints its answer, and turns our exceptions into one line and an exit status."""
 
 import argparse
-import json
-import os
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from rich.console import Console
-
 import proxytune
 from proxytune.cli.commands import COMMANDS
 from proxytune.cli.examples import epilog
-from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
+from proxytune.cli.terminal.own_output import print_answer, prints_to_stderr
+from proxytune.cli.terminal.trouble import stopped_by
 from proxytune.cli.terminal.trusting import only_trusted_code
-from proxytune.errors import InputError, ProxytuneError, RunError
+from proxytune.errors import InputError, ProxytuneError
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 FORMATS = ("png", "svg", "pdf")
@@ -89,10 +86,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         trusting = only_trusted_code(getattr(arguments, "trust", False))
         with sigterm_as_interrupt(), trusting, _figures(getattr(arguments, "format", ())):
-            _print(command.load().run(arguments), arguments.json)
+            with prints_to_stderr():
+                answer = command.load().run(arguments)
+            print_answer(answer, as_json=arguments.json)
     except ProxytuneError as problem:
         _complain(arguments.command, str(problem))
         return BAD_INPUT if isinstance(problem, InputError) else FAILED
+    except (SystemExit, MemoryError, OSError) as problem:
+        _complain(arguments.command, f"{stopped_by(problem)}; {command.left}")
+        return FAILED
     except KeyboardInterrupt as problem:
         word, status = ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
         _complain(arguments.command, f"{word}; {command.left}")
@@ -109,31 +111,5 @@ def _figures(named: Sequence[str]) -> AbstractContextManager[None]:
     return figures_also_as(named)
 
 
-def _print(answer: Answer, as_json: bool) -> None:
-    """Print a command's answer; a closed pipe is not an error.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
-    try:
-        if as_json:
-            print(json.dumps(answer.document, indent=2, allow_nan=False, ensure_ascii=False))
-        elif isinstance(answer.text, str):
-            print(answer.text)
-        else:
-            Console().print(answer.text)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        _discard_the_rest()
-    except OSError as problem:
-        _discard_the_rest()
-        raise RunError(f"standard output: cannot be written ({problem.strerror}); make room and run again") from None
-
-
-def _discard_the_rest() -> None:
-    """Drop what is still in the buffer, which would raise once more when Python ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def _complain(command: str, line: str) -> None:
-    print(f"proxytune {command}: {line}", file=sys.stderr)
+    print(f"proxytune {command}: {' '.join(line.splitlines())}", file=sys.stderr)

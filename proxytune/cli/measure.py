@@ -15,6 +15,8 @@ from proxytune.seeds import TARGET_OFFSET, target_seed
 from proxytune.study.measure import measure
 from proxytune.study.settings import read_study_settings
 
+MOST_REPEATS = 1_000_000
+
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the study, the model and the table to write."""
@@ -39,12 +41,14 @@ def run(arguments: argparse.Namespace) -> Answer:
     seed = target_seed(settings.seed) if arguments.seed is None else arguments.seed
     if seed < 0:
         raise InputError(f"--seed must be at least 0, got {seed}")
-    if arguments.repeats < 1:
-        raise InputError(f"--repeats must be at least 1, got {arguments.repeats}")
+    if not 1 <= arguments.repeats <= MOST_REPEATS:
+        raise InputError(f"--repeats must be between 1 and {MOST_REPEATS}, got {arguments.repeats}")
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
     if not arguments.output.absolute().parent.is_dir():
         raise InputError(f"{arguments.output}: its folder does not exist; create it first")
+    if arguments.output.is_dir():
+        raise InputError(f"--output {arguments.output}: is a folder; give the name of a file in it")
     with Bars(len(settings.agents) * settings.starts * arguments.repeats) as bars:
         scores = measure(settings, arguments.model, seed, bars, arguments.repeats)
     write_scores(scores, arguments.output)

@@ -51,9 +51,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     metrics = [Metric.parse(text) for text in arguments.metric]
     settings = read_study_settings(arguments.path)
     with Store.read(settings.folder) as store:
-        result, curves = _read(stored_run(open_to_look(settings, store), store), metrics)
+        study = open_to_look(settings, store)
+        result, curves = _read(stored_run(study, store), metrics)
     folder = _folder(settings.folder, metrics)
-    figures = draw_curves(curves, folder / "figures")
+    figures = draw_curves(curves, folder / "figures", study.truth)
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())

@@ -5,11 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
+from proxytune.cli.terminal.waiting import waiting
 from proxytune.diagnosis.horizon.prediction import agreement, predict
 from proxytune.diagnosis.measured.vehicle import robot_of
 from proxytune.diagnosis.predicted_pictures import frames_of, predict_pictures
@@ -95,13 +95,13 @@ def _predict_poses(log: Log, robot: Robot, model: Model, arguments: argparse.Nam
 def _predict_pictures(log: Log, robot: Robot, model: Model, folder: Path) -> Answer:
     """Every frame as a picture; frames.csv comes last, so that a list never names what is not there."""
     numbers, errors = list[int](), list[float]()
-    with Console(stderr=True).status("drawing") as status:
+    with waiting("drawing") as tell:
         for part in predict_pictures(log, robot, model.theta):
             for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
                 write_picture(folder / (PICTURES % number), picture)
             numbers += part.numbers.tolist()
             errors += part.grey_errors.tolist()
-            status.update(f"drawing: {len(numbers)} frames")
+            tell(f"drawing: {len(numbers)} frames")
     write_text(folder / "frames.csv", frames_text(log, frames_of(log), numbers))
     error = float(np.mean(errors))
     told = f"{len(numbers)} frames: mean absolute difference on the floor {error:.1f} grey levels\n{folder}"

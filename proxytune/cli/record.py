@@ -3,17 +3,19 @@
 import argparse
 from pathlib import Path
 
-from rich.console import Console
 from rich.text import Text
 
 from proxytune.api.recording import Wanted, record_log
 from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.waiting import waiting
 from proxytune.errors import InputError
 from proxytune.logs import Log
 from proxytune.study.settings import read_study_settings
 
 MOST_FRAMES = 1_000_000
 """As many as six digits number."""
+MOST_REPEATS = 10_000
+"""Weeks of driving at the least."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -34,14 +36,15 @@ def run(arguments: argparse.Namespace) -> Answer:
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
     wanted = Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed)
-    with Console(stderr=True).status("driving") as status:
-        log = record_log(settings, arguments.model, arguments.output, wanted, status.update)
+    with waiting("driving") as tell:
+        log = record_log(settings, arguments.model, arguments.output, wanted, tell)
     return _answer(log, arguments)
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    if arguments.repeats < 1 or arguments.seed < 0 or not 5.0 <= arguments.seconds <= 600.0:
-        raise InputError("--repeats must be at least 1, --seed at least 0 and --seconds between 5 and 600")
+    if not 1 <= arguments.repeats <= MOST_REPEATS or arguments.seed < 0 or not 5.0 <= arguments.seconds <= 600.0:
+        limits = f"--repeats must be between 1 and {MOST_REPEATS}, --seed at least 0 and --seconds between 5 and 600"
+        raise InputError(limits)
     if not 0 <= arguments.frames <= MOST_FRAMES:
         raise InputError(f"--frames must be between 0 and {MOST_FRAMES}, got {arguments.frames}")
 

@@ -1,7 +1,6 @@
 """`score`: how useful proxies are as predictors, from tables of scores."""
 
 import argparse
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,11 +20,12 @@ from proxytune.report.scores.table import measures, ranking
 from proxytune.report.scores.table_file import write_scores_table
 from proxytune.report.scores.words import score_answer
 from proxytune.report.table_files import check_ending
-from proxytune.report.writing import save, write_text
+from proxytune.report.writing import file_names, save, write_text
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import Assessment, Selection, assess, in_common, select_proxy
 
-FEWEST_RESAMPLES = 100
+FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000
+LARGEST_WEIGHT = 1e70
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -78,8 +78,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score one proxy, or rank several."""
-    if arguments.resamples < FEWEST_RESAMPLES or arguments.seed < 0:
-        raise InputError(f"--resamples must be at least {FEWEST_RESAMPLES} and --seed at least 0")
+    if not FEWEST_RESAMPLES <= arguments.resamples <= MOST_RESAMPLES or arguments.seed < 0:
+        between = f"{FEWEST_RESAMPLES} and {MOST_RESAMPLES}"
+        raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
         check_ending("--table", arguments.table)
     metrics = [Metric.parse(text) for text in arguments.metric]
@@ -134,6 +135,8 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
             weights[name] = float(weight)
         except ValueError:
             raise InputError(f"--beta {text}: write NAME:WEIGHT, as in distance:0.5") from None
+        if abs(weights[name]) > LARGEST_WEIGHT:
+            raise InputError(f"--beta {text}: the weight must be at most {LARGEST_WEIGHT:g}")
     return weights or None
 
 
@@ -152,9 +155,9 @@ def _write(
 
 def _draw(assessments: Mapping[str, Assessment], folder: Path) -> dict[Path, tuple[str, str]]:
     """Draw the figures; the kind of each and the proxy that it is of, by its path."""
-    drawn = {}
+    drawn, files = {}, file_names(assessments)
     for name, assessment in assessments.items():
-        suffix = "" if len(assessments) == 1 else "_" + re.sub(r"[^\w.-]+", "_", name)
+        suffix = "" if len(assessments) == 1 else f"_{files[name]}"
         for kind, figure in (("scatter", scatter(assessment)), ("flipped_pairs", flipped_pairs(assessment.prpv))):
             path = folder / f"{kind}{suffix}.png"
             save(figure, path)

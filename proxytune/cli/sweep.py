@@ -17,6 +17,7 @@ from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.report.page import foot_of, html_of
 from proxytune.report.study.page import study_settings
+from proxytune.report.sweep.bars import bars_figure
 from proxytune.report.sweep.document import (
     NO_POD,
     curve_csv,
@@ -25,8 +26,9 @@ from proxytune.report.sweep.document import (
     curve_name,
     curve_tables,
     failures,
+    held_mark,
 )
-from proxytune.report.sweep.figures import bars_figure, panels_figure, sweep_figure
+from proxytune.report.sweep.figures import panels_figure, sweep_figure
 from proxytune.report.sweep.page import sweep_page
 from proxytune.report.writing import save, write_text
 from proxytune.running.progress import Bars
@@ -87,22 +89,22 @@ def run(arguments: argparse.Namespace) -> Answer:
                 run_sweep(run, sweep, discrepancy)
         curves = [curve for sweep in sweeps if (curve := curve_of(run, sweep))]
     output = arguments.output or folder / "figures"
-    figures = draw_curves(curves, output)
+    figures = draw_curves(curves, output, study.truth)
     held = _held(word, sweeps[0].base)
     page = _write_page(arguments, study, curves, figures, held)
     answer = _answer(curves, run.spent, figures, [*write_curves(curves, output), page])
     return _say_base(answer, word, sweeps[0].base, held)
 
 
-def draw_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
+def draw_curves(curves: Sequence[Curve], folder: Path, truth: Theta | None) -> list[Path]:
     """Draw one figure per curve, and two of all curves with the same values of the others; return their paths."""
-    figures = {curve_name(curve): panels_figure(curve) for curve in curves}
+    figures = {curve_name(curve): panels_figure(curve, truth) for curve in curves}
     for base, members in groupby(sorted(curves, key=_base), key=_base):
         together = list({curve.parameter: curve for curve in members}.values())
         if len(together) > 1:
-            held = [f"{name}={value:g}" for name, value in base]
-            figures["_".join(["sweep_all", *held])] = sweep_figure(together)
-            figures["_".join(["sweep_bars", *held])] = bars_figure(together)
+            mark = f"_{held_mark(dict(base))}" if base else ""
+            figures[f"sweep_all{mark}"] = sweep_figure(together, truth)
+            figures[f"sweep_bars{mark}"] = bars_figure(together)
     for name, figure in figures.items():
         save(figure, folder / f"{name}.png")
     return [folder / f"{name}.png" for name in figures]

@@ -1,27 +1,29 @@
 """The righted agent on its way: beside the target in the proxy tuned before, and in the extended one after."""
 
+import json
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from proxytune.api.studies import StudyReport
-from proxytune.closing.loop import Closed
+from proxytune.closing.closed import Closed
 from proxytune.closing.righted import righted
 from proxytune.domain import DomainFamily, make_episode
-from proxytune.errors import EpisodeError
+from proxytune.errors import EpisodeError, StoreError
 from proxytune.report.drive.document import parting
 from proxytune.report.drive.figure import episode_figure
 from proxytune.report.numbers import short
 from proxytune.report.page import Picture
 from proxytune.report.style import plain
-from proxytune.report.writing import png_of
+from proxytune.report.writing import save, write_text
 from proxytune.seeds import episode_seed
 from proxytune.study.family import load_family
 from proxytune.study.side_by_side import SideBySide, drive_side_by_side
 from proxytune.study.single_episode import can_record
 
 MOST_STARTS = 4
-"""The start that is shown is one of the first so many: each is driven to choose it, whenever a page is made."""
+"""The start that is shown is one of the first so many: each is driven to choose it."""
 
 
 class BothEpisodes(NamedTuple):
@@ -31,23 +33,41 @@ class BothEpisodes(NamedTuple):
     after: SideBySide
 
 
-def righted_pictures(closed: Closed) -> list[Picture]:
-    """Both episodes of the righted agent; none where there is no such agent, or no twin to drive it in."""
-    told = righted(closed)
-    both = drive_both(closed, told["agent"]) if told else None
-    if told is None or both is None:
-        return []
-    metrics = [metric.name for metric in closed.loop.settings.metrics]
-    captions = (_introduction(closed, told, both.before), "The same start and seed in the extended proxy.")
-    rest = " This is one episode; the order of the agents counts every start, under other seeds."
-    return [
-        Picture(
-            f"{told['agent']} beside the target, {when}",
-            png_of(episode_figure(pair, metrics)),
-            f"{caption} {parting(pair)} {_scores(pair, metrics)}{end}",
-        )
-        for when, pair, caption, end in zip(("before", "after"), both, captions, ("", rest), strict=True)
-    ]
+def pictures_file(home: Path) -> Path:
+    """Where a loop keeps titles and captions of the pictures that lie beside them."""
+    return home / "righted" / "pictures.json"
+
+
+def write_pictures(closed: Closed) -> None:
+    """Drive the righted agent, and keep a picture of it before and after; none without such an agent, or a twin.
+
+    Raises:
+        RunError: If they cannot be written.
+    """
+    path, gain = pictures_file(closed.loop.home), righted(closed)
+    both = drive_both(closed, gain["agent"]) if gain else None
+    texts = []
+    if gain and both:
+        metrics = [metric.name for metric in closed.loop.settings.metrics]
+        for name, pair, caption in zip(BothEpisodes._fields, both, _captions(closed, gain, both), strict=True):
+            save(episode_figure(pair, metrics), path.with_name(f"{name}.png"))
+            title = f"{gain['agent']} beside the target, {name}"
+            texts.append({"file": f"{name}.png", "title": title, "caption": caption})
+    write_text(path, json.dumps(texts, indent=2) + "\n")
+
+
+def read_pictures(home: Path) -> list[Picture]:
+    """The pictures that were kept.
+
+    Raises:
+        StoreError: If they cannot be read.
+    """
+    path = pictures_file(home)
+    try:
+        texts = json.loads(path.read_text(encoding="utf-8"))
+        return [Picture(one["title"], path.with_name(one["file"]).read_bytes(), one["caption"]) for one in texts]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise StoreError(f"{path}: cannot be read; remove it to draw the righted agent again") from None
 
 
 def drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
@@ -89,9 +109,19 @@ def _starts(closed: Closed) -> range:
     return range(min(MOST_STARTS, closed.loop.settings.starts))
 
 
-def _introduction(closed: Closed, told: dict[str, Any], pair: SideBySide) -> str:
-    agent, start, starts = told["agent"], pair.episode.start, _starts(closed)
-    pairs = f"{short(told['wrong_pairs_before'])} before, {short(told['wrong_pairs_after'])} after"
+def _captions(closed: Closed, gain: dict[str, Any], both: BothEpisodes) -> tuple[str, str]:
+    metrics = [metric.name for metric in closed.loop.settings.metrics]
+    before, after = (f"{parting(pair)} {_scores(pair, metrics)}" for pair in both)
+    rest = "This is one episode; the order of the agents counts every start, under other seeds."
+    return (
+        f"{_introduction(closed, gain, both.before)} {before}",
+        f"The same start and seed in the extended proxy. {after} {rest}",
+    )
+
+
+def _introduction(closed: Closed, gain: dict[str, Any], pair: SideBySide) -> str:
+    agent, start, starts = gain["agent"], pair.episode.start, _starts(closed)
+    pairs = f"{short(gain['wrong_pairs_before'])} before, {short(gain['wrong_pairs_after'])} after"
     chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
     return (
         f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "

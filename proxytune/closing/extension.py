@@ -1,13 +1,11 @@
 """The extended study: the same study by a proxy that has what the diagnosis found."""
 
-import json
 import os
-import re
 import shutil
-from collections.abc import Mapping
-from datetime import date, time
 from pathlib import Path
 from typing import Any
+
+import tomlkit
 
 from proxytune.errors import SettingsError, StoreError
 from proxytune.report.writing import write_text
@@ -45,7 +43,7 @@ def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
     domain = {key: value for key, value in settings.domain.items() if key != "effects"}
     kept = _kept_effects(settings, model)
     values["domain"] = {**domain, "effects": kept} if kept else domain
-    return f"# {settings.name} with what `diagnose` found, written by `loop`.\n" + toml_text(values)
+    return f"# {settings.name} with what `diagnose` found, written by `loop`.\n" + tomlkit.dumps(values)
 
 
 def write_extension(settings: StudySettings, model: Path, folder: Path) -> None:
@@ -102,40 +100,3 @@ def _kept_effects(settings: StudySettings, model: Path) -> dict[str, Any]:
 
 def _from(folder: Path, path: Path) -> str:
     return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-
-
-def toml_text(values: Mapping[str, Any]) -> str:
-    """Plain values as TOML that reads back as these."""
-    return "".join(_lines("", values))
-
-
-def _lines(name: str, table: Mapping[str, Any]) -> list[str]:
-    plain = {key: value for key, value in table.items() if not isinstance(value, dict)}
-    head = [f"\n[{name}]\n"] if name and (plain or not table) else []
-    own = [*head, *(f"{_key(key)} = {_value(value)}\n" for key, value in plain.items())]
-    prefix = f"{name}." if name else ""
-    inner = [_lines(f"{prefix}{_key(key)}", value) for key, value in table.items() if isinstance(value, dict)]
-    return [*own, *(line for lines in inner for line in lines)]
-
-
-def _key(key: str) -> str:
-    """A key, in quotes where TOML needs them."""
-    return key if re.fullmatch("[A-Za-z0-9_-]+", key) else _text(key)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items()) + " }"
-    if isinstance(value, str):
-        return _text(value)
-    if isinstance(value, date | time):
-        return value.isoformat()
-    # JSON calls inf and nan by other names.
-    return repr(value) if isinstance(value, float) else json.dumps(value)
-
-
-def _text(text: str) -> str:
-    # JSON's escapes are TOML's, which has one more.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,13 +1,14 @@
 """The loop: tune, diagnose, extend, tune again, compare; whatever was done is kept."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from proxytune.api.recording import record_log
 from proxytune.api.studies import StudyReport, most_episodes, run_opened
+from proxytune.closing.closed import Closed
 from proxytune.closing.diagnosing import (
     adds_something,
     check_camera,
@@ -16,9 +17,11 @@ from proxytune.closing.diagnosing import (
     read_diagnosis,
     wanted_of,
 )
+from proxytune.closing.episodes import pictures_file, write_pictures
 from proxytune.closing.extension import begin_anew_if_changed, extension_text, files_of, write_extension
 from proxytune.closing.held_out import drive_held_out, held_out_settings, scored_agents
 from proxytune.closing.opening import Loop
+from proxytune.closing.righted import righted
 from proxytune.closing.steps import Kept, Step, Teller, digest, digest_of_files
 from proxytune.driving.robot import robot_home
 from proxytune.errors import InputError
@@ -41,31 +44,9 @@ STEPS = {
     "extended study": "tuning again",
     "held-out scores": "the target's scores of held-out agents",
     "held-out agents": "held-out agents in both tuned proxies",
+    "righted agent": "the righted agent on its way",
 }
 """The steps in their order, as they are told."""
-
-
-@dataclass(frozen=True)
-class Closed:
-    """A loop that has come to its end.
-
-    Attributes:
-        loop: Which one.
-        before: The study.
-        diagnosis: What `diagnose --json` prints of the log.
-        after: The extended study; None where nothing was found to extend the proxy by.
-        held_out: What held-out agents say of both tuned proxies; None where there are none, or nothing was found.
-        done: The steps that this run has done or gone on with.
-        episodes: How many episodes this run has driven.
-    """
-
-    loop: Loop
-    before: StudyReport
-    diagnosis: Mapping[str, Any]
-    after: StudyReport | None
-    held_out: tuple[Assessment, Assessment] | None
-    done: tuple[str, ...]
-    episodes: int
 
 
 def close_loop(loop: Loop, teller: Teller) -> Closed:
@@ -103,7 +84,9 @@ class _Closing:
         if adds_something(diagnosis):
             after = self._tune("extended study", self._extend())
             held_out = self._held_out(before, after)
-        return Closed(self.loop, before, diagnosis, after, held_out, tuple(self.done), self.episodes)
+        closed = Closed(self.loop, before, diagnosis, after, held_out, (), self.episodes)
+        self._show_righted(closed)
+        return replace(closed, done=tuple(self.done))
 
     def _begin(self, name: str, how: str = "") -> None:
         place = list(STEPS).index(name) + 1
@@ -206,6 +189,17 @@ class _Closing:
         self.episodes += episodes
         self.done += [name] if episodes else []
         return driven[0].assessment, driven[1].assessment
+
+    def _show_righted(self, closed: Closed) -> None:
+        """Draw the righted agent's episodes, where there is a proxy after."""
+        if closed.after is None:
+            return
+        name, twin, home = "righted agent", self.loop.twin, self.loop.home
+        seen = twin and twin.read_text(encoding="utf-8"), digest_of_files(home / "diagnosed" / "model.toml")
+        thetas = [dict(report.theta) for report in (closed.before, closed.after)]
+        metrics = [metric.name for metric in self.settings.metrics]
+        inputs = digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
+        self._keep(name, inputs, pictures_file(home), partial(write_pictures, closed))
 
     def _held_out_target(self, names: tuple[str, ...]) -> Path | None:
         """The target's scores of held-out agents: a file of their own, or None where the study's table has them."""

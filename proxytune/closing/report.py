@@ -3,10 +3,11 @@
 from dataclasses import asdict
 from typing import Any
 
+from proxytune.closing.closed import Closed
 from proxytune.closing.comparison import Compared, compare_errors, compare_prpv
-from proxytune.closing.episodes import righted_pictures
+from proxytune.closing.episodes import read_pictures
 from proxytune.closing.figure import prpv_figure
-from proxytune.closing.loop import STEPS, Closed
+from proxytune.closing.loop import STEPS
 from proxytune.closing.righted import righted
 from proxytune.closing.wording import answer, chance_text, floor_text, following, lacking, level_text
 from proxytune.report.page import Foot, Page, Picture, Table, Words
@@ -80,12 +81,15 @@ def page_of(closed: Closed, command: str, date: str) -> Page:
     values = {key: value for key, value in as_document(closed.loop.settings).items() if value not in (None, {}, [])}
     settings = tuple((key, _text(value)) for key, value in values.items() if key != "path")
     caption = "PRPV of the best θ on fresh episodes with 95 % intervals; grey: what a perfect proxy scores."
-    shown = [Picture("PRPV before and after", png_of(prpv_figure(prpv)), caption)] if closed.after else []
+    shown = []
+    if closed.after:
+        first = Picture("PRPV before and after", png_of(prpv_figure(prpv)), caption)
+        shown = [first, *read_pictures(closed.loop.home)]
     return Page(
         title=f"{closed.loop.settings.name}: the loop closed",
         answer=answer(closed.diagnosis, rows),
         following=_following(closed),
-        parts=(_table(closed, rows), *shown, *righted_pictures(closed), *_found(closed), _words(closed)),
+        parts=(_table(closed, rows), *shown, *_found(closed), _words(closed)),
         foot=Foot(command, settings, tuple(versions_of(PACKAGES).items()), date),
     )
 

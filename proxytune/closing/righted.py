@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from proxytune.closing.loop import Closed
+from proxytune.closing.closed import Closed
 from proxytune.scores import Array
 from proxytune.usefulness import Assessment
 from proxytune.usefulness.prpv import dominance

@@ -1,12 +1,12 @@
 """Logs of a domain instance: manoeuvres driven and measured as a robot's would be."""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import tomlkit
 
 from proxytune.diagnosis.manoeuvres import LIBRARY
 from proxytune.diagnosis.measured.drives import Floats
@@ -24,12 +24,11 @@ HEADING_NOISE_DEG = math.degrees(HEADING_NOISE_RAD)
 PICTURES = "frames/%06d.png"
 """Where a log's pictures lie in its folder."""
 
-CAMERA = f"""
-[camera]
-frames = "{PICTURES}"
-poses = {{ position_m = {POSITION_NOISE_M:g}, heading_deg = {HEADING_NOISE_DEG:.4g} }}
-exposure = "fixed"
-"""
+CAMERA = {
+    "frames": PICTURES,
+    "exposure": "fixed",
+    "poses": {"position_m": POSITION_NOISE_M, "heading_deg": round(HEADING_NOISE_DEG, 4)},
+}
 """What log.toml states of the pictures: no effect adjusts the exposure from one to the next."""
 
 
@@ -79,8 +78,7 @@ def log_text(log: Log, source: str) -> str:
     facts = {"format": 1, "name": log.name, "robot": log.robot, "command": log.command, "rate_hz": log.rate_hz}
     facts |= {"pose": pose, "measured": False, "source": source}
     facts |= {"map": Path(log.frames.road).name} if log.frames else {}
-    lines = "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in facts.items())
-    return lines + (CAMERA if log.frames else "")
+    return tomlkit.dumps(facts | ({"camera": CAMERA} if log.frames else {}))
 
 
 def samples_text(log: Log) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from proxytune.environments.policies import ask_policy
 from proxytune.errors import EpisodeError, ExtensionError, InputError
 from proxytune.extensions import ask, describe, load
 
@@ -32,7 +33,7 @@ BUILT_IN: Mapping[str, Callable[[Any, int], Act]] = MappingProxyType({"random": 
 
 
 @dataclass
-class Predictor:
+class Predicting:
     """What has `predict`, as the policies of stable-baselines3 do; a state that it answers with is handed back."""
 
     policy: Any
@@ -40,11 +41,8 @@ class Predictor:
 
     def __call__(self, observation: Any) -> Any:
         """The action of its deterministic policy."""
-        known = {} if self.state is None else {"state": self.state}
-        answer = self.policy.predict(observation, deterministic=True, **known)
-        if isinstance(answer, tuple) and len(answer) == 2:
-            answer, self.state = answer
-        return answer
+        action, self.state = ask_policy(self.policy, observation, self.state)
+        return action
 
 
 def load_agent(name: str, folder: Path, space: Any, seed: int) -> Act:
@@ -67,7 +65,7 @@ def load_agent(name: str, folder: Path, space: Any, seed: int) -> Act:
     if inspect.isclass(found):
         found = ask(f"agent '{name}'", found)
     if hasattr(found, "predict"):
-        return Predictor(found)
+        return Predicting(found)
     if callable(found):
         act: Act = found
         return act

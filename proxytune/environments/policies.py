@@ -10,12 +10,19 @@ from proxytune.driving.robot import Robot
 from proxytune.errors import ExtensionError
 
 
-class Predictor(Protocol):
+class Policy(Protocol):
     """What has learnt to act, as stable-baselines3's algorithms and policies."""
 
-    def predict(self, observation: Any, *, deterministic: bool) -> tuple[Any, Any]:
-        """The action for an observation and the policy's state, None where it has none; it takes `state=` then."""
+    def predict(self, observation: Any, *, deterministic: bool) -> Any:
+        """The action for an observation, or the action and a state, which it is given back as `state=`."""
         ...
+
+
+def ask_policy(policy: Policy, observation: Any, state: Any, *, deterministic: bool = True) -> tuple[Any, Any]:
+    """A policy's action, and its state for the next observation, None where it has none."""
+    known = {} if state is None else {"state": state}
+    answer = policy.predict(observation, deterministic=deterministic, **known)
+    return answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, state)
 
 
 @dataclass(frozen=True)
@@ -27,7 +34,7 @@ class PolicyAgent:
         deterministic: Whether it takes its likeliest action; one that draws would make episodes differ at one seed.
     """
 
-    policy: Predictor
+    policy: Policy
     deterministic: bool = True
 
     def begin(self, robot: Robot) -> None:
@@ -35,12 +42,11 @@ class PolicyAgent:
 
     def act(self, picture: Picture, memory: Any) -> tuple[Command, Any]:
         """The policy's duties, and its state for the next picture."""
-        state = {} if memory is None else {"state": memory}
-        action, memory = self.policy.predict(picture, deterministic=self.deterministic, **state)
+        action, memory = ask_policy(self.policy, picture, memory, deterministic=self.deterministic)
         return np.clip(np.asarray(action, dtype=float), -1.0, 1.0), memory
 
 
-def agent_of(policy: Predictor, *, deterministic: bool = True) -> PolicyAgent:
+def agent_of(policy: Policy, *, deterministic: bool = True) -> PolicyAgent:
     """An agent for studies of anything with `predict(observation, deterministic=…) -> (action, state)`.
 
     Args:

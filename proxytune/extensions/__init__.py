@@ -8,7 +8,7 @@ the group `proxytune` that is called `KIND.NAME`, as in
     "effect.yaw_drift" = "my_package.effects:YawDrift"
 """
 
-from proxytune.extensions.door import ask, describe, load, make, place_of, require
+from proxytune.extensions.door import ask, describe, load, make, one_line, place_of, require
 from proxytune.extensions.plugins import GROUP, plugins
 
-__all__ = ["GROUP", "ask", "describe", "load", "make", "place_of", "plugins", "require"]
+__all__ = ["GROUP", "ask", "describe", "load", "make", "one_line", "place_of", "plugins", "require"]

@@ -83,13 +83,13 @@ def ask(what: str, question: Callable[[], Answer], where: str = "") -> Answer:
         where: On what it was tried, as a complaint goes on.
 
     Raises:
-        ExtensionError: In one line, if it raises anything but an error of ours.
+        ExtensionError: In one line, if it raises anything but an error of ours, or exits.
     """
     try:
         return question()
-    except ProxytuneError:
+    except (ProxytuneError, KeyboardInterrupt):
         raise
-    except Exception as problem:
+    except BaseException as problem:
         raise ExtensionError(f"{what} raised {describe(problem)}{place_of(problem)}{where}; correct it") from problem
 
 
@@ -105,7 +105,16 @@ def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:
 
 def describe(problem: BaseException) -> str:
     """An exception in one line."""
-    return f"{type(problem).__name__}: {' '.join(str(problem).split())}".rstrip(": ")
+    try:
+        said = one_line(str(problem))
+    except Exception:  # Its own __str__ fails.
+        said = ""
+    return f"{type(problem).__name__}: {said}".rstrip(": ")
+
+
+def one_line(text: str) -> str:
+    """A text without line breaks, and of letters that every file can hold."""
+    return " ".join(text.split()).encode(errors="backslashreplace").decode()
 
 
 def place_of(problem: BaseException | None) -> str:
@@ -141,9 +150,9 @@ def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleT
         check_permitted(module, Path.cwd())
     try:
         return importlib.import_module(module) if beside is None else import_beside(module, beside)
-    except ProxytuneError:
+    except (ProxytuneError, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as problem:
+    except BaseException as problem:
         if isinstance(problem, ModuleNotFoundError) and f"{module}.".startswith(f"{problem.name}."):
             where = "installed" if beside is None else f"in {beside.absolute()} or installed"
             raise ExtensionError(f"{kind} '{name}': no module '{problem.name}' {where}; check the name") from None
@@ -158,7 +167,9 @@ def _plugin(name: str, kind: str, installed: Mapping[str, Any], shipped: Mapping
         raise ExtensionError(f"{kind} '{name}' is unknown (your own is written module:attribute); {hint}")
     try:
         return installed[name].load()
-    except (Exception, SystemExit) as problem:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as problem:
         raise ExtensionError(
             f"{kind} '{name}': its plug-in {installed[name].value} raised {describe(problem)}; correct or uninstall it"
         ) from problem

@@ -33,21 +33,28 @@ class Facts:
         return 0.0 if self.clock_offset in ("", "fit") else float(self.clock_offset)
 
 
-def read_figures(given: list[str]) -> dict[str, float]:
-    """Figures of a robot from texts such as baseline_m=0.16.
+def finite(text: str) -> float | None:
+    """The finite number that a text states, if it does."""
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def read_geometry(given: list[str]) -> dict[str, float]:
+    """Measures of a robot from texts such as baseline_m=0.16.
 
     Raises:
         InputError: If one is no such figure.
     """
-    figures = {}
+    geometry = {}
     for text in given:
         key, _, value = text.partition("=")
         if key.strip() not in GEOMETRY:
             raise InputError(f"--figure {text}: write one of {', '.join(GEOMETRY)}, as in baseline_m=0.16")
-        try:
-            figures[key.strip()] = number = float(value)
-        except ValueError:
-            number = math.nan
-        if not (math.isfinite(number) and number > 0.0):
+        number = finite(value)
+        if number is None or number <= 0.0:
             raise InputError(f"--figure {text}: '{value}' is no length or speed; write it as in {key}=0.16")
-    return figures
+        geometry[key.strip()] = number
+    return geometry

@@ -1,6 +1,5 @@
 """A source written as a log's folder: whole, or not at all."""
 
-import json
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -9,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import tomlkit
 from PIL import Image
 
 from proxytune.errors import InputError, LogError, RunError
@@ -145,5 +145,4 @@ def _description(source: Source, name: str, facts: Facts, origin: str, *, with_p
         stated["clock_offset_s"] = facts.clock_offset if facts.clock_offset == "fit" else float(facts.clock_offset)
     if with_pictures:
         stated["map"] = facts.road
-    lines = "".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in stated.items())
-    return lines + (f'\n[camera]\nframes = "{PICTURES}"\n' if with_pictures else "")
+    return tomlkit.dumps(stated | ({"camera": {"frames": PICTURES}} if with_pictures else {}))

@@ -4,7 +4,6 @@ import contextlib
 import hashlib
 import json
 import os
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,5 +98,6 @@ def _read(path: Path) -> Arrays:
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in file.files if name != FACTS}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as problem:
+    # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.
+    except Exception as problem:
         raise StoreError(f"{path}: is damaged ({problem}); delete it, and run again to make it anew") from None

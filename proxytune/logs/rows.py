@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from proxytune.errors import LogError
 from proxytune.logs.log import Floats, Whole
-from proxytune.settings import nearest
+from proxytune.settings import nearest, read_text
+
+LARGEST = 1e50
+"""Beyond this the square of a number's square is not finite."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ def check_known_episodes(rows: Rows, names: Sequence[str]) -> None:
 def _read_cells(path: Path) -> tuple[list[int], list[list[str]]]:
     """Every line that is not blank, with its number; the first has the columns."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, "utf-8-sig")
         rows = list(csv.reader(text.splitlines(), strict=True))
     except FileNotFoundError:
         raise LogError(f"{path}: no such file; a log has its samples beside log.toml") from None
@@ -163,7 +166,7 @@ def _numbers(samples: Rows, cells: pd.Series, may_lack_any: Sequence[str]) -> Fl
     texts = cells.str.strip()
     values = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
     may_lack = cells.name in may_lack_any
-    wrong = ~np.isfinite(values)
+    wrong = ~(np.abs(values) < LARGEST)
     if may_lack:
         wrong &= (texts != "").to_numpy()
     if wrong.any():

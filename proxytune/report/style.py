@@ -1,5 +1,7 @@
 """What figures share: colours, axes and legends."""
 
+from collections.abc import Collection
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -37,9 +39,16 @@ def dress(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def legend_below(figure: Figure, *panels: Axes) -> None:
-    """One legend under the figure with everything that has a name, each name once, in the columns that fit."""
+def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -> None:
+    """One legend under the figure with everything that has a name, each name once, in the columns that fit.
+
+    Args:
+        figure: What it goes under.
+        panels: Whose names are listed.
+        without: Names that stand beside their lines already.
+    """
     named = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    named = {label: handle for label, handle in named.items() if label not in without}
     longest = max((len(name) for name in named), default=0) + HANDLE
     columns = max(1, min(3, int(figure.get_figwidth() * CHARACTERS_PER_INCH / longest)))
     if named:

@@ -2,7 +2,9 @@
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+import re
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from functools import partial
 from io import BytesIO
@@ -12,6 +14,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -48,7 +51,7 @@ def save(figure: Figure, path: Path) -> None:
     Raises:
         RunError: If the figure cannot be written.
     """
-    write_whole(path, "the figure ", lambda draft: figure.savefig(draft, format="png", dpi=200))
+    write_whole(path, "the figure ", lambda draft: _save(figure, draft, format="png", dpi=200))
     for form in _beside.get():
         write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
 
@@ -56,14 +59,34 @@ def save(figure: Figure, path: Path) -> None:
 def png_of(figure: Figure) -> bytes:
     """A figure as the bytes of a PNG file."""
     image = BytesIO()
-    figure.savefig(image, format="png", dpi=200)
+    _save(figure, image, format="png", dpi=200)
     return image.getvalue()
 
 
 def _draw(figure: Figure, form: str, draft: Path) -> None:
     """Write a vector file; journals refuse the fonts that Matplotlib's PDF has by default."""
     with mpl.rc_context({"pdf.fonttype": 42, "svg.hashsalt": "proxytune"}):
-        figure.savefig(draft, format=form, metadata=UNDATED[form])
+        _save(figure, draft, format=form, metadata=UNDATED[form])
+
+
+def _save(figure: Figure, where: Path | BytesIO, **how: Any) -> None:
+    """Save a figure with names as they are: a dollar begins no formula, and a letter without a glyph is no news."""
+    for text in figure.findobj(Text):
+        if "$" in text.get_text():
+            text.set_parse_math(False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        figure.savefig(where, **how)
+
+
+def file_names(names: Iterable[str]) -> dict[str, str]:
+    """What names are called in file names; of those that would be alike, the later ones are numbered."""
+    called: dict[str, str] = {}
+    for name in names:
+        plain = re.sub(r"[^\w.-]+", "_", name)
+        others = (f"{plain}_{number}" for number in range(2, len(called) + 3))
+        called[name] = next(one for one in (plain, *others) if one not in called.values())
+    return called
 
 
 def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:

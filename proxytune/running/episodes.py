@@ -7,16 +7,38 @@ import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import EpisodeError, RunError
-from proxytune.extensions import describe, place_of
-from proxytune.running.workers import working
+from proxytune.extensions import describe, one_line, place_of
+from proxytune.running.apart import Lost
+from proxytune.running.workers import Rescue, working
 
 OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)
+ENDED, ENDLESS = "it ended its process", "it took longer than"
+"""How failures begin of episodes that end their process, and of those that do not end themselves."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """How episodes are watched that may end their process or never end.
+
+    Attributes:
+        timeout_s: How long an episode may take [s]; one that takes longer has failed. None for as long as it takes.
+        suspect: Whether an episode is run in a process of its own at once, as an earlier process ended during its like.
+        begins: Told of each episode that begins in this very process, which it may end.
+    """
+
+    timeout_s: float | None = None
+    suspect: Callable[[Episode], bool] = lambda _: False
+    begins: Callable[[Episode], None] = lambda _: None
+
+
+UNWATCHED = Watch()
 
 
 def running(
@@ -25,13 +47,34 @@ def running(
     jobs: int,
     skip: Callable[[Episode], bool] = lambda _: False,
     needed: Collection[str] = (),
+    watch: Watch = UNWATCHED,
 ) -> AbstractContextManager[Iterator[Outcome]]:
     """Run episodes and give each outcome as soon as it is there, in no particular order; see `working`.
 
+    An episode that ends two processes, the second one its own, has failed, and so has one that takes too long.
+
     Raises:
-        RunError: If the machine fails rather than an episode: a process dies, memory or disk run out.
+        RunError: If the machine fails rather than an episode: memory, disk or descriptors run out.
     """
-    return working(functools.partial(run_episode, family, needed=tuple(needed)), episodes, jobs, skip)
+    work = functools.partial(run_episode, family, needed=tuple(needed))
+    rescue = Rescue(functools.partial(_lost, watch), watch.timeout_s, watch.suspect, watch.begins)
+    return working(work, episodes, jobs, skip, rescue)
+
+
+def _lost(watch: Watch, episode: Episode, lost: Lost) -> Outcome:
+    """The outcome of an episode that has ended its process, or was ended.
+
+    Raises:
+        RunError: If the process was killed from outside, as a machine without memory does.
+    """
+    where = f"agent '{episode.agent}' from start {episode.start}"
+    if lost.killed:
+        raise RunError(
+            f"{where}: its process was killed twice ({lost.how}; out of memory?); run again to continue, with more "
+            "memory or without that agent"
+        )
+    failure = f"{ENDED} twice ({lost.how})" if lost.how else f"{ENDLESS} {watch.timeout_s:g} s"
+    return Outcome(episode, None, failure, lost.seconds)
 
 
 def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] = ()) -> Outcome:
@@ -43,7 +86,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
         needed: The metrics without which it has failed; others may be missing. All, where none is named.
 
     Raises:
-        RunError: If memory or disk run out: that is not the episode's doing.
+        RunError: If memory, disk or descriptors run out: that is not the episode's doing.
     """
     start = time.perf_counter()
     metrics: Mapping[str, float] | None = None
@@ -51,13 +94,36 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     try:
         with _libraries(len(sys.modules)).limit(limits=1):
             metrics = _checked(family, episode, family.run(episode), needed)
-    except EpisodeError as problem:
-        failure = f"{problem}{place_of(problem.__cause__)}"
-    except Exception as problem:
-        if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:
-            raise RunError(f"the machine failed ({type(problem).__name__}: {problem}); run again to continue") from None
-        failure = f"the domain family raised {describe(problem)}{place_of(problem)}"
+    except KeyboardInterrupt:
+        raise
+    except BaseException as problem:
+        _check_machine(episode, problem)
+        failure = one_line(_failure(problem))
     return Outcome(episode, metrics, failure, time.perf_counter() - start)
+
+
+def _failure(problem: BaseException) -> str:
+    """Why an episode failed."""
+    if isinstance(problem, EpisodeError):
+        return f"{problem}{place_of(problem.__cause__)}"
+    # What is no Exception, as of sys.exit, goes through every family, so it may be the agent's.
+    whose = "the domain family" if isinstance(problem, Exception) else "the agent or the domain family"
+    return f"{whose} raised {describe(problem)}{place_of(problem)}"
+
+
+def _check_machine(episode: Episode, problem: BaseException | None) -> None:
+    """Refuse to call an episode failed of what the machine lacked, whoever caught that first.
+
+    Raises:
+        RunError: With the agent, and what the machine lacked.
+    """
+    while problem is not None:
+        if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:
+            raise RunError(
+                f"agent '{episode.agent}' from start {episode.start}: the machine failed ({describe(problem)})"
+                f"{place_of(problem)}; run again to continue, with more room or without that agent"
+            ) from None
+        problem = problem.__cause__ or problem.__context__
 
 
 @functools.lru_cache(maxsize=1)

@@ -1,33 +1,55 @@
 """Doing many independent pieces of work, in this process or spread over several."""
 
+import functools
 import os
-import pickle
-import signal
-import sys
-import threading
-import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, TypeVar, cast
+from multiprocessing import TimeoutError as ParallelTimeoutError
+from typing import Any, Generic, TypeVar, cast
 
 from joblib import Parallel, delayed
+from joblib.parallel import BACKENDS, get_active_backend
 
 from proxytune.errors import RunError
-from proxytune.extensions import describe, place_of
-from proxytune.extensions.beside import folders, open_folders
+from proxytune.running.apart import Apart, Lost
+from proxytune.running.sending import NotSendableError, Recipe, do_sent, end_with, recipe_of
 
-WATCH_S = 0.5
+START_S = 30.0
+"""So long may processes take to start beyond a piece's own time-out [s]."""
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
 
+@dataclass(frozen=True)
+class Rescue(Generic[Piece, Result]):
+    """What becomes of pieces that end their process, or do not end themselves.
+
+    A process that dies is not known to have died of its piece: that is done once more in a process apart, and lost if
+    that dies too.
+
+    Attributes:
+        lost: The result of a piece that has no other, from how it ended.
+        timeout_s: How long a piece may take [s]; then all are done in other processes.
+        suspect: Whether a piece is done in a process apart at once, because the like of it has ended one before.
+        begins: Told of each piece that begins in this very process, which it may end.
+    """
+
+    lost: Callable[[Piece, Lost], Result]
+    timeout_s: float | None = None
+    suspect: Callable[[Piece], bool] = lambda _: False
+    begins: Callable[[Piece], None] = lambda _: None
+
+
 @contextmanager
 def working(
-    work: Callable[[Piece], Result], pieces: Sequence[Piece], jobs: int, skip: Callable[[Piece], bool] = lambda _: False
+    work: Callable[[Piece], Result],
+    pieces: Sequence[Piece],
+    jobs: int,
+    skip: Callable[[Piece], bool] = lambda _: False,
+    rescue: Rescue[Piece, Result] | None = None,
 ) -> Iterator[Iterator[Result]]:
     """Do pieces of work and give each result as soon as it is there, in no particular order.
 
@@ -37,16 +59,17 @@ def working(
     Args:
         work: Does one piece; picklable.
         pieces: What to do, in the order in which to begin.
-        jobs: How many processes; with one, everything is done in this process.
+        jobs: How many processes; with one, and no time-out, everything is done in this process.
         skip: Whether a piece need not be done any more, asked when it is about to begin; those under way are finished.
+        rescue: What becomes of pieces that end their process; nothing else can be done without them.
 
     Raises:
-        RunError: If a process dies.
+        RunError: If a process dies and there is no rescue.
     """
     begun = (piece for piece in pieces if not skip(piece))
-    results = _spread(work, begun, jobs) if min(jobs, len(pieces)) > 1 else _here(work, begun)
+    results = _results(work, begun, min(jobs, len(pieces)), rescue or Rescue(_no_rescue))
     try:
-        yield _name_dead_processes(results)
+        yield results
     finally:
         with warnings.catch_warnings():
             # joblib warns of pieces it has finished in vain; whoever leaves early knows.
@@ -54,75 +77,98 @@ def working(
             results.close()
 
 
-def _here(work: Callable[[Piece], Result], pieces: Iterable[Piece]) -> Generator[Result, None, None]:
-    for piece in pieces:
-        yield work(piece)
+def _no_rescue(piece: Any, lost: Lost) -> Any:
+    raise RunError(
+        f"a process was killed twice by the same piece of work ({lost.how}; out of memory?); run again to continue, "
+        "perhaps with jobs = 1"
+    )
 
 
-def _spread(work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int) -> Generator[Result, None, None]:
-    recipe = _Recipe(_pickled(work), tuple(sys.path), folders(), os.getpid())
+def _results(
+    work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int, rescue: Rescue[Piece, Result]
+) -> Generator[Result, None, None]:
+    if jobs > 1:
+        return _spread(work, pieces, jobs, rescue)
+    return _here(work, pieces, rescue) if rescue.timeout_s is None else _apart(work, pieces, rescue)
+
+
+def _here(
+    work: Callable[[Piece], Result], pieces: Iterable[Piece], rescue: Rescue[Piece, Result]
+) -> Generator[Result, None, None]:
+    with Apart(work) as apart:
+        for piece in pieces:
+            if rescue.suspect(piece):
+                # What cannot go to another process can only be done here.
+                with suppress(NotSendableError):
+                    yield apart.do(piece, functools.partial(rescue.lost, piece))
+                    continue
+            rescue.begins(piece)
+            yield work(piece)
+
+
+def _apart(
+    work: Callable[[Piece], Result], pieces: Iterable[Piece], rescue: Rescue[Piece, Result]
+) -> Generator[Result, None, None]:
+    with Apart(work, rescue.timeout_s) as apart:
+        for piece in pieces:
+            yield apart.do(piece, functools.partial(rescue.lost, piece))
+
+
+def _spread(
+    work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int, rescue: Rescue[Piece, Result]
+) -> Generator[Result, None, None]:
+    """Do them in several processes; where one dies or hangs, what was under way is done apart, then the rest."""
+    recipe, left, begun = recipe_of(work), enumerate(pieces), _Begun(rescue.suspect)
+    broken = True
+    while broken:
+        try:
+            with closing(_in_processes(recipe, begun.of(left), jobs, rescue.timeout_s)) as results:
+                for number, result in results:
+                    del begun.pieces[number]
+                    yield result
+            broken = False
+        except (BrokenExecutor, ParallelTimeoutError):
+            broken = True
+        yield from _apart(work, list(begun.pieces.values()), rescue)
+        begun.pieces.clear()
+
+
+class _Begun:
+    """Pieces that have begun in other processes, or are to be done apart; each until its result is there."""
+
+    def __init__(self, suspect: Callable[[Any], bool]) -> None:
+        self.pieces: dict[int, Any] = {}
+        self._suspect = suspect
+
+    def of(self, numbered: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
+        """Numbered pieces as they begin, without those that are to be done apart."""
+        for number, piece in numbered:
+            self.pieces[number] = piece
+            if not self._suspect(piece):
+                yield number, piece
+
+
+def _in_processes(
+    recipe: Recipe, numbered: Iterable[tuple[int, Any]], jobs: int, timeout_s: float | None
+) -> Generator[tuple[int, Any], None, None]:
     # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
-    parallel = Parallel(n_jobs=jobs, batch_size=1, pre_dispatch=jobs + 1, return_as="generator_unordered")
-    return cast("Generator[Result, None, None]", parallel(delayed(_do_pickled)(recipe, piece) for piece in pieces))
+    parallel = Parallel(
+        n_jobs=jobs,
+        batch_size=1,
+        pre_dispatch=jobs + 1,
+        return_as="generator_unordered",
+        timeout=timeout_s and timeout_s + START_S,
+        **_of_processes(),
+    )
+    tasks = (delayed(_do_numbered)(recipe, number, piece) for number, piece in numbered)
+    return cast("Generator[tuple[int, Any], None, None]", parallel(tasks))
 
 
-def _pickled(work: Callable[[Piece], Result]) -> bytes:
-    try:
-        return pickle.dumps(work)
-    except Exception as problem:
-        remedy = "make it of classes and functions that a module has by name, without open files, or set jobs = 1"
-        line = f"what is to be run cannot be sent to other processes ({describe(problem)}){place_of(problem)}"
-        raise RunError(f"{line}; {remedy}") from problem
+def _do_numbered(recipe: Recipe, number: int, piece: Any) -> tuple[int, Any]:
+    return number, do_sent(recipe, piece)
 
 
-@dataclass(frozen=True)
-class _Recipe:
-    """Work pickled once, where its modules are found, and whose it is: a process unpickles it once."""
-
-    pickled: bytes
-    path: tuple[str, ...]
-    own: tuple[str, ...]
-    owner: int
-
-
-def _do_pickled(recipe: _Recipe, piece: Any) -> Any:
-    if os.getppid() == recipe.owner:
-        _end_with(recipe.owner)
-    return _unpickled(recipe)(piece)
-
-
-@lru_cache
-def _end_with(parent: int) -> None:
-    """End this process with its parent, and not before.
-
-    After a `kill -9` it would wait for work for minutes. Ctrl-C reaches every process of a terminal; the parent answers
-    it, and ends this one.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(WATCH_S)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-@lru_cache(maxsize=1)
-def _unpickled(recipe: _Recipe) -> Callable[[Any], Any]:
-    sys.path.extend(folder for folder in recipe.path if folder not in sys.path)
-    open_folders(recipe.own)
-    try:
-        return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
-    except Exception as problem:
-        line = f"another process cannot load what is to be run: {describe(problem)}{place_of(problem)}"
-        raise RunError(f"{line}; what it needs must be there when its modules are imported, or set jobs = 1") from None
-
-
-def _name_dead_processes(results: Iterator[Result]) -> Iterator[Result]:
-    try:
-        yield from results
-    except BrokenExecutor:
-        raise RunError(
-            "a process that ran episodes was killed (out of memory?); run again to continue, perhaps with jobs = 1"
-        ) from None
+def _of_processes() -> dict[str, Any]:
+    """What joblib's own processes begin with; those of another backend are not ours to end."""
+    backend, _ = get_active_backend()
+    return {"initializer": end_with, "initargs": (os.getpid(),)} if isinstance(backend, BACKENDS["loky"]) else {}

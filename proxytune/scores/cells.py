@@ -3,13 +3,16 @@
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from proxytune.errors import ScoresError
+from proxytune.scores.metric import Array
 from proxytune.scores.table import LARGEST
-from proxytune.settings import nearest
+from proxytune.settings import nearest, read_text
 
 LABELS = ("agent", "episode", "domain")
 SEPARATORS = (",", ";", "\t")
@@ -25,29 +28,48 @@ class Cells:
         path: The file.
         named: Its columns, as the file names them.
         header: The same, those of a column map by the names they have here.
-        rows: Line number and cells by column name.
+        lines: The line number of each row.
+        cells: The cells of each row by column: labels and the metrics asked for.
         decimal: What numbers have before their fractions.
     """
 
     path: Path
     named: Sequence[str]
     header: Sequence[str]
-    rows: Sequence[tuple[int, Mapping[str, str]]]
+    lines: Sequence[int]
+    cells: Mapping[str, Sequence[str]]
     decimal: str = "."
 
-    def number(self, line: int, column: str, cell: str) -> float:
-        """The number in a cell.
+    def label(self, name: str) -> Sequence[str]:
+        """The labels of this kind, one per row; empty ones where the file has no such column.
 
         Raises:
-            ScoresError: If it is none, or not finite.
+            ScoresError: If one is empty in the file.
         """
-        try:
-            value = float(cell.replace(self.decimal, "."))
-        except ValueError:
-            value = math.nan
-        if not abs(value) < LARGEST:
-            raise ScoresError(f"{self.path}: line {line}, column '{column}': must be a finite number, got {cell!r}")
-        return value
+        labels = self.cells.get(name)
+        if labels is None:
+            return [""] * len(self.lines)
+        if "" in labels:
+            raise ScoresError(
+                f"{self.path}: line {self.lines[labels.index('')]}, column '{name}': is empty; fill it in"
+            )
+        return labels
+
+    def numbers(self, columns: Sequence[str]) -> Array:
+        """The numbers of these columns, shape (rows, columns).
+
+        Raises:
+            ScoresError: If one is none, or its square would not be.
+        """
+        values = np.empty((len(self.lines), len(columns)))
+        for place, name in enumerate(columns):
+            values[:, place] = [_number(cell.replace(self.decimal, ".")) for cell in self.cells[name]]
+        size = np.abs(values)
+        for row, place in np.argwhere(~((size == 0.0) | ((size > 1.0 / LARGEST) & (size < LARGEST)))):
+            where, cell = f"line {self.lines[row]}, column '{columns[place]}'", self.cells[columns[place]][row]
+            remedy = "; give it in another unit" if math.isfinite(values[row, place]) else ""
+            raise ScoresError(f"{self.path}: {where}: must be a finite number, got {cell!r}{remedy}")
+        return values
 
 
 def read_cells(path: Path, metrics: Sequence[str], columns: Columns | None = None) -> Cells:
@@ -63,16 +85,21 @@ def read_cells(path: Path, metrics: Sequence[str], columns: Columns | None = Non
     """
     text = _text(path)
     separator = _separator(text)
-    lines = _lines(path, text, separator)
-    header = _renamed(path, lines[0][1], columns or {})
+    rows = _rows(path, text, separator)
+    named = _first(path, rows)
+    header = _renamed(path, named, columns or {})
     _check_header(path, header, metrics)
-    for line, cells in lines[1:]:
-        if len(cells) != len(header):
-            raise ScoresError(
-                f"{path}: line {line}: has {len(cells)} cells, but the first line names {len(header)} columns"
-            )
-    rows = [(line, dict(zip(header, cells, strict=True))) for line, cells in lines[1:]]
-    return Cells(path, lines[0][1], header, rows, _decimal(path, rows, metrics) if separator != "," else ".")
+    lines, cells = _columns(path, rows, header, {*LABELS, *metrics})
+    found = Cells(path, named, header, lines, cells)
+    return found if separator == "," else replace(found, decimal=_decimal(found, metrics))
+
+
+def _number(text: str) -> float:
+    """A number as tables have it; NaN for what is none, be it one to Python, as 1_000 is."""
+    try:
+        return float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        return math.nan
 
 
 def column_names(path: Path) -> list[str]:
@@ -82,12 +109,12 @@ def column_names(path: Path) -> list[str]:
         ScoresError: If it cannot be read.
     """
     text = _text(path)
-    return _lines(path, text, _separator(text))[0][1]
+    return _first(path, _rows(path, text, _separator(text)))
 
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return read_text(path, "utf-8-sig")
     except FileNotFoundError:
         raise ScoresError(f"{path}: no such file; check the path") from None
     except OSError as problem:
@@ -102,16 +129,42 @@ def _separator(text: str) -> str:
     return max(SEPARATORS, key=first.count)
 
 
-def _lines(path: Path, text: str, separator: str) -> list[tuple[int, list[str]]]:
-    """Line number and cells of each line that is not empty, at least one."""
+def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of each line that is not empty."""
+    lines = io.TextIOWrapper(io.BytesIO(text.encode()), encoding="utf-8", newline="")
+    reader = csv.reader(lines, strict=True, delimiter=separator)
     try:
-        reader = csv.reader(io.StringIO(text, newline=""), strict=True, delimiter=separator)
-        lines = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if cells]
+        for cells in reader:
+            if cells:
+                yield reader.line_num, cells
     except csv.Error:
         raise _no_csv(path) from None
-    if not lines:
+
+
+def _first(path: Path, rows: Iterator[tuple[int, list[str]]]) -> list[str]:
+    """The names in the first line."""
+    _, cells = next(rows, (0, []))
+    if not cells:
         raise ScoresError(f"{path}: is empty; its first line must name the columns, agent and metrics among them")
-    return lines
+    return [cell.strip() for cell in cells]
+
+
+def _columns(
+    path: Path, rows: Iterable[tuple[int, list[str]]], header: Sequence[str], names: Collection[str]
+) -> tuple[list[int], dict[str, list[str]]]:
+    """Line numbers, and the cells of the columns of these names."""
+    places = {name: header.index(name) for name in names if name in header}
+    cells: dict[str, list[str]] = {name: [] for name in places}
+    lines = []
+    for line, row in rows:
+        if len(row) != len(header):
+            raise ScoresError(
+                f"{path}: line {line}: has {len(row)} cells, but the first line names {len(header)} columns"
+            )
+        lines.append(line)
+        for name, place in places.items():
+            cells[name].append(row[place].strip())
+    return lines, cells
 
 
 def _no_csv(path: Path) -> ScoresError:
@@ -139,16 +192,20 @@ def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> 
             raise ScoresError(f"{path}: the first line names the column '{name}' twice; rename one")
 
 
-def _decimal(path: Path, rows: Sequence[tuple[int, Mapping[str, str]]], metrics: Sequence[str]) -> str:
+def _decimal(found: Cells, metrics: Sequence[str]) -> str:
     """What the numbers of a file have before their fractions.
 
     Raises:
         ScoresError: If some have a comma and some a point: one of them may separate thousands.
     """
-    numbers = [(line, name, row[name]) for line, row in rows for name in metrics]
-    commas, points = ([one for one in numbers if mark in one[2]] for mark in ",.")
+    numbers = [
+        (line, name, cell) for name in metrics for line, cell in zip(found.lines, found.cells[name], strict=True)
+    ]
+    commas, points = (next((one for one in numbers if mark in one[2]), None) for mark in ",.")
     if commas and points:
-        line, name, cell = commas[0]
-        other = f"line {points[0][0]} has {points[0][2]!r}"
-        raise ScoresError(f"{path}: line {line}, column '{name}': {cell!r} has a comma, but {other}; write all alike")
+        line, name, cell = commas
+        other = f"line {points[0]} has {points[2]!r}"
+        raise ScoresError(
+            f"{found.path}: line {line}, column '{name}': {cell!r} has a comma, but {other}; write all alike"
+        )
     return "," if commas else "."

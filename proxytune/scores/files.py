@@ -4,8 +4,10 @@ import contextlib
 import csv
 import io
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from proxytune.errors import ScoresError
 from proxytune.scores.cells import LABELS, Cells, Columns, read_cells
@@ -14,7 +16,8 @@ from proxytune.settings import nearest
 
 Files = str | Path | Sequence[str | Path]
 """A file, or several that make one table."""
-Scored = dict[tuple[str, str | int], dict[str, float]]
+Row = tuple[str, str, str]
+"""Domain, agent and episode."""
 
 
 def read_scores(
@@ -57,21 +60,21 @@ def read_domains(path: Files, metrics: Iterable[str], columns: Columns | None = 
     files = [read_cells(file, names, columns) for file in _files(path)]
     _check_alike(files)
     _check_columns(files, columns or {})
-    domains: dict[str, Scored] = {}
-    origin: dict[tuple[str, str, str], Path] = {}
-    for cells in files:
-        if not cells.rows:
-            raise ScoresError(f"{cells.path}: has no rows; add one per agent and episode")
-        for line, row in cells.rows:
-            _check_labels(cells, line, row)
-            domain, agent, episode = row.get("domain", ""), row["agent"], row.get("episode", "")
-            before = origin.setdefault((domain, agent, episode), cells.path)
-            scored = domains.setdefault(domain, {})
-            if (agent, episode) in scored:
-                where = f", once in {before}" if before != cells.path else ""
-                raise ScoresError(f"{cells.path}: line {line}: {_duplicate(row, where)}")
-            scored[agent, episode] = {name: cells.number(line, name, row[name]) for name in names}
-    return {domain: ScoreTable.from_episodes(scored) for domain, scored in domains.items()}
+    bare = next((cells for cells in files if not cells.lines), None)
+    if bare:
+        raise ScoresError(f"{bare.path}: has no rows; add one per agent and episode")
+    domain, agent, episode = (
+        [one for cells in files for one in cells.label(name)] for name in ("domain", "agent", "episode")
+    )
+    _check_single(files, list(zip(domain, agent, episode, strict=True)))
+    values = np.concatenate([cells.numbers(names) for cells in files])
+    rows: dict[str, list[int]] = {}
+    for row, name in enumerate(domain):
+        rows.setdefault(name, []).append(row)
+    return {
+        name: ScoreTable.from_rows([agent[row] for row in own], [episode[row] for row in own], names, values[own])
+        for name, own in rows.items()
+    }
 
 
 def _files(path: Files) -> list[Path]:
@@ -94,9 +97,17 @@ def _check_columns(files: Sequence[Cells], columns: Columns) -> None:
             raise ScoresError(f"{files[0].path}: no column '{theirs}' for '{name}'; {nearest(theirs, files[0].named)}")
 
 
-def _check_labels(cells: Cells, line: int, row: Mapping[str, str]) -> None:
-    for label in [label for label in LABELS if label in row and not row[label]]:
-        raise ScoresError(f"{cells.path}: line {line}, column '{label}': is empty; fill it in")
+def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:
+    """Refuse an episode that one agent drove twice in one domain."""
+    if len(set(rows)) == len(rows):
+        return
+    known: dict[Row, Path] = {}
+    places = ((cells, line) for cells in files for line in cells.lines)
+    for (cells, line), row in zip(places, rows, strict=True):
+        if row in known:
+            where = f", once in {known[row]}" if known[row] != cells.path else ""
+            raise ScoresError(f"{cells.path}: line {line}: {_duplicate(cells, row, where)}")
+        known[row] = cells.path
 
 
 def write_scores(table: ScoreTable, path: Path) -> None:
@@ -127,9 +138,10 @@ def write_scores(table: ScoreTable, path: Path) -> None:
         raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None
 
 
-def _duplicate(row: Mapping[str, str], before: str) -> str:
-    where = f" in domain '{row['domain']}'{before}" if "domain" in row else before
-    if "episode" in row:
-        return f"agent '{row['agent']}' has episode '{row['episode']}' twice{where}; number the episodes"
+def _duplicate(cells: Cells, row: Row, before: str) -> str:
+    domain, agent, episode = row
+    where = f" in domain '{domain}'{before}" if "domain" in cells.header else before
+    if "episode" in cells.header:
+        return f"agent '{agent}' has episode '{episode}' twice{where}; number the episodes"
     remedy = "add a column 'episode', or give its name: --columns episode=NAME"
-    return f"agent '{row['agent']}' is there twice{where}; {remedy}"
+    return f"agent '{agent}' is there twice{where}; {remedy}"

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from proxytune.errors import ScoresError
 from proxytune.scores.metric import Array
 from proxytune.settings import nearest
 
-LARGEST = 1e100
+LARGEST = 1e70
 """A score beyond this is no measurement, and its square would overflow."""
 
 
@@ -41,19 +41,30 @@ class ScoreTable:
         """
         if not scored:
             raise ScoresError("no episode has been scored")
-        agents = tuple(dict.fromkeys(agent for agent, _ in scored))
-        episodes = tuple(dict.fromkeys(str(episode) for _, episode in scored))
         metrics = tuple(next(iter(scored.values())))
-        rows = {name: row for row, name in enumerate(agents)}
-        columns = {label: column for column, label in enumerate(episodes)}
-        values = np.full((len(agents), len(episodes), len(metrics)), np.nan)
-        for (agent, episode), scores in scored.items():
-            cells = [scores.get(name, math.nan) for name in metrics]
+        rows = [[scores.get(name, math.nan) for name in metrics] for scores in scored.values()]
+        for (agent, episode), cells in zip(scored, rows, strict=True):
             if not all(abs(cell) < LARGEST for cell in cells):
                 raise ScoresError(f"agent '{agent}', episode {episode}: not a finite score in each of {list(metrics)}")
-            values[rows[agent], columns[str(episode)]] = cells
-        values.setflags(write=False)
-        return cls(agents, episodes, metrics, values)
+        return cls.from_rows([agent for agent, _ in scored], [str(label) for _, label in scored], metrics, rows)
+
+    @classmethod
+    def from_rows(
+        cls, agents: Sequence[str], episodes: Sequence[str], metrics: Sequence[str], values: ArrayLike
+    ) -> "ScoreTable":
+        """Build a table from the scores of each agent's each episode, given once.
+
+        Args:
+            agents: The agent of each row.
+            episodes: The episode of each row.
+            metrics: What was scored.
+            values: Finite, shape (rows, metrics).
+        """
+        rows, columns = _places(agents), _places(episodes)
+        table = np.full((len(rows), len(columns), len(metrics)), np.nan)
+        table[[rows[name] for name in agents], [columns[label] for label in episodes]] = values
+        table.setflags(write=False)
+        return cls(tuple(rows), tuple(columns), tuple(metrics), table)
 
     @cached_property
     def driven(self) -> NDArray[np.bool_]:
@@ -103,6 +114,11 @@ class ScoreTable:
         labels = self.episodes if episodes is None else tuple(episodes)
         if tuple(agents) == self.agents and labels == self.episodes:
             return self
-        rows = [self.agents.index(name) for name in agents]
-        columns = [self.episodes.index(label) for label in labels]
-        return ScoreTable(tuple(agents), labels, self.metrics, self.values[np.ix_(rows, columns)])
+        rows, columns = _places(self.agents), _places(self.episodes)
+        values = self.values[np.ix_([rows[name] for name in agents], [columns[label] for label in labels])]
+        return ScoreTable(tuple(agents), labels, self.metrics, values)
+
+
+def _places(names: Iterable[str]) -> dict[str, int]:
+    """The place of each name among them, each once."""
+    return {name: place for place, name in enumerate(dict.fromkeys(names))}

@@ -23,6 +23,7 @@ from proxytune.storage.records import (
     trial_of,
 )
 from proxytune.storage.renaming import RENAMING
+from proxytune.storage.under_way import UnderWay
 
 FILE_NAME = "study.db"
 Made = TypeVar("Made")
@@ -168,6 +169,10 @@ class Store:
             )
             self._outcomes[key] = {outcome.episode: outcome for outcome in outcomes}
         return self._outcomes[key]
+
+    def under_way(self, identity: str) -> UnderWay:
+        """Which episode runs of the domain family with this identity."""
+        return UnderWay(self.path, self._connection, identity)
 
     def failed_in_other_code(self, identity: str, code: str) -> set[Episode]:
         """The episodes that failed in other code than this; those of which the code is not known are left out."""

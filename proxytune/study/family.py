@@ -77,9 +77,9 @@ def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Valu
     """What a user's code answers; one line of what it raises instead."""
     try:
         return ask()
-    except ProxytuneError:
+    except (ProxytuneError, KeyboardInterrupt):
         raise
-    except Exception as problem:
+    except BaseException as problem:
         raise settings.error("family", f"{what} raised {describe(problem)}{place_of(problem)}; correct it") from problem
 
 

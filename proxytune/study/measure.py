@@ -1,10 +1,12 @@
 """Scoring a study's agents in one fixed domain: how a twin's target.csv is made."""
 
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
-from proxytune.domain import Episode
+from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import EpisodeError
-from proxytune.running.episodes import running
+from proxytune.running.episodes import Watch, running
 from proxytune.running.progress import Watcher
 from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
@@ -27,16 +29,29 @@ def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, r
     family = load_family(settings, model)
     labels = _labelled(settings, seed, repeats)
     watcher.begin(f"measuring {model.name}", 0)
-    metrics = {}
-    needed = needed_metrics(settings, family)
-    with running(family, longest_first(list(labels), {}), settings.jobs, needed=needed) as outcomes:
+    metrics = _drive(family, settings, list(labels), watcher)
+    scored = {(episode.agent, label): metrics[episode] for episode, label in labels.items()}
+    return ScoreTable.from_episodes(in_common(scored))
+
+
+def _drive(
+    family: DomainFamily, settings: StudySettings, episodes: list[Episode], watcher: Watcher
+) -> dict[Episode, Mapping[str, float]]:
+    """The metrics of every episode; an agent's last one is told."""
+    needed, left = needed_metrics(settings, family), Counter(episode.agent for episode in episodes)
+    metrics: dict[Episode, Mapping[str, float]] = {}
+    watch = Watch(settings.episode_timeout_s)
+    with running(family, longest_first(episodes, {}), settings.jobs, needed=needed, watch=watch) as outcomes:
         for outcome in outcomes:
             if outcome.metrics is None:
                 raise EpisodeError(failure_of(outcome))
+            agent = outcome.episode.agent
             metrics[outcome.episode] = outcome.metrics
             watcher.episode()
-    scored = {(episode.agent, label): metrics[episode] for episode, label in labels.items()}
-    return ScoreTable.from_episodes(in_common(scored))
+            left[agent] -= 1
+            if not left[agent]:
+                watcher.finished(f"agent {agent} measured")
+    return metrics
 
 
 def _labelled(settings: StudySettings, seed: int, repeats: int) -> dict[Episode, str]:

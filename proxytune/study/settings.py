@@ -11,6 +11,7 @@ from proxytune.scores import Metric
 from proxytune.search.engines.registry import DEFAULT_ENGINE, SCORE_ENGINE
 from proxytune.settings import Section, read_settings
 from proxytune.space import Interval, Space
+from proxytune.study.stop_rules import StopRules, positive, read_stop_rules
 
 DEFAULT_FAMILY = "proxytune.driving.family:lane_following"
 FILE_NAME = "study.toml"
@@ -20,22 +21,8 @@ LEARNING = "plv"
 KEYS = (
     "format", "name", "family", "proxy", "target", "target_columns", "truth", "objective", "metrics", "agents",
     "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
-    "cut_off", "stop", "parameters", "domain", "teaching", "held_out",
+    "cut_off", "stop", "parameters", "domain", "teaching", "held_out", "episode_timeout_s",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class StopRules:
-    """When a study ends before its budget is spent; None where a rule is not asked for.
-
-    Attributes:
-        wall_time_s: After the trial with which its episodes have taken so long [s], all runs together.
-        no_improvement: Once the most that any θ is expected to improve the score is less than this, in standard
-            deviations of the score's noise.
-    """
-
-    wall_time_s: float | None = None
-    no_improvement: float | None = None
 
 
 @dataclass(frozen=True)
@@ -70,6 +57,7 @@ class StudySettings:
         aliases: What is loaded for an agent whose name in tables is another.
         more_targets: The other files of the target's score table.
         target_columns: What columns are called in the target's files where that is another name.
+        episode_timeout_s: How long an episode may take before it counts as failed [s], if that is limited.
     """
 
     path: Path
@@ -99,6 +87,7 @@ class StudySettings:
     aliases: Mapping[str, str] = field(default_factory=dict)
     more_targets: tuple[Path, ...] = ()
     target_columns: Mapping[str, str] = field(default_factory=dict)
+    episode_timeout_s: float | None = None
 
     @property
     def targets(self) -> tuple[Path, ...]:
@@ -152,13 +141,14 @@ def read_study_settings(path: Path) -> StudySettings:
         preflight=read.flag("preflight", True),
         confirm=read.whole("confirm", 1, high=1000),
         cut_off=read.flag("cut_off", True),
-        stop=_stop(read.section("stop")),
+        stop=read_stop_rules(read.section("stop")),
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
         aliases=_aliases(read),
         more_targets=tuple(path.parent / name for name in _targets(read)[1:]),
         target_columns=_texts(read.section("target_columns")),
+        episode_timeout_s=positive(read, "episode_timeout_s"),
     )
 
 
@@ -203,20 +193,6 @@ def _texts(table: Section) -> dict[str, str]:
     return {name: table.text(name) for name in table.values}
 
 
-def _stop(rules: Section) -> StopRules:
-    rules.only(("wall_time_s", "no_improvement"))
-    return StopRules(_positive(rules, "wall_time_s"), _positive(rules, "no_improvement"))
-
-
-def _positive(rules: Section, key: str) -> float | None:
-    if key not in rules.values:
-        return None
-    value = rules.number(key)
-    if value <= 0.0:
-        raise rules.error(key, f"must be above 0, got {value:g}; remove it to have no such rule")
-    return value
-
-
 def _space(parameters: Section) -> Space:
     if not parameters.values:
         raise Section(parameters.path, "", {}).error("parameters", "is missing; write NAME = [low, high] in it")
@@ -240,6 +216,7 @@ def as_document(settings: StudySettings) -> Mapping[str, Any]:
         "engine": settings.engine,
         "seed": settings.seed,
         "jobs": settings.jobs,
+        "episode_timeout_s": settings.episode_timeout_s,
         "on_failure": "stop" if settings.stop_on_failure else "continue",
         "preflight": settings.preflight,
         "confirm": settings.confirm,

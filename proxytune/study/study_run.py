@@ -5,7 +5,7 @@ from functools import cached_property
 
 from proxytune.domain import Episode, Instance, Outcome, instance_of
 from proxytune.errors import EpisodeError, RunError
-from proxytune.running.episodes import running
+from proxytune.running.episodes import ENDED, ENDLESS, Watch, running
 from proxytune.running.progress import Silent, Watcher
 from proxytune.search.proposer import Trial
 from proxytune.space import Theta
@@ -111,7 +111,11 @@ class StudyRun:
         ended = {theta for theta in {episode.theta for episode in planned} if enough and enough(theta, known)}
         order = self._order(planned, missing, by_agent=enough is not None)
         family, needed = self.study.family, needed_metrics(self.settings, self.study.family)
-        with running(family, order, self.settings.jobs, lambda one: one.theta in ended, needed) as outcomes:
+        under_way = self.store.under_way(self.study.identity)
+        left, agents = under_way.left(), under_way.agents_that_failed(ENDED, ENDLESS)
+        watch = Watch(self.settings.episode_timeout_s, lambda one: one in left or one.agent in agents, under_way.begin)
+        episodes = running(family, order, self.settings.jobs, lambda one: one.theta in ended, needed, watch)
+        with under_way.ended(), episodes as outcomes:
             for outcome in outcomes:
                 self._keep(outcome)
                 known[outcome.episode] = outcome

@@ -7,7 +7,8 @@ import numpy as np
 
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare
-from proxytune.usefulness.prpv import dominance
+from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.usefulness.resampling import in_blocks
 
 LEVEL = 0.05
 """Chance explains a PRPV as low as is found by chance at least so often."""
@@ -46,12 +47,10 @@ def chance(
         ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
     """
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
-    in_proxy, on_target = (dominance(means, inputs.metrics) for means in inputs.means)
+    in_proxy, on_target = inputs.means
     rng = np.random.default_rng(seed)
-    values = np.empty(permutations)
-    for draw in range(permutations):
-        order = rng.permutation(len(inputs.agents))
-        values[draw] = np.abs(in_proxy[np.ix_(order, order)] - on_target).sum()
-    as_low = (values <= np.abs(in_proxy - on_target).sum()).sum()
+    shuffled = in_proxy[np.stack([rng.permutation(len(in_proxy)) for _ in range(permutations)])]
+    values = in_blocks(lambda proxy, _: prpv_of_means(proxy, on_target, inputs.metrics), shuffled, shuffled)
+    as_low = (values <= prpv_of_means(in_proxy, on_target, inputs.metrics)).sum()
     p_value = float((1 + as_low) / (1 + permutations))
     return Chance(float(values.mean()), float(values.std(ddof=1)), p_value, permutations, inputs)

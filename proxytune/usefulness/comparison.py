@@ -81,7 +81,8 @@ def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric])
 
 
 def _check_agents(present: ScoreTable, where: str, absent: ScoreTable, other: str) -> None:
-    missing = [name for name in present.agents if name not in absent.agents]
+    known = set(absent.agents)
+    missing = [name for name in present.agents if name not in known]
     if missing:
         remedy = "add or remove them, or compare the others alone (score --common)"
         raise ScoresError(f"{other} lacks scores of {', '.join(missing)}, which {where} has; {remedy}")

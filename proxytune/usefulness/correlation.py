@@ -8,6 +8,8 @@ import numpy as np
 
 from proxytune.scores import ROUNDING, Array, Metric, ScoreTable, varies
 from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.many_agents import by_table, kendall_of_table
+from proxytune.usefulness.standing import FEW_AGENTS
 
 SIMPLER_EPSILON = 1e-8
 """SIMPLER adds this to Pearson's denominator unless both sides are equal; so do we, for its published figures to come
@@ -52,6 +54,8 @@ def pearson_of_means(proxy: Array, target: Array) -> Array:
 
 def kendall_of_means(proxy: Array, target: Array) -> Array:
     """Kendall's τ-b between two domains, shapes as in pearson_of_means."""
+    if proxy.shape[-2] > FEW_AGENTS:
+        return by_table(kendall_of_table, proxy, target)
     one, other = _orders(proxy), _orders(target)
     concordant = (one * other).sum(axis=(-2, -3))
     pairs = np.abs(one).sum(axis=(-2, -3)) * np.abs(other).sum(axis=(-2, -3))

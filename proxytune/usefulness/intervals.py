@@ -40,9 +40,12 @@ def intervals(*, inputs: Comparison, error: Ppv, resamples: int, seed: int) -> I
         return None
     means = bootstrap_means(inputs, resamples=resamples, seed=seed)
     weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])
+    each = inputs.target.means.size
     return Intervals(
-        ppv=None if error.value is None else interval(ppv_of_means(*means, weights)),
-        srcc=_per_metric(inputs.metrics, pearson_of_means(*means)),
+        ppv=None
+        if error.value is None
+        else interval(in_blocks(lambda p, t: ppv_of_means(p, t, weights), *means, numbers=each)),
+        srcc=_per_metric(inputs.metrics, in_blocks(pearson_of_means, *means, numbers=each)),
         kendall_tau=_per_metric(inputs.metrics, in_blocks(kendall_of_means, *means)),
         mmrv=_per_metric(inputs.metrics, in_blocks(lambda p, t: mmrv_of_means(p, t, inputs.metrics), *means)),
     )

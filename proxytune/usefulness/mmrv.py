@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from proxytune.scores import ROUNDING, Array, Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.many_agents import by_table, violations_of_table
+from proxytune.usefulness.standing import FEW_AGENTS
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,8 @@ def mmrv_of_means(proxy: Array, target: Array, metrics: Sequence[Metric]) -> Arr
         Shape (…, metrics).
     """
     signs = np.array([1.0 if metric.direction == "max" else -1.0 for metric in metrics])
+    if proxy.shape[-2] > FEW_AGENTS:
+        return np.asarray(by_table(violations_of_table, proxy * signs, target * signs).mean(axis=-2), dtype=np.float64)
     violated = _above(proxy * signs) != _above(target * signs)
     costs = np.abs(target[..., :, None, :] - target[..., None, :, :]) * violated
     return np.asarray(costs.max(axis=-2).mean(axis=-2), dtype=np.float64)

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxytune.scores import Array, Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.prpv import prpv_of_means
-from proxytune.usefulness.repeats import by_start, is_repeated, split_repeats
-from proxytune.usefulness.resampling import counted_means, draw_counts, in_blocks, interval, too_few
+from proxytune.usefulness.repeats import Choice, by_start, is_repeated, split_repeats, start_places
+from proxytune.usefulness.resampling import agent_blocks, counted_means, draw_counts, in_blocks, interval, too_few
 
 FloorKind = Literal["same starts", "halves", "none"]
 MEANINGS: dict[FloorKind, str] = {
@@ -74,13 +73,8 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
     reason = too_few(chosen, "on the target")
     if reason:
         return NoiseFloor("none", None, None, None, 0, chosen, tuple(metrics), reason=reason)
-    rng, same_starts = np.random.default_rng(seed), is_repeated(chosen)
-    if same_starts:
-        first, second = split_repeats(chosen, rng, splits)
-    else:
-        first = split_halves(chosen, rng, splits)
-        second = chosen.driven[:, None, :] - first
-    values = _prpv(counted_means(chosen, first), counted_means(chosen, second), metrics)
+    same_starts = is_repeated(chosen)
+    values = _prpv(*_split_means(chosen, np.random.default_rng(seed), splits, same_starts), metrics)
     kind: FloorKind = "same starts" if same_starts else "halves"
     return NoiseFloor(kind, float(values.mean()), *interval(values), splits, chosen, tuple(metrics))
 
@@ -114,18 +108,33 @@ def floor_of_repeats(
         return NoiseFloor("none", None, None, None, 0, inputs.target, inputs.metrics, inputs.proxy, reason)
     value = float(prpv_of_means(one.means, other.means, metrics))
     counts = draw_counts(one, np.random.default_rng(seed), resamples)
-    low, high = interval(_prpv(counted_means(one, counts), counted_means(other, counts), metrics))
+    low, high = interval(_prpv(counted_means(one.values, counts), counted_means(other.values, counts), metrics))
     ends = min(low, value), max(high, value)
     return NoiseFloor("same starts", value, *ends, resamples, inputs.target, inputs.metrics, inputs.proxy)
 
 
-def split_halves(table: ScoreTable, rng: np.random.Generator, splits: int) -> NDArray[np.int64]:
-    """Which episodes fall into the first half: ones and zeros, shape (agents, splits, episodes)."""
-    rows = 1 if table.complete else len(table.agents)
-    order = rng.random((rows, splits, len(table.episodes)))
-    order = np.where(table.driven[:, None, :], order, np.inf)
-    rank = order.argsort(axis=-1).argsort(axis=-1)
-    return np.asarray(rank < (table.counts // 2)[:, None, None], dtype=np.int64)
+def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_starts: bool) -> tuple[Array, Array]:
+    """Mean scores of two sets of each agent's episodes, each of shape (splits, agents, metrics)."""
+    places, keys = start_places(table), rng.random((splits, len(table.episodes))) if same_starts else None
+    means = []
+    for rows, driven in agent_blocks(table, splits):
+        sets = split_halves(driven, rng, splits) if keys is None else split_repeats(driven, places, keys)
+        means.append([counted_means(table.values[rows], chosen) for chosen in sets])
+    first, second = (np.concatenate(parts, axis=1) for parts in zip(*means, strict=True))
+    return first, second
+
+
+def split_halves(driven: Choice, rng: np.random.Generator, splits: int) -> tuple[Choice, Choice]:
+    """Which episodes fall into the first half and which into the second, each of shape (agents, splits, episodes).
+
+    Args:
+        driven: Which agent drove which episode, shape (agents, episodes).
+        rng: Every agent is split at random by itself.
+        splits: How many times.
+    """
+    order = np.where(driven[:, None, :], rng.random((len(driven), splits, driven.shape[1])), np.inf)
+    first = order.argsort(axis=-1).argsort(axis=-1) < (driven.sum(axis=1) // 2)[:, None, None]
+    return first, driven[:, None, :] & ~first
 
 
 def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from proxytune.scores import Array, Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.many_agents import by_table, prpv_of_table
+from proxytune.usefulness.standing import FEW_AGENTS
 
 Flip = Literal["reversed", "lost", "invented"]
 
@@ -59,11 +61,10 @@ class Prpv:
         """Every pair that the proxy ranks unlike the target; a reversed one costs 2, others 1."""
         proxy, target = (dominance(means, self.inputs.metrics) for means in self.inputs.means)
         agents = self.inputs.agents
-        flipped = []
-        for i, j in zip(*np.nonzero(proxy != target), strict=True):
-            if (target[i, j], proxy[i, j]) in FLIPS:
-                flipped.append(FlippedPair(agents[i], agents[j], FLIPS[target[i, j], proxy[i, j]]))
-        return tuple(flipped)
+        better, worse = np.nonzero((proxy != target) & ((target == 1.0) | ((target == 0.5) & (proxy == 1.0))))
+        sides = zip(target[better, worse].tolist(), proxy[better, worse].tolist(), strict=True)
+        pairs = zip(better.tolist(), worse.tolist(), sides, strict=True)
+        return tuple(FlippedPair(agents[i], agents[j], FLIPS[flip]) for i, j, flip in pairs)
 
 
 FLIPS: dict[tuple[float, float], Flip] = {(1.0, 0.0): "reversed", (1.0, 0.5): "lost", (0.5, 1.0): "invented"}
@@ -99,6 +100,8 @@ def prpv_of_means(proxy: Array, target: Array, metrics: Sequence[Metric]) -> Arr
     Returns:
         Shape (…).
     """
+    if proxy.shape[-2] > FEW_AGENTS:
+        return by_table(lambda one, other: prpv_of_table(one, other, metrics), proxy, target)
     # Each pair counts half in either order.
     difference = np.abs(_signs(proxy, metrics) - _signs(target, metrics))
     return np.asarray(difference.sum(axis=-1), dtype=np.float64)

@@ -7,6 +7,7 @@ import numpy as np
 
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison
+from proxytune.usefulness.standing import stand
 
 CONFIDENCE = 0.95
 
@@ -63,8 +64,8 @@ def success_rates(inputs: Comparison) -> tuple[SuccessRates, ...]:
 
 
 def _is_rate(inputs: Comparison, column: int) -> bool:
-    known = {float(value) for side in (inputs.proxy, inputs.target) for value in side.values[side.driven][:, column]}
-    return known == {0.0, 1.0}
+    known = [np.unique(side.values[side.driven][:, column]) for side in (inputs.proxy, inputs.target)]
+    return bool(np.array_equal(np.union1d(*known), (0.0, 1.0)))
 
 
 def _rates(inputs: Comparison, metric: Metric, column: int) -> SuccessRates:
@@ -89,5 +90,5 @@ def _of_agents(table: ScoreTable, column: int) -> dict[str, Rate]:
 
 def _ties(table: ScoreTable, metric: Metric, column: int) -> int:
     merits, tie = metric.merits(table.means[:, column])
-    first, second = np.triu_indices(len(table.agents), 1)
-    return int((np.abs(merits[first] - merits[second]) <= tie).sum())
+    agents = len(merits)
+    return agents * (agents - 1) // 2 - int(stand(merits, float(tie[0])).below.sum())

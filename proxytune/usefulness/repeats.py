@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from proxytune.scores import ScoreTable
 
 Counts = NDArray[np.int64]
+Choice = NDArray[np.bool_]
 
 
 def start_of(label: str) -> str:
@@ -28,7 +29,10 @@ def start_places(table: ScoreTable) -> Counts:
 
 def repeats(table: ScoreTable) -> Counts:
     """How many repeats each agent drove of each start, shape (agents, starts)."""
-    return np.asarray(table.driven.astype(np.int64) @ _membership(table).astype(np.int64), dtype=np.int64)
+    places = start_places(table)
+    order = np.argsort(places, kind="stable")
+    firsts = np.searchsorted(places[order], np.arange(places.max() + 1))
+    return np.add.reduceat(table.driven[:, order].astype(np.int64), firsts, axis=1)
 
 
 def is_repeated(table: ScoreTable) -> bool:
@@ -42,21 +46,25 @@ def is_repeated(table: ScoreTable) -> bool:
     return bool(labels.min() >= 2 and shared.all() and (driven >= 2).any(axis=1).all())
 
 
-def split_repeats(table: ScoreTable, rng: np.random.Generator, splits: int) -> tuple[Counts, Counts]:
+def split_repeats(driven: Choice, places: Counts, keys: NDArray[np.float64]) -> tuple[Choice, Choice]:
     """Which episodes fall into either of two sets that hold the same starts, each as often.
 
     Where an agent has an odd number of repeats of a start, one is left out. Agents split the same repeats alike.
 
+    Args:
+        driven: Which agent drove which episode, shape (agents, episodes).
+        places: The place of each episode's start.
+        keys: Random numbers, shape (splits, episodes); the lower half of a start's repeats is the first set's.
+
     Returns:
-        Two arrays of ones and zeros, shape (agents, splits, episodes).
+        Two arrays of shape (agents, splits, episodes).
     """
-    keys = np.where(table.driven[:, None, :], rng.random((1, splits, len(table.episodes))), np.inf)
-    first, second = np.zeros(keys.shape, dtype=np.int64), np.zeros(keys.shape, dtype=np.int64)
-    places, half = start_places(table), repeats(table) // 2
-    for place in range(half.shape[1]):
+    first, second = np.zeros((2, len(driven), *keys.shape), dtype=np.bool_)
+    for place in range(places.max() + 1):
         columns = np.flatnonzero(places == place)
-        rank = keys[..., columns].argsort(axis=-1).argsort(axis=-1)
-        size = half[:, place, None, None]
+        own = driven[:, None, columns]
+        rank = np.where(own, keys[:, columns], np.inf).argsort(axis=-1).argsort(axis=-1)
+        size = own.sum(axis=-1, keepdims=True) // 2
         first[..., columns] = rank < size
         second[..., columns] = (rank >= size) & (rank < 2 * size)
     return first, second

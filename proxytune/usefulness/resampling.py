@@ -1,6 +1,6 @@
 """Bootstrap over episodes: what the measures would be, had the same agents driven other episodes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,9 +72,32 @@ def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> tuple[A
         Two arrays of shape (resamples, agents, metrics).
     """
     rng = np.random.default_rng(seed)
-    target_counts = draw_counts(inputs.target, rng, resamples)
-    proxy_counts = _alike(inputs, target_counts) if inputs.paired else draw_counts(inputs.proxy, rng, resamples)
-    return counted_means(inputs.proxy, proxy_counts), counted_means(inputs.target, target_counts)
+    if inputs.paired:
+        counts = draw_counts(inputs.target, rng, resamples)
+        return counted_means(inputs.proxy.values, _alike(inputs, counts)), counted_means(inputs.target.values, counts)
+    on_target = _means_of_draws(inputs.target, rng, resamples)
+    return _means_of_draws(inputs.proxy, rng, resamples), on_target
+
+
+def _means_of_draws(table: ScoreTable, rng: np.random.Generator, resamples: int) -> Array:
+    if table.complete:
+        return counted_means(table.values, draw_counts(table, rng, resamples))
+    blocks = agent_blocks(table, resamples)
+    means = [counted_means(table.values[rows], _draw_own(driven, rng, resamples)) for rows, driven in blocks]
+    return np.concatenate(means, axis=1)
+
+
+def agent_blocks(table: ScoreTable, draws: int) -> Iterator[tuple[slice, NDArray[np.bool_]]]:
+    """Agents of which episodes are drawn together, and what they drove.
+
+    Where all drove the same episodes these are all agents, with one row for them; otherwise as many as memory takes.
+    """
+    if table.complete:
+        yield slice(None), table.driven[:1]
+        return
+    size = max(1, BLOCK // (draws * len(table.episodes)))
+    for start in range(0, len(table.agents), size):
+        yield slice(start, start + size), table.driven[start : start + size]
 
 
 def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> NDArray[np.int64]:
@@ -87,8 +110,13 @@ def draw_counts(table: ScoreTable, rng: np.random.Generator, resamples: int) -> 
         places = places if places.any() else np.arange(len(places))
         starts = int(places.max()) + 1
         return rng.multinomial(starts, np.full(starts, 1 / starts), size=(1, resamples))[..., places]
-    chances = table.driven / table.counts[:, None]
-    return rng.multinomial(table.counts[:, None], chances[:, None, :], size=(len(table.agents), resamples))
+    return _draw_own(table.driven, rng, resamples)
+
+
+def _draw_own(driven: NDArray[np.bool_], rng: np.random.Generator, resamples: int) -> NDArray[np.int64]:
+    """How often each agent's each episode is drawn of its own, shape (agents, resamples, episodes)."""
+    counts = driven.sum(axis=1, keepdims=True)
+    return rng.multinomial(counts, (driven / counts)[:, None, :], size=(len(driven), resamples))
 
 
 def _alike(inputs: Comparison, target_counts: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -99,16 +127,24 @@ def _alike(inputs: Comparison, target_counts: NDArray[np.int64]) -> NDArray[np.i
     return target_counts[..., [columns.get(label, columns[start_of(label)]) for label in inputs.proxy.episodes]]
 
 
-def counted_means(table: ScoreTable, counts: NDArray[np.int64]) -> Array:
-    """Mean scores when episodes count as often as drawn: shape (resamples, agents, metrics)."""
-    sums = counts.astype(np.float64) @ np.nan_to_num(table.values)
+def counted_means(values: Array, counts: NDArray[np.int64] | NDArray[np.bool_]) -> Array:
+    """Mean scores (agents, episodes, metrics) when episodes count as often as drawn: (resamples, agents, metrics)."""
+    sums = counts.astype(np.float64) @ np.nan_to_num(values)
     return np.asarray(np.swapaxes(sums / counts.sum(axis=-1)[..., None], 0, 1), dtype=np.float64)
 
 
-def in_blocks(measure: Callable[[Array, Array], Array], proxy: Array, target: Array) -> Array:
-    """Apply a measure of pairs of agents to many tables without holding all pairs of all tables at once."""
-    agents = proxy.shape[-2]
-    size = max(1, BLOCK // agents**2)
+def in_blocks(
+    measure: Callable[[Array, Array], Array], proxy: Array, target: Array, *, numbers: int | None = None
+) -> Array:
+    """Apply a measure to many tables without holding at once all that it takes.
+
+    Args:
+        measure: Of mean scores in the proxy and on the target, shape (…, agents, metrics).
+        proxy: Mean scores in the proxy, shape (tables, agents, metrics).
+        target: Mean scores on the target, same shape.
+        numbers: How many numbers the measure holds of one table; by default one for each pair of agents.
+    """
+    size = max(1, BLOCK // (numbers or proxy.shape[-2] ** 2))
     starts = range(0, len(proxy), size)
     return np.concatenate([measure(proxy[start : start + size], target[start : start + size]) for start in starts])
 

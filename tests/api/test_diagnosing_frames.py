@@ -38,6 +38,7 @@ def test_parameters_and_errors_are_those_of_the_document(report):
     assert report.errors().empty
 
 
+@pytest.mark.slow
 def test_what_is_written_is_what_is_said(report, tmp_path):
     paths = report.write(tmp_path / "found")
     assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report.document()))

@@ -74,6 +74,7 @@ WRONG = {
     "a column less": (lambda samples: samples.drop(columns="y"), {}, "samples: no column 'y'"),
     "no rows": (lambda samples: samples.head(0), {}, "samples: has no rows; add one per sample"),
     "no table": (lambda samples: [1, 2], {}, "samples: must be a DataFrame, got list"),
+    "no text": (lambda samples: samples, {"name": None}, "log.toml: .*; give texts and numbers"),
     "a key": (lambda samples: samples, {"rate": 20}, "log.toml: rate: unknown key; did you mean 'rate_hz'"),
     "a command": (lambda samples: samples, {"command": "duties"}, "log.toml: command: unknown value 'duties'"),
 }

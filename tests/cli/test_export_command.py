@@ -53,17 +53,20 @@ def test_every_value_is_told_with_its_place_or_that_it_has_none(model, tmp_path,
     assert "dead_band.width 0.06 duty (0.05 to 0.07): NO PLACE, not in this file" in told
 
 
+SHORT = {
+    "family": None,
+    "metrics": '["distance:max"]',
+    "starts": "1",
+    "budget": "3",
+    "initial": "3",
+    "engine": '"sobol"',
+    "domain": {"plant": '"planar"', "seconds": "2"},
+}
+"""A study of three short trials on the road."""
+
+
 def test_the_best_theta_of_a_study_is_exported_with_its_intervals(make_study, tmp_path, capsys):
-    folder = make_study(
-        family=None,
-        agents='["steady", "daredevil"]',
-        metrics='["distance:max"]',
-        starts="1",
-        budget="3",
-        initial="3",
-        engine='"sobol"',
-        domain={"plant": '"planar"', "seconds": "2"},
-    )
+    folder = make_study(agents='["steady", "daredevil"]', **SHORT)
     (folder / "target.csv").write_text("agent,episode,distance\nsteady,0,0.2\ndaredevil,0,0.5\n")
     assert main(["study", str(folder), "--json"]) == 0
     best = json.loads(capsys.readouterr().out)["best"]["theta"]
@@ -77,16 +80,7 @@ def test_the_best_theta_of_a_study_is_exported_with_its_intervals(make_study, tm
 
 
 def test_a_study_that_names_its_agents_otherwise_is_exported(make_study, tmp_path, capsys):
-    folder = make_study(
-        family=None,
-        agents=None,
-        metrics='["distance:max"]',
-        starts="1",
-        budget="3",
-        initial="3",
-        engine='"sobol"',
-        domain={"plant": '"planar"', "seconds": "2"},
-    )
+    folder = make_study(agents=None, **SHORT)
     with (folder / "study.toml").open("a") as study:
         study.write('\n[agents]\nslow = "steady"\nwild = "daredevil"\n')
     (folder / "target.csv").write_text("agent,episode,distance\nslow,0,0.2\nwild,0,0.5\n")

@@ -52,7 +52,7 @@ def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured
 def test_no_repeat_at_all_is_refused(measured, capsys):
     status, output = measured("one.csv", "--repeats", "0")
     assert status == 2
-    assert "--repeats must be at least 1, got 0" in capsys.readouterr().err
+    assert "--repeats must be between 1 and 1000000, got 0" in capsys.readouterr().err
     assert not output.exists()
 
 

@@ -83,6 +83,11 @@ def test_a_map_of_the_users_own_goes_with_the_log(recorded, tmp_path):
     assert (home / "yard.toml").read_bytes() == (tmp_path / "yard.toml").read_bytes()
 
 
+def test_without_a_terminal_a_line_says_how_many_pictures_are_taken(recorded, capsys):
+    assert recorded("log", "--frames", "1")[0] == 0
+    assert "driving: 1 of 1 frames" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("frames", ["-1", "1000001"])
 def test_an_impossible_number_of_frames_is_refused(recorded, capsys, frames):
     status, home = recorded("log", "--frames", frames)

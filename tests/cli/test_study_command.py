@@ -78,6 +78,7 @@ def test_an_engine_that_is_not_installed_is_refused_by_file_and_key_and_nothing_
     assert not (folder / "study.db").exists()
 
 
+@pytest.mark.slow
 def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(make_study, capsys):
     folder = make_study(
         family='"partly_dead:partly_dead"', parameters={"matters": "[-1, 1]", "dead": "[0, 1]"}, preflight="true"
@@ -111,6 +112,7 @@ def test_without_a_terminal_every_trial_is_a_plain_line_with_its_prpv_the_best_a
     assert said[-1].startswith("fresh episodes ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("asked", "says"), [("7", "7 of 7"), ("5", "7 (budget 5)"), ("9", "9 of 9")])
 def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, asked, says):
     assert main(["study", str(finished), "--budget", asked]) == 0
@@ -119,6 +121,7 @@ def test_a_budget_on_the_command_line_stands_over_study_toml(finished, capsys, a
     assert json.loads(capsys.readouterr().out)["settings"]["budget"] == 7, "study.toml stays as it is"
 
 
+@pytest.mark.slow
 def test_a_study_of_a_lowered_budget_goes_on_to_the_trials_it_would_have_had(make_study, finished, capsys):
     folder = make_study("low")
     assert main(["study", str(folder), "--budget", "6", "--jobs", "2"]) == 0

@@ -14,19 +14,19 @@ def test_a_sweep_writes_its_curve_as_figure_csv_and_json_and_goes_on_where_it_wa
     document = json.loads(capsys.readouterr().out)
     assert document["episodes"] == {"run": 72}
     assert sorted(path.name for path in output.iterdir()) == [
-        "sweep_trim_delay=0.12.csv",
-        "sweep_trim_delay=0.12.html",
-        "sweep_trim_delay=0.12.json",
-        "sweep_trim_delay=0.12.png",
+        "sweep_trim_4e3f5b.csv",
+        "sweep_trim_4e3f5b.html",
+        "sweep_trim_4e3f5b.json",
+        "sweep_trim_4e3f5b.png",
     ]
     (curve,) = document["curves"]
-    assert json.loads((output / "sweep_trim_delay=0.12.json").read_text()) == curve
+    assert json.loads((output / "sweep_trim_4e3f5b.json").read_text()) == curve
     assert [point["prpv"] for point in curve["points"]][2] == 0
     assert main(arguments) == 0
     again = json.loads(capsys.readouterr().out)
     assert again["episodes"] == {"run": 0}
     assert again["curves"] == document["curves"]
-    assert (folder / "figures" / "sweep_trim_delay=0.12.png").exists()
+    assert (folder / "figures" / "sweep_trim_4e3f5b.png").exists()
 
 
 def test_all_sweeps_every_parameter_of_the_study_and_draws_them_together(make_study, capsys):

@@ -37,6 +37,7 @@ def test_people_see_table_1_and_when_a_learner_counts_as_converged(make_study, c
         assert words in said
 
 
+@pytest.mark.slow
 def test_a_budget_too_small_to_converge_is_said_and_gives_no_plv(make_study, capsys):
     folder = make_taught(make_study, grid=[0, 3, 6])
     assert main(["teach", str(folder), "--json"]) == 0
@@ -47,6 +48,7 @@ def test_a_budget_too_small_to_converge_is_said_and_gives_no_plv(make_study, cap
     assert "raise teaching.target_samples" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
     folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more="budget = 3")
     assert main(["study", str(folder), "--json"]) == 0
@@ -63,6 +65,7 @@ def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
     assert "refresh" not in page
 
 
+@pytest.mark.slow
 def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, capsys):
     more = "budget = 2\nnarrow = true"
     folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more=more)

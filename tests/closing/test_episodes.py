@@ -8,8 +8,8 @@ import pytest
 from episodes import paired, recorded
 from tiny_loop import FOUND, write_tiny
 
+from proxytune.closing.closed import Closed
 from proxytune.closing.episodes import drive_both, mean_gap_m
-from proxytune.closing.loop import Closed
 from proxytune.closing.opening import Loop
 from proxytune.domain import make_episode
 from proxytune.seeds import episode_seed

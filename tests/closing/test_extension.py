@@ -1,28 +1,10 @@
 """The extended study is the study itself, by another proxy, from another folder."""
 
-import tomllib
-
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from tiny_loop import FOUND, write_tiny
 
-from proxytune.closing.extension import toml_text, write_extension
+from proxytune.closing.extension import write_extension
 from proxytune.study.family import load_family
 from proxytune.study.settings import read_study_settings
-
-FINITE = st.floats(allow_nan=False, allow_infinity=False)
-PLAIN = st.one_of(st.text(), st.integers(-(10**9), 10**9), FINITE, st.booleans())
-VALUES = st.recursive(
-    st.one_of(PLAIN, st.lists(PLAIN, max_size=3)),
-    lambda inner: st.dictionaries(st.text(min_size=1), inner, max_size=3),
-    max_leaves=8,
-)
-
-
-@given(st.dictionaries(st.text(min_size=1), VALUES, max_size=4))
-def test_toml_reads_back_as_what_was_written(values):
-    assert tomllib.loads(toml_text(values)) == values
 
 
 def extended(tmp_path, *changes):
@@ -63,14 +45,3 @@ def test_what_a_study_may_read_lies_beside_the_extended_one_and_what_runs_made_d
     extended(tmp_path)
     there = {path.relative_to(folder / "loop" / "extended").as_posix() for path in (folder / "loop").rglob("*.*")}
     assert there == {"study.toml", "twin.toml", "found.toml", "mine.py", "robby/robot.toml"}
-
-
-@pytest.mark.parametrize("key", ["a b", "é", 'quo"te', ""])
-def test_keys_are_quoted_where_toml_needs_it(key):
-    assert tomllib.loads(toml_text({key: 1, "table": {key: {"inner": 2}}})) == {key: 1, "table": {key: {"inner": 2}}}
-
-
-@pytest.mark.parametrize("text", ["inf", "-inf", "nan", "2024-02-29", "07:32:00.5", "1979-05-27T07:32:00-07:00"])
-def test_values_that_json_does_not_have_read_back_as_they_were(text):
-    values = tomllib.loads(f"plain = {text}\nlist = [{text}]\n")
-    assert repr(tomllib.loads(toml_text(values))) == repr(values)

@@ -135,6 +135,17 @@ def test_without_a_twin_the_righted_agent_is_named_but_not_shown(righting, close
     assert captions_of_episodes(folder) == []
 
 
+@pytest.mark.slow
+def test_kept_pictures_that_are_damaged_are_told_of_and_drawn_again_once_removed(righting, close, capsys):
+    kept = righting[0] / "loop" / "righted"
+    (kept / "before.png").unlink()
+    assert main(["loop", str(righting[0])]) == 1
+    assert "pictures.json: cannot be read; remove it to draw the righted agent again" in capsys.readouterr().err
+    (kept / "pictures.json").unlink()
+    assert close(righting[0])["this_run"]["steps"] == ["righted agent"]
+    assert len(captions_of_episodes(righting[0])) == 2
+
+
 def test_what_is_done_is_not_done_again_and_comes_out_the_same(closed, closed_once, diagnosed, close):
     again = close(closed)
     assert (again["this_run"]["steps"], again["this_run"]["episodes"]) == ([], 0)
@@ -155,14 +166,15 @@ def test_another_log_does_only_what_comes_after_it_again(closed, closed_once, di
     assert (changed["verdict"], changed["prpv"]) == ("partly explained", closed_once[1]["prpv"])
 
 
+@pytest.mark.slow
 def test_another_model_tunes_again_and_the_way_back_drives_nothing(closed, closed_once, diagnosed, close):
     found = closed / "loop" / "diagnosed" / "model.toml"
     was = found.read_text()
     found.write_text(was.replace("0.149", "0.05"))
-    assert close(closed)["this_run"]["steps"] == ["extension", "extended study", "held-out agents"]
+    assert close(closed)["this_run"]["steps"] == ["extension", "extended study", "held-out agents", "righted agent"]
     found.write_text(was)
     back = close(closed)
-    assert (back["this_run"]["steps"], back["this_run"]["episodes"]) == (["extension"], 0)
+    assert (back["this_run"]["steps"], back["this_run"]["episodes"]) == (["extension", "righted agent"], 0)
     assert but_for_times(back) == but_for_times(closed_once[1])
 
 
@@ -184,6 +196,7 @@ def test_a_target_measured_of_another_twin_is_told_of(closed, capsys):
     assert "target.csv: was measured of another model" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_what_depends_on_the_users_own_modules_is_done_again_when_they_change(closed, diagnosed, close, capsys):
     (closed / "mine.py").write_text("GAIN = 1.0\n")
     assert main(["loop", str(closed)]) == 2

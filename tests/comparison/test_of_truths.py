@@ -108,6 +108,7 @@ def test_a_point_that_seems_no_worse_than_the_truth_has_the_regret_of_the_worse_
     assert told.fresh_regret((0.1, 0.1), 1) == 3.0
 
 
+@pytest.mark.slow
 def test_fresh_episodes_are_left_out_where_they_cannot_lower_the_lowest_regret(opened, simulated):
     objective = opened()
     level = sum(own_and_fresh(objective, 1)) / 2

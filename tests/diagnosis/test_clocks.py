@@ -10,6 +10,7 @@ import pytest
 sys.path.append(str(Path(__file__).parent))
 
 import hidden
+from clock_rates import planted
 from planted import ROBOT, driven_log, planted_log
 
 from proxytune.diagnosis.measured.clocks import put_in_step, read_clocks
@@ -78,6 +79,16 @@ def test_a_clock_that_jumps_is_named_with_its_time_and_the_longer_stretch_is_kep
     low, high = found.kept_s[3]
     assert (low, high <= 25.0) == (0.0, True)
     assert np.isinf(found.kept_s[[0, 1, 2, 4, 5], 1]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [22, 23])
+def test_a_jump_that_leaves_little_of_a_drive_is_clear_beside_what_the_others_say(number):
+    one = planted("jump", number, hidden=False)
+    (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
+    assert jump.drive == f"{one.drive:02d}"
+    assert jump.time_s == pytest.approx(one.at_s, abs=4.0)
+    assert jump.by_s == pytest.approx(one.by_s, abs=0.02)
 
 
 @pytest.mark.parametrize("effect", [0, 12, 17, 21, 24])

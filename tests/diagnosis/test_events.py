@@ -113,6 +113,7 @@ def test_what_points_against_a_loss_of_no_consequence_costs(effect, size):
     assert gains[2] == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_commands_at_times_of_their_own_are_no_jitter_of_the_robot_but_on_a_grid_they_look_like_it(seed):
     gains = {}

@@ -34,6 +34,7 @@ def tested():
     return planted_drives({**TRUTH, **TURNING}, episodes=3, seconds=20.0, seed=9)
 
 
+@pytest.mark.slow
 def test_the_error_with_names_and_remainder_is_told_beside_that_with_names_alone(drives, tested):
     learning = learn(found(drives, {}), tested, (1.0, 2.0, 60.0))
     assert [error.horizon_s for error in learning.errors] == [1.0, 2.0]
@@ -42,6 +43,7 @@ def test_the_error_with_names_and_remainder_is_told_beside_that_with_names_alone
     assert not learning.names_doubtful
 
 
+@pytest.mark.slow
 def test_names_that_hide_what_curves_could_say_are_doubtful(drives, tested):
     learning = learn(found(drives, {"saturation.limit": 0.25}, (WRONG,)), tested, (2.0,))
     assert learning.names_doubtful

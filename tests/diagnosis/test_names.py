@@ -49,6 +49,7 @@ def named(base, monkeypatch, *answers, harmful=True):
     return naming.name_effects(base, 1, told.append), asked, told
 
 
+@pytest.mark.slow
 def test_an_effect_that_misled_is_left_out_of_a_second_search_and_still_told(base, monkeypatch):
     found, asked, told = named(base, monkeypatch, SLIP, SCRUB)
     assert asked == [(), ("lateral_slip",)]
@@ -63,12 +64,14 @@ def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
     assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_was_found_last_and_does_not_matter_misled_nobody(base, monkeypatch):
     found, asked, _ = named(base, monkeypatch, SCRUB, SLIP)
     assert asked == [()]
     assert [dropped.effect.effect for dropped in found.immaterial] == ["lateral_slip"]
 
 
+@pytest.mark.slow
 def test_the_second_search_is_not_taken_where_it_predicts_worse(base, monkeypatch):
     monkeypatch.setattr(naming, "predicts_no_worse", lambda one, other: False)
     found, asked, _ = named(base, monkeypatch, SLIP, SCRUB)

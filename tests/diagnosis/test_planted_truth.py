@@ -25,7 +25,7 @@ def said_of(name, kind):
         "dead_band width 0.12",
         pytest.param("turn_slip gain 0.15", marks=pytest.mark.slow),
         pytest.param("yaw_scrub baseline 0.13", marks=pytest.mark.slow),
-        "dropped_commands probability 0.4",
+        pytest.param("dropped_commands probability 0.4", marks=pytest.mark.slow),
     ],
 )
 def test_a_hidden_effect_is_named_and_nothing_else(name):

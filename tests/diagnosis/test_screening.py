@@ -61,12 +61,14 @@ def chance():
     return np.array([min(lead.p_value for lead in leads_of({}, seed=seed)) for seed in range(20, 28)])
 
 
+@pytest.mark.slow
 def test_chance_alone_is_told_as_chance(chance):
     assert chance.min() > 0.005
     assert (chance < 0.1).sum() <= 3
     assert 0.15 < chance.mean() < 0.85
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_leads():
     base = fitted(planted_drives(TRUTH, **SHORT))
     forms = candidates(ROBOT, base.theta, TAKEN)

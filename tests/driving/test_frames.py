@@ -109,6 +109,7 @@ def test_corners_are_bent_more_tightly_than_an_arc_of_half_a_tile():
     assert overlap(ours(), "both") > arcs + 0.15
 
 
+@pytest.mark.slow
 def test_nine_dashes_fit_a_straight_tile_better_than_any_other_number():
     far, near = from_middle()
     straight = (far < MIDDLE) & (near < TILE / 2)

@@ -149,6 +149,7 @@ def painted(road, offset, outer=True):
     return floor.pixels[rows, columns]
 
 
+@pytest.mark.slow
 @every_road
 @both_lanes
 def test_the_edge_lines_and_the_lanes_are_drawn_where_they_are_scored(road, outer):

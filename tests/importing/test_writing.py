@@ -7,7 +7,7 @@ import pytest
 from imported_drives import commands, drive, poses
 
 from proxytune.errors import InputError, LogError
-from proxytune.importing.facts import Facts, read_figures
+from proxytune.importing.facts import Facts, read_geometry
 from proxytune.importing.source import Drive, Pictures, Source
 from proxytune.importing.writing import write_log
 from proxytune.logs import read_log
@@ -73,10 +73,10 @@ def test_pictures_that_break_off_leave_nothing_behind(tmp_path):
 
 
 def test_figures_are_read_by_the_names_of_log_toml():
-    assert read_figures(["baseline_m=0.16", "wheel_radius_m = 0.03"]) == {"baseline_m": 0.16, "wheel_radius_m": 0.03}
+    assert read_geometry(["baseline_m=0.16", "wheel_radius_m = 0.03"]) == {"baseline_m": 0.16, "wheel_radius_m": 0.03}
 
 
 @pytest.mark.parametrize("text", ["baseline=0.16", "baseline_m", "baseline_m=wide"])
 def test_a_figure_that_is_none_is_refused(text):
     with pytest.raises(InputError, match="--figure"):
-        read_figures([text])
+        read_geometry([text])

@@ -1,5 +1,8 @@
 """What is in the cache is whole, is made once, and is told apart by all that determines it."""
 
+import contextlib
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -54,3 +57,26 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
     (tmp_path / "kept").write_text("a file, where the folder should be")
     with pytest.raises(StoreError, match="cannot be written"):
         Cache(tmp_path / "kept").get("exam", {}, lambda: {"scores": np.zeros(1)})
+
+
+@pytest.mark.parametrize("place", [0.3, 0.5, 0.7, 0.9])
+def test_a_flipped_byte_is_one_line_or_in_no_array(tmp_path, place):
+    cache, facts = Cache(tmp_path), {"seed": 1}
+    noise = {"scores": np.random.default_rng(1).normal(size=500)}
+    cache.get("exam", facts, lambda: noise)
+    path = cache.path("exam", facts)
+    content = bytearray(path.read_bytes())
+    content[int(place * len(content))] ^= 0xFF
+    path.write_bytes(content)
+    with contextlib.suppress(StoreError):
+        assert (cache.get("exam", facts, dict)["scores"] == noise["scores"]).all()
+
+
+def test_an_array_of_impossible_size_is_damage(tmp_path):
+    cache, facts = Cache(tmp_path), {"seed": 1}
+    path = cache.path("exam", facts)
+    header = repr({"descr": "<f8", "fortran_order": False, "shape": (10**12,)}).encode().ljust(117) + b"\n"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("scores.npy", b"\x93NUMPY\x01\x00v\x00" + header)
+    with pytest.raises(StoreError, match="is damaged .*delete it"):
+        cache.get("exam", facts, dict)

@@ -204,6 +204,7 @@ def test_instants_that_are_written_are_the_instants_that_are_read(tmp_path_facto
     assert [int(path.stem) for path in frames.paths] == table["frame"].tolist()
 
 
+@pytest.mark.slow
 @settings(derandomize=True, deadline=None, max_examples=150)
 @given(text=st.one_of(st.text(max_size=60), st.text("ab,-0.159einf \n\"'", max_size=60).map(HEADER.__add__)))
 def test_no_text_leads_to_anything_but_frames_or_one_line(tmp_path_factory, text):

@@ -58,6 +58,15 @@ def test_the_answer_s_fresh_score_stands_after_the_last_trial_with_its_interval(
     assert bar.get_label() == "answer, fresh episodes"
 
 
+def test_lines_are_named_at_their_ends_and_not_in_the_legend(result):
+    figure = convergence(confirmed(result, kind="same starts", value=5.0, low=1.0, high=9.0))
+    (axes,) = figure.axes
+    chance = f"chance\n{result.judged.chance.mean:.1f}"
+    assert [text.get_text() for text in axes.texts] == ["answer\nso far", chance, "noise floor\n5.0"]
+    told = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert told == ["design", "proposed", "answer, fresh episodes"]
+
+
 def test_axes_are_named_with_units(result):
     (axes,) = convergence(result).axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("trial", "PRPV [ordered pairs]")

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.container import ErrorbarContainer
+from matplotlib.text import Text
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
@@ -23,9 +24,10 @@ from proxytune.driving.robot import read_robot
 from proxytune.effects import Means, theta_names
 from proxytune.effects.catalogue import CATALOGUE
 from proxytune.report.diagnosis.effect_figure import effect_curve
-from proxytune.report.diagnosis.figures import SHOWN, diagnosis_figures
+from proxytune.report.diagnosis.figures import diagnosis_figures
 from proxytune.report.diagnosis.means import ANY, GROUPS, MEASURED, retuned
 from proxytune.report.diagnosis.model_names import BEFORE
+from proxytune.report.diagnosis.ranking_figure import JUDGES, SHOWN, ranking_figure
 from proxytune.report.diagnosis.residual_figure import MANY_WINDOWS, residual_map, residual_over_time, strayed
 
 WIDTH = 0.12
@@ -81,8 +83,11 @@ def test_every_figure_is_drawn_without_a_warning(diagnosis):
     assert set(figures) == {"residual_over_time", "residual_map", "ranking", "effect_curve", "error"}
 
 
-def test_figures_are_made_for_a_column(figures):
-    assert all(3.4 <= figure.get_figwidth() <= 7.0 for figure in figures.values())
+def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(figures):
+    for figure in figures.values():
+        assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
+        figure.draw_without_rendering()
+        assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 6.0
 
 
 def test_the_legend_lies_within_its_figure(figures):
@@ -97,11 +102,11 @@ def test_the_legend_lies_within_its_figure(figures):
 def test_axes_say_what_they_show_in_which_unit(figures):
     labels = {name: [(a.get_xlabel(), a.get_ylabel()) for a in figure.axes] for name, figure in figures.items()}
     assert labels["residual_over_time"] == [("time in the episode [s]", "distance to prediction\nin 2-s windows [mm]")]
-    assert labels["residual_map"][-1][1] == "distance to prediction\nin 2-s windows [mm]"
-    assert "[nats]" in labels["ranking"][1][0]
-    assert [y for _, y in labels["error"]] == ["error of position, RMS [mm]", "error of heading, RMS [deg]"]
-    assert all(x == "length of the prediction [s]" for x, _ in labels["error"])
-    assert [y for _, y in labels["effect_curve"]][::2] == ["steady speed [m/s]", "speed − declared [mm/s]"]
+    assert labels["residual_map"][-1][0] == "distance to prediction in 2-s windows [mm]"
+    assert "[nats]" in figures["ranking"].get_supxlabel()
+    assert [y for _, y in labels["error"]] == ["position error, RMS [mm]", "heading error, RMS [deg]"]
+    assert all(x == "length of prediction [s]" for x, _ in labels["error"])
+    assert [y for _, y in labels["effect_curve"]][::2] == ["steady speed [m/s]", "speed − declared\n[mm/s]"]
     assert [x for x, _ in labels["effect_curve"]][2:] == ["command [duty]"] * 2
 
 
@@ -166,6 +171,25 @@ def test_the_maps_share_one_scale_and_equal_axes(diagnosis, figures):
     assert list(other.get_array()) == pytest.approx(both[AFTER].rms)
 
 
+def test_an_axis_that_begins_late_says_why(diagnosis, figures):
+    drives = diagnosis.parts.tested
+    assert figures["residual_over_time"].axes[0].get_xlabel() == "time in the episode [s]"
+    half = int(drives.last.max() // 2)
+    late = drives.only(drives.first >= half)
+    both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=late)))
+    assert "the first was fitted" in residual_over_time(late, both).axes[0].get_xlabel()
+
+
+def test_errors_are_on_logarithmic_axes_with_the_floor_off_their_ends(diagnosis, figures):
+    for axes, floors in zip(
+        figures["error"].axes,
+        ([1e3 * e.floor.lower for e in diagnosis.errors], [np.degrees(e.heading_floor) for e in diagnosis.errors]),
+        strict=True,
+    ):
+        assert axes.get_yscale() == "log"
+        assert axes.get_ylim()[0] < 0.95 * min(floors)
+
+
 def test_a_path_on_the_map_is_where_the_window_was_measured(diagnosis, figures):
     drives = diagnosis.parts.tested
     windows = cut(drives, 2.0)
@@ -185,31 +209,46 @@ def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monk
     assert MANY_WINDOWS > 3
 
 
-def test_the_ranking_holds_every_gain_best_first(diagnosis, figures):
-    upper, lower = figures["ranking"].axes
-    for axes, gains in (
-        (upper, [tried.gain for tried in diagnosis.found.tried[:SHOWN]]),
-        (lower, [curve.gain for curve in diagnosis.found.curves[:6]]),
-    ):
-        dots = [one for one in axes.get_lines() if one.get_marker() == "o"]
-        assert [float(one.get_xdata()[0]) for one in dots] == gains
-        assert [float(one.get_ydata()[0]) for one in dots] == list(range(len(gains)))
+def dots(axes):
+    return [one for one in axes.get_lines() if one.get_marker() == "o"]
+
+
+def test_the_ranking_holds_those_added_then_every_other_gain_best_first(diagnosis, figures):
+    found, panels = diagnosis.found, figures["ranking"].axes
+    others = [tried.gain for tried in found.tried if tried.effect != "dead_band" or tried.form]
+    expected = ([found.adopted[0].gain], others[:SHOWN], [curve.gain for curve in found.curves[:JUDGES]])
+    for axes, gains in zip(panels, expected, strict=True):
+        assert [float(one.get_xdata()[0]) for one in dots(axes)] == gains
+        assert [float(one.get_ydata()[0]) for one in dots(axes)] == list(range(len(gains)))
         low, high = axes.get_xlim()
         assert low <= min(gains) <= max(gains) <= high
-    assert upper.get_yticklabels()[0].get_text() == "dead band"
-    assert [one.get_label() for one in upper.get_lines() if one.get_marker() == "o"].count("adopted") == 1
-    threshold = [one for one in upper.get_lines() if one.get_linestyle() == ":"]
+    assert [axes.get_title(loc="left") for axes in panels] == ["added, in this order", "tried alone", "any curve over"]
+    assert "dead band" not in [tick.get_text() for tick in panels[1].get_yticklabels()]
+    threshold = [one for one in panels[0].get_lines() if one.get_linestyle() == ":"]
     assert list(threshold[0].get_xdata()) == [RULES.least_gain_nats, RULES.least_gain_nats]
+
+
+def test_every_effect_that_was_added_is_on_top_in_the_order_of_adding(diagnosis):
+    (first,) = diagnosis.found.adopted
+    added = (first, replace(first, effect="wheel_gain", form="left wheel", gain=40.0), replace(first, effect="new"))
+    top = ranking_figure(replace(diagnosis.found, adopted=added)).axes[0]
+    assert [tick.get_text() for tick in top.get_yticklabels()] == ["dead band", "wheel gain (left wheel)", "new"]
+    assert {dot.get_label() for dot in dots(top)} == {"added"}
+
+
+def test_with_nothing_added_the_ranking_begins_with_what_was_tried(clean):
+    figure = ranking_figure(clean.found)
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["tried alone", "any curve over"]
 
 
 def test_rivals_are_marked_in_the_ranking(diagnosis):
     rival = next(c for c in candidates(diagnosis.robot, diagnosis.found.declared.theta, ()) if c.effect == "stiction")
     adopted = (replace(diagnosis.found.adopted[0], rivals=(rival,)),)
     figure = diagnosis_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
-    upper = figure.axes[0]
-    dots = [one for one in upper.get_lines() if one.get_marker() == "o"]
+    upper = figure.axes[1]
     names = [tick.get_text() for tick in upper.get_yticklabels()]
-    marked = {name.split(" (")[0] for name, dot in zip(names, dots, strict=True) if dot.get_label().startswith("rival")}
+    pairs = zip(names, dots(upper), strict=True)
+    marked = {name.split(" (")[0] for name, dot in pairs if dot.get_label() == "fits as well as one added"}
     assert marked == {"stiction"}
 
 

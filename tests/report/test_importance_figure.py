@@ -29,10 +29,12 @@ def test_a_study_has_the_importance_of_each_of_its_parameters(finished):
     assert [importance.name for importance in found] == ["delay", "trim"]
 
 
-def test_bars_have_the_shares_and_their_intervals_most_important_on_top(result):
+def test_a_dot_is_the_share_a_stroke_what_is_alone_and_a_line_the_interval_most_important_on_top(result):
     (axes,) = importance_figure(result).axes
     assert [label.get_text() for label in axes.get_yticklabels()] == ["delay", "trim"]
-    assert [bar.get_width() for bar in axes.patches] == [0.25, 0.75, 0.125, 0.5]
+    drawn = {line.get_label(): line.get_xydata().tolist() for line in axes.get_lines()}
+    assert drawn["alone or with others"] == [[0.25, 0.0], [0.75, 1.0]]
+    assert drawn["alone"] == [[0.125, 0.0], [0.5, 1.0]]
     ends = [path.vertices[:, 0] for path in axes.collections[0].get_paths()]
     assert np.allclose(ends, [(0.1, 0.4), (0.5, 1.0)])
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from confirmations import planted
 
+from proxytune.report.numbers import span
 from proxytune.report.study.profiles_figure import density_of, profiles_figure
 from proxytune.storage.store import Store
 from proxytune.study.result import result_of
@@ -52,9 +53,11 @@ def test_the_answer_is_a_line_and_the_truth_a_mark_only_where_it_is_known(result
     assert marks[1]["truth"] == 0.11
 
 
-def test_an_unidentified_parameter_is_called_so(result):
+def test_what_remains_is_written_above_and_an_unidentified_parameter_is_called_so(result):
     vague = planted(result, deviation=(3.0, 0.02))
-    assert [axes.get_title() for axes in profiles_figure(vague).axes] == ["unidentified", ""]
+    ends = [span(vague.knowledge.intervals[name]) for name in ("delay", "trim")]
+    titles = [axes.get_title() for axes in profiles_figure(vague).axes]
+    assert titles == [f"unidentified: {ends[0]}", f"{ends[1]} remain"]
 
 
 def test_it_can_be_read_in_one_column_of_a_paper(result):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.errors import RunError
-from proxytune.report.scores.figures import FLIP_COLOURS, flipped_pairs, scatter
+from proxytune.report.scores.figures import FLIP_COLOURS, LONGEST, MOST, flipped_pairs, scatter
 from proxytune.report.writing import save
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import assess
@@ -31,8 +31,45 @@ def test_the_scatter_has_a_panel_per_metric_with_every_agent_named(assessment):
         points = next(line for line in axes.lines if line.get_marker() == "o")
         np.testing.assert_array_equal(points.get_xdata(), assessment.inputs.target.means[:, column])
         np.testing.assert_array_equal(points.get_ydata(), assessment.inputs.proxy.means[:, column])
-        named = {name for text in axes.texts for name in text.get_text().split(", ")}
-        assert named == set(assessment.inputs.agents)
+        assert sorted(text.get_text() for text in axes.texts) == sorted(assessment.inputs.agents)
+
+
+@pytest.mark.parametrize("agents", [6, MOST])
+def test_no_two_names_overlap_and_none_is_cut_at_85_millimetres(agents):
+    values = np.round(np.random.default_rng(1).normal(size=(agents, 3, 2)), 1)
+    values[: agents // 2] = 1.0
+    names = tuple(f"policy_number_{i}" for i in range(agents))
+    both = ScoreTable(names, ("0", "1", "2"), ("distance", "time"), values)
+    figure = scatter(assess(proxy=both, target=both, metrics=M, resamples=20))
+    assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        heights = sorted(text.get_position()[1] * axes.bbox.height for text in axes.texts)
+        assert np.diff(heights).min() * 72.0 / figure.dpi > max(text.get_fontsize() for text in axes.texts)
+        assert max(text.get_window_extent().x1 for text in axes.texts) <= figure.bbox.x1
+
+
+def test_names_are_in_the_proxys_order_each_tied_to_its_point(assessment):
+    axes = scatter(assessment).axes[0]
+    means = assessment.inputs.proxy.means[:, 0]
+    top_down = sorted(axes.texts, key=lambda text: -text.get_position()[1])
+    assert [text.get_text() for text in top_down] == [f"A{row}" for row in np.argsort(-means)]
+    for text in axes.texts:
+        row = int(text.get_text()[1:])
+        assert text.xy == (assessment.inputs.target.means[row, 0], means[row])
+
+
+def test_of_many_agents_those_are_named_whose_rank_differs_most():
+    scores = np.arange(40.0)[:, None, None]
+    moved = scores.copy()
+    moved[[3, 36]] = scores[[36, 3]]
+    names = tuple(f"module.of.some.package:agent{row}" for row in range(40))
+    tables = [ScoreTable(names, ("0",), ("distance",), values) for values in (scores, moved)]
+    (axes,) = scatter(assess(proxy=tables[0], target=tables[1], metrics=M[:1])).axes
+    named = [text.get_text() for text in axes.texts]
+    assert len(named) == MOST
+    assert {name.rsplit(":", 1)[1] for name in named} >= {"agent3", "agent36"}
+    assert max(map(len, named)) == LONGEST
 
 
 def test_error_bars_are_standard_errors(assessment):
@@ -54,6 +91,18 @@ def test_the_map_colours_each_pair_once_and_counts_them(assessment):
     assert sum(drawn.values()) == 15
     assert np.isnan(cells[np.triu_indices(6)]).all()
     assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"{k}: {n}" for k, n in drawn.items()]
+
+
+def test_pairs_of_more_agents_than_can_be_named_are_a_picture_over_ranks_of_the_same_width():
+    found = assess(proxy=table(4, agents=300), target=table(5, agents=300), metrics=M, resamples=2)
+    few, many = (flipped_pairs(one.prpv) for one in (assess(proxy=table(4), target=table(5), metrics=M), found))
+    assert few.get_figwidth() == many.get_figwidth()
+    assert few.get_figwidth() * 25.4 == pytest.approx(85.0)
+    (picture,) = many.axes[0].images
+    reversed_ = list(FLIP_COLOURS).index("reversed")
+    assert (picture.get_array() == reversed_).sum() == sum(pair.flip == "reversed" for pair in found.prpv.pairs) > 0
+    many.draw_without_rendering()
+    assert not any("A" in label.get_text() for label in many.axes[0].get_yticklabels())
 
 
 def test_constant_scores_and_two_agents_are_drawn_too(tmp_path):

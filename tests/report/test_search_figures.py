@@ -44,6 +44,16 @@ def test_the_pair_has_every_trial_the_answer_the_failed_ones_and_the_truth(resul
     assert "truth" not in [line.get_label() for line in evaluations_figure(result).axes[0].get_lines()]
 
 
+def test_a_trial_that_was_cut_off_is_an_open_point(result):
+    cut = TrialRecord(8, {"trim": 0.2, "delay": 0.25}, "cut", bound=14.0, score=20.0)
+    pair = evaluations_figure(replace(result, trials=(*result.trials, cut))).axes[0]
+    (holes,) = [one for one in pair.collections if one.get_zorder() == 3]
+    assert np.allclose(holes.get_offsets(), [(0.25, 0.2)])
+    assert [one.get_label() for one in pair.collections].count("stopped early") == 1
+    whole = evaluations_figure(result).axes[0]
+    assert "stopped early" not in [one.get_label() for one in whole.collections]
+
+
 def test_the_shadow_is_the_region_and_no_more(result):
     holds = shadow(result)
     # Two deviations of 0.05 and 0.02 of the box are inside, four are not.

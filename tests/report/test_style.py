@@ -8,6 +8,7 @@ import pytest
 HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis.result")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "module",
     [

@@ -5,10 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from rich.console import Console
 
-from proxytune.report.sweep.document import curve_csv, curve_document, curve_lines, curve_name, curve_tables, failures
-from proxytune.report.sweep.figures import bar_points, bars_figure, panels_figure, sweep_figure
+from proxytune.report.sweep.bars import bar_points, bars_figure
+from proxytune.report.sweep.document import (
+    curve_csv,
+    curve_document,
+    curve_lines,
+    curve_name,
+    curve_tables,
+    failures,
+    held_mark,
+)
+from proxytune.report.sweep.figures import panels_figure, sweep_figure
 from proxytune.storage.store import Store
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
@@ -59,9 +69,17 @@ def test_the_csv_says_the_same_and_reads_back(swept):
     assert [float(row["ppv"]) for row in rows] == [point["ppv"] for point in points]
 
 
-def test_the_name_says_what_the_others_are_held_at(swept, make_study):
-    assert curve_name(swept) == "sweep_trim_delay=0.12"
-    assert curve_name(curve(make_study("nominal"), base={})) == "sweep_trim"
+def test_the_name_is_short_and_other_where_the_others_are_held_elsewhere(swept):
+    names = [curve_name(replace(swept, base=base)) for base in (TRUTH, {**TRUTH, "delay": 0.2}, {"trim": 0.1}, {})]
+    assert names[0] == "sweep_trim_4e3f5b"
+    assert len(names[1]) == len(names[0])
+    assert names[1] != names[0]
+    assert names[2:] == ["sweep_trim", "sweep_trim"]
+
+
+def test_values_have_one_mark_in_any_order_and_as_any_number():
+    assert held_mark({"trim": 1, "delay": 0.12}) == held_mark({"delay": 0.12, "trim": 1.0})
+    assert held_mark({"trim": 1.0}) != held_mark({"trim": 0.1})
 
 
 def test_people_see_a_row_per_value(swept):
@@ -89,14 +107,14 @@ def test_the_figure_shows_every_point_of_every_curve_within_its_axes(make_study)
     folder = make_study()
     curves = [curve(folder), curve(folder, "delay")]
     panels = np.reshape(sweep_figure(curves).axes, (2, 2))
-    for column, swept in enumerate(curves):
-        line = next(line for line in panels[0, column].get_lines() if line.get_label() == "PRPV")
+    for row, swept in enumerate(curves):
+        line = next(line for line in panels[row, 0].get_lines() if line.get_label() == "PRPV")
         assert list(line.get_xdata()) == [point.value for point in swept.points]
         assert list(line.get_ydata()) == [point.assessment.prpv.value for point in swept.points]
-        low, high = panels[0, column].get_ylim()
+        low, high = panels[row, 0].get_ylim()
         assert low <= min(line.get_ydata()) <= max(line.get_ydata()) <= high
-    assert [panel.get_xlabel() for panel in panels[1]] == ["trim", "delay [s]"]
-    assert [row[0].get_ylabel() for row in panels] == ["PRPV [ordered pairs]", "PPV"]
+    assert [panel.get_xlabel() for panel in panels[:, 0]] == ["trim", "delay [s]"]
+    assert [panel.get_title() for panel in panels[0]] == ["PRPV [ordered pairs]", "PPV"]
 
 
 def test_every_measure_is_in_the_document_with_its_interval(with_pod):
@@ -109,7 +127,7 @@ def test_every_measure_is_in_the_document_with_its_interval(with_pod):
     assert document["notes"] == []
     assert document["shapes"]["pod_pose"]["best"] == (0.1,)
     assert document["shapes"]["pod_pose"]["worsens_on_both_sides"] is True
-    assert curve_name(with_pod) == "sweep_trim_delay=0.12_pod"
+    assert curve_name(with_pod) == "sweep_trim_4e3f5b_pod"
 
 
 def test_without_a_target_model_the_document_says_how_to_get_pod(swept):
@@ -133,18 +151,38 @@ def test_a_line_per_measure_says_what_the_curve_shows(with_pod):
     assert "worsens" in next(line for line in lines if "POD pose" in line)
 
 
-def test_the_panels_show_prpv_ppv_srcc_and_both_pods(with_pod):
-    *panels, right = panels_figure(with_pod).axes
-    assert [axes.get_ylabel() for axes in panels] == ["PRPV [ordered pairs]", "PPV", "SRCC", "POD, pose [m]"]
-    assert right.get_ylabel() == "POD, image [of full scale]"
-    assert [line.get_label() for line in panels[2].get_lines()][:2] == ["distance", "survival time"]
-    for axes, key in ((panels[3], "pod_pose"), (right, "pod_image")):
-        assert list(axes.get_lines()[0].get_ydata()) == [point.pod[key].value for point in with_pod.points]
+def test_the_panels_show_prpv_ppv_srcc_and_both_pods_each_on_an_axis_of_its_own(with_pod):
+    figure = panels_figure(with_pod)
+    *panels, key, pose, image = figure.axes
+    titles = ["PRPV [ordered pairs]", "PPV", "SRCC", "POD, pose [m]", "POD, image [full scale]"]
+    assert [axes.get_title() for axes in (*panels, pose, image)] == titles
+    assert [line.get_label() for line in panels[2].get_lines()][:2] == ["SRCC, distance", "SRCC, survival time"]
+    for axes, measure in ((pose, "pod_pose"), (image, "pod_image")):
+        assert list(axes.get_lines()[0].get_ydata()) == [point.pod[measure].value for point in with_pod.points]
     assert all(0.1 in line.get_xdata() for axes in panels for line in axes.get_lines()[-1:])
+    assert not key.axison
+    places = [axes.get_position().bounds for axes in figure.axes]
+    assert len(set(places)) == len(places), "no second axis stands on another"
 
 
-def test_without_pod_there_are_three_panels(swept):
-    assert len(panels_figure(swept).axes) == 3
+def test_without_pod_there_are_three_panels_and_the_key(swept):
+    assert [axes.axison for axes in panels_figure(swept).axes] == [True, True, True, False]
+
+
+def test_the_target_s_own_value_is_marked_only_where_it_is_known(swept):
+    def marks(figure):
+        return [line.get_xdata()[0] for axes in figure.axes for line in axes.get_lines() if line.get_label() == "truth"]
+
+    assert marks(panels_figure(swept, {"trim": 0.11})) == [0.11] * 3
+    assert marks(sweep_figure([swept], {"trim": 0.11})) == [0.11] * 2
+    assert marks(panels_figure(swept)) == marks(sweep_figure([swept], {"delay": 0.1})) == []
+
+
+def test_figures_are_as_wide_as_a_column_with_type_of_six_points_and_more(with_pod, swept):
+    for figure in (panels_figure(with_pod), panels_figure(swept), sweep_figure([swept] * 4), bars_figure([swept] * 4)):
+        assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
+        figure.draw_without_rendering()
+        assert min(text.get_fontsize() for text in figure.findobj(Text) if text.get_text()) >= 6.0
 
 
 def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_study, swept):
@@ -159,13 +197,15 @@ def test_the_bars_stand_at_the_held_value_and_a_third_of_the_range_beside(make_s
 
 
 def legend(figure):
-    return [text.get_text() for text in figure.legends[0].get_texts()]
+    (told,) = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    return [text.get_text() for text in told.get_texts()]
 
 
-def test_every_line_band_and_bar_is_explained_once_below_the_figure(with_pod, swept, make_study):
+def test_every_line_band_and_bar_is_explained_once(with_pod, swept, make_study):
     both = [swept, curve(make_study(), "delay")]
     lines = ["target's halves", "chance", "95 % interval", "held value"]
-    assert legend(panels_figure(with_pod)) == legend(sweep_figure(both)) == lines
+    assert legend(sweep_figure(both)) == lines
+    assert legend(panels_figure(with_pod)) == [*lines, "SRCC, distance", "SRCC, survival time"]
     assert sorted(legend(bars_figure(both))) == sorted([*lines, "lower and higher value"])
 
 

@@ -81,6 +81,8 @@ def test_each_proxy_has_a_panel_of_its_own_against_no_proxy():
 
 def test_the_zero_shot_score_stands_apart_from_the_counts():
     assert places_of(LESSONS[0].curve) == [0.0, 1.5, 2.5, 3.5, 4.5]
+    for axes in teach_figure(experiment()).axes[: len(LESSONS)]:
+        assert [(text.get_text(), text.get_position()[0]) for text in axes.texts] == [("//", 0.75)]
 
 
 def test_the_page_has_table_1_and_takes_no_name_for_markup(tmp_path):

@@ -9,13 +9,8 @@ GOOD = "agent,episode,distance,time\nA,1,1.5,10\nA,2,2.5,20\nB,1,3,30\n"
 
 
 @pytest.fixture
-def csv(tmp_path):
-    def write(text, name="scores.csv"):
-        path = tmp_path / name
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return path
-
-    return write
+def csv(write_file):
+    return lambda content, name="scores.csv": write_file(content, name)
 
 
 def test_a_table_keeps_episodes_counts_and_means(csv):
@@ -66,6 +61,10 @@ def test_domains_are_read_apart(csv):
         ("agent,distance\nA,inf\n", "must be a finite number"),
         ("agent,distance\nA,1e300\n", "must be a finite number"),
         ("agent,distance\nA,far\n", "must be a finite number, got 'far'"),
+        ("agent,distance\nA,1_000\n", "must be a finite number, got '1_000'"),
+        ("agent,distance\nA,٣\n", "must be a finite number, got '٣'"),
+        ("agent,distance\nA,1e99\n", "must be a finite number, got '1e99'; give it in another unit"),
+        ("agent,distance\nA,1e-320\n", "must be a finite number, got '1e-320'; give it in another unit"),
         ("agent,distance\nA\n", "line 2: has 1 cells, but the first line names 2"),
         ("agent,distance\nA,1,2\n", "line 2: has 3 cells, but the first line names 2"),
         ("agent,distance\n,1\n", "line 2, column 'agent': is empty"),

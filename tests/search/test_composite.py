@@ -42,6 +42,7 @@ def test_a_proposal_does_not_depend_on_the_order_in_which_trials_are_told():
     assert Composite(WHOLE).propose(SPACE, trials[::-1], 2) == Composite(WHOLE).propose(SPACE, trials, 2)
 
 
+@pytest.mark.slow
 def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
     trials = search(make_proposer("composite", 5, WHOLE), 8, seed=4)
     code = (

@@ -33,6 +33,7 @@ def known(seed, count=14, lost=()):
     return learn(SPACE, trials, goal(compose, target, 2 * 0.02**2), seed)
 
 
+@pytest.mark.slow
 def test_the_region_holds_the_truth_and_is_small():
     found = [known(seed) for seed in range(20)]
     assert sum(one.holds(truth_of(seed)) for seed, one in enumerate(found)) >= 18

@@ -37,6 +37,7 @@ def test_targets_that_the_proxy_can_make_are_seldom_said_to_be_beyond_it():
     assert np.ptp(found) > 0.5
 
 
+@pytest.mark.slow
 def test_targets_beyond_it_are_found():
     assert max(p_value(seed, 0.6) for seed in range(6)) < 0.05
 

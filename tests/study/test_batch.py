@@ -15,9 +15,9 @@ from proxytune.search.proposer import propose_batch
 from proxytune.storage.store import Store
 from proxytune.study.knowledge import goal_of
 from proxytune.study.run import run_study
-from proxytune.study.settings import StopRules
 from proxytune.study.stages.cutting import reference
 from proxytune.study.stages.stopping import stopped
+from proxytune.study.stop_rules import StopRules
 from proxytune.study.study import facts, open_study
 from proxytune.study.study_run import StudyRun
 

@@ -18,7 +18,6 @@ from proxytune.study.evaluation import plan, table
 from proxytune.study.knowledge import knowledge_of
 from proxytune.study.result import result_of
 from proxytune.study.run import run_study
-from proxytune.study.settings import StopRules
 from proxytune.study.stages import confirmation
 from proxytune.study.stages.confirmation import (
     CANDIDATES,
@@ -27,6 +26,7 @@ from proxytune.study.stages.confirmation import (
     most_episodes,
     run_confirmation,
 )
+from proxytune.study.stop_rules import StopRules
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 from proxytune.usefulness import prpv
@@ -137,6 +137,7 @@ def test_trials_do_not_depend_on_it(finished, make_study):
     assert trials[0][:7] == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
     study = opened(finished, jobs=jobs, confirm=2)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from telling import Telling
 
 from proxytune.errors import EpisodeError
 from proxytune.running.progress import Silent
@@ -22,6 +23,12 @@ def test_a_table_has_every_agent_start_and_metric_in_the_study_s_order(make_stud
     assert table.episodes == ("0", "1", "2")
     assert table.metrics == ("distance", "survival_time")
     assert table.complete
+
+
+def test_every_agent_is_told_of_once_it_is_measured(make_study, model):
+    watcher = Telling()
+    measure(read_study_settings(make_study(agents='["agent1", "agent0"]')), model, 1001, watcher)
+    assert sorted(watcher.lines) == ["agent agent0 measured", "agent agent1 measured"]
 
 
 def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_study, model):

@@ -69,6 +69,7 @@ def twice(rows):
     return [f"{agent},{start}/{repeat},{rest}" for agent, start, rest in split for repeat in (0, 1)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", [means_only, other_starts, with_holes])
 def test_any_other_table_works_and_says_what_it_loses(finished, edit):
     with Store.read(finished) as store:

@@ -37,6 +37,7 @@ def partly(make_study):
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["gp", "outcomes"])
 @pytest.mark.parametrize("missing", ["False", "(episode.agent == 'agent1' and episode.start == 9)"])
 def test_a_study_works_where_a_metric_beside_its_own_is_missing_here_and_there(partly, engine, missing):

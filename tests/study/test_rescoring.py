@@ -8,7 +8,7 @@ from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import result_of
-from proxytune.study.settings import StopRules
+from proxytune.study.stop_rules import StopRules
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 
@@ -48,6 +48,7 @@ def test_every_trial_is_scored_as_a_study_of_these_metrics_would_have(finished, 
     assert again.best.assessment.prpv.value == again.best.trial.prpv
 
 
+@pytest.mark.slow
 def test_a_metric_may_be_taken_out_or_turned_round(finished):
     assert scores(found(finished, OWN[:1])) != scores(found(finished, OWN))
     turned = (Metric.parse("distance:min"), Metric.parse("survival_time:min"))

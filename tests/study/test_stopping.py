@@ -6,8 +6,8 @@ from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.records import TrialRecord
 from proxytune.storage.store import Store
 from proxytune.study.run import run_study
-from proxytune.study.settings import StopRules
 from proxytune.study.stages.stopping import stopped
+from proxytune.study.stop_rules import StopRules
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 

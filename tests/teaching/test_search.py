@@ -77,6 +77,7 @@ def test_a_batch_of_proxies_is_proposed_together_and_resumed_exactly(make_study)
     assert [trial.theta for trial in run(cut).trials] == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rule", "reason"),
     [("wall_time_s = 1e-9", "episodes took"), ("no_improvement = 1e9", "no θ is expected to improve PLV")],
@@ -93,6 +94,7 @@ def test_a_rule_stops_it_and_without_the_rule_it_goes_on(make_study, rule, reaso
     assert [trial.theta for trial in run(folder).trials][: len(found.trials)] == [trial.theta for trial in found.trials]
 
 
+@pytest.mark.slow
 def test_other_settings_of_teaching_begin_its_trials_afresh(make_study):
     folder = make_taught(make_study, parameters=BOX, more="budget = 2", initial="2")
     first = run(folder)

@@ -153,6 +153,7 @@ FAMILIES = {
 }
 
 
+@pytest.mark.slow
 def test_a_family_that_keeps_every_promise_passes_also_with_a_parameter_that_is_said_to_do_nothing():
     assert check_family(Wobbly(), agents=["agent0"]) is None
     assert check_family(Altered(idle="trim"), agents=["agent0"], without_effect=["trim"]) is None

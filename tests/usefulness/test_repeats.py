@@ -5,7 +5,7 @@ import pytest
 
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import assess, bootstrap_prpv, compare
-from proxytune.usefulness.repeats import by_start, is_repeated, split_repeats, start_of, starts_of
+from proxytune.usefulness.repeats import by_start, is_repeated, split_repeats, start_of, start_places, starts_of
 from proxytune.usefulness.resampling import bootstrap_means, draw_counts
 
 M = (Metric("m"),)
@@ -13,6 +13,11 @@ M = (Metric("m"),)
 
 def table(values, labels):
     return ScoreTable(tuple(f"A{i}" for i in range(len(values))), tuple(labels), ("m",), np.array(values)[:, :, None])
+
+
+def split(scores, splits):
+    keys = np.random.default_rng(0).random((splits, len(scores.episodes)))
+    return split_repeats(scores.driven, start_places(scores), keys)
 
 
 def labelled(starts, repeats):
@@ -27,7 +32,7 @@ def test_the_start_is_what_is_before_the_last_stroke():
 def test_both_sets_hold_every_start_equally_often_and_share_no_episode():
     values = np.zeros((3, 9))
     values[0, 4] = np.nan
-    first, second = split_repeats(table(values, labelled(3, 3)), np.random.default_rng(0), 40)
+    first, second = split(table(values, labelled(3, 3)), 40)
     assert not (first & second).any()
     assert not first[0, :, 4].any()
     assert not second[0, :, 4].any()
@@ -40,9 +45,9 @@ def test_both_sets_hold_every_start_equally_often_and_share_no_episode():
 def test_an_agent_that_lost_a_repeat_is_split_over_its_other_starts():
     values = np.zeros((2, 4))
     values[0, 3] = np.nan
-    first, second = split_repeats(table(values, labelled(2, 2)), np.random.default_rng(0), 10)
-    assert (first[0] + second[0] == [1, 1, 0, 0]).all()
-    assert (first[1] + second[1] == 1).all()
+    first, second = split(table(values, labelled(2, 2)), 10)
+    assert (first[0] ^ second[0] == [True, True, False, False]).all()
+    assert (first[1] ^ second[1]).all()
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,10 @@
 """The options that say what to take from a bag or a table, alike for every command that reads one."""
 
 import argparse
-import math
 from pathlib import Path
 
 from proxytune.errors import InputError
-from proxytune.importing.facts import Facts, read_figures
+from proxytune.importing.facts import Facts, finite, read_geometry
 from proxytune.importing.wanted import Wanted
 from proxytune.logs import COMMANDS
 
@@ -66,18 +65,11 @@ def facts_of(arguments: argparse.Namespace) -> Facts:
         InputError: If a figure or the offset is no number.
     """
     offset = arguments.clock_offset
-    if offset not in ("", "fit") and not _is_number(offset):
+    if offset not in ("", "fit") and finite(offset) is None:
         raise InputError(f"--clock-offset {offset}: give seconds, as in -0.25, or fit")
     road = arguments.map
     road = str(Path(road).resolve()) if road.endswith(".toml") else road
-    return Facts(arguments.robot or "", read_figures(arguments.figure), road, offset)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
+    return Facts(arguments.robot or "", read_geometry(arguments.figure), road, offset)
 
 
 def _columns(text: str) -> dict[str, str]:

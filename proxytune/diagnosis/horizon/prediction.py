@@ -33,7 +33,8 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
     if not horizon_s * log.rate_hz >= 1.0:
         raise LogError(f"{log.name}: a horizon of {horizon_s:g} s is shorter than a sample of {1.0 / log.rate_hz:g} s")
     whole = gather(log, robot, log.episodes)
-    reach = int(np.floor(horizon_s * log.rate_hz + 1e-9))
+    longest = max(len(episode.times) for episode in log.episodes)
+    reach = int(np.floor(min(horizon_s * log.rate_hz, longest) + 1e-9))
     starts = [_starts(episode, reach) for episode in log.episodes]
     if not any(len(rows) for rows in starts):
         raise LogError(f"{log.name}: no measured pose to start a window from")

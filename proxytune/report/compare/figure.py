@@ -1,6 +1,6 @@
 """The figure of a comparison: how fast each engine gets near the optimum."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import cycle
 
 import numpy as np
@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from proxytune.comparison.runs import Run
 from proxytune.comparison.summary import median_curve
 from proxytune.errors import InputError
-from proxytune.report.style import BLUE, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
+from proxytune.report.line_names import LineName, name_lines
+from proxytune.report.style import BLUE, COLUMN, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
 from proxytune.search.engines.engine import Look
 from proxytune.search.engines.registry import ENGINES, engine_of
 
@@ -22,9 +23,10 @@ PALETTE = tuple(
     for colour in (GREEN, PURPLE, LIGHT_BLUE, BLUE, VERMILLION, ORANGE)
 )
 """For engines that do not say how they would like to be drawn, in this order."""
-WIDE, PANEL, APART = (3.35, 3.0), (0.13, 0.14, 0.67, 0.83), 0.05
-"""Size [inch], which is 85 mm wide; what of it the panel takes, leaving room for names; how far these are apart at
-least, as a share of the panel's height."""
+HEIGHT = 3.0
+"""Of the figure [inch]."""
+
+FLOOR, SHARED = "noise floor", "← shared design"
 
 BEYOND = 0.8
 """So much of an evaluation is drawn after the last, so that one sees where it ended."""
@@ -36,21 +38,26 @@ def compare_figure(engines: Sequence[Sequence[Run]], tolerance: float) -> Figure
     The first engine has its 95 % band. Up to the vertical line all engines share the design; below the dashed line a θ
     cannot be told from the optimum.
     """
-    figure = Figure(figsize=WIDE)
-    axes = figure.add_axes(PANEL)
+    figure = Figure(figsize=(COLUMN, HEIGHT), layout="constrained")
+    axes = figure.subplots()
     key, names = engines[0][0].key, [runs[0].key.engine for runs in engines]
     looks = looks_of(names)
     for number, runs in enumerate(engines):
         _curve(axes, runs, looks[names[number]], banded=number == 0)
     axes.axvline(key.initial + 0.5, color="0.6", linewidth=0.8)
-    axes.axhline(tolerance, color="0.3", linewidth=0.8, linestyle="--", label="noise floor")
-    axes.annotate("noise floor", (1.2, tolerance), (0, 2), textcoords="offset points", fontsize=6, color="0.3")
+    axes.axhline(tolerance, color="0.3", linewidth=0.8, linestyle="--", label=FLOOR)
     axes.set_xlabel("evaluations", fontsize=8)
     axes.set_ylabel("lowest regret so far [ordered pairs]", fontsize=8)
     axes.set_xlim(1, key.budget + BEYOND)
     axes.set_ylim(*_range(engines, tolerance))
     dress(axes)
-    _name(axes, looks, [float(median_curve(runs)[0][-1]) for runs in engines])
+    axes.annotate(
+        SHARED, (key.initial + 0.5, 1.0), (0, 2), xycoords=("data", "axes fraction"),
+        textcoords="offset points", fontsize=7, color="0.3", ha="left",
+    )  # fmt: skip
+    ends = [float(median_curve(runs)[0][-1]) for runs in engines]
+    named = [LineName(name, look.colour, end) for (name, look), end in zip(looks.items(), ends, strict=True)]
+    name_lines(axes, [*named, LineName(FLOOR, "0.3", tolerance)])
     return figure
 
 
@@ -88,27 +95,3 @@ def _range(engines: Sequence[Sequence[Run]], tolerance: float) -> tuple[float, f
     finite = medians[np.isfinite(medians)]
     low, high = min(0.0, tolerance, *finite), max(1.0, tolerance, *finite)
     return low - 0.04 * (high - low) if low < 0.0 else 0.0, high + 0.04 * (high - low)
-
-
-def _name(axes: Axes, looks: Mapping[str, Look], ends: Sequence[float]) -> None:
-    """Write each engine's name beside the end of its line, moved apart where lines end together."""
-    bottom, top = axes.get_ylim()
-    places = spread([(min(max(end, bottom), top) - bottom) / (top - bottom) for end in ends], APART)
-    for (name, look), place in zip(looks.items(), places, strict=True):
-        axes.text(1.02, place, name, transform=axes.transAxes, fontsize=7, color=look.colour, va="center", ha="left")
-
-
-def spread(places: Sequence[float], apart: float) -> list[float]:
-    """Places moved as little as it takes to be so far apart, in the same order, not below 0."""
-    order = sorted(range(len(places)), key=lambda row: places[row])
-    moved = np.array([places[row] for row in order])
-    steps = apart * np.arange(len(moved))
-    # Least squares with the order kept: pools of places that touch share their mean.
-    pools: list[list[float]] = []
-    for value in moved - steps:
-        pools.append([float(value)])
-        while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
-            last = pools.pop()
-            pools[-1] += last
-    found = np.concatenate([np.full(len(pool), max(0.0, float(np.mean(pool)))) for pool in pools]) + steps
-    return [float(found[order.index(row)]) for row in range(len(places))]

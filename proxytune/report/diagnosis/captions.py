@@ -7,9 +7,9 @@ from proxytune.report.page import Picture
 SAID = {
     "error": (
         "Error of predictions before and after",
-        "Errors on drives kept aside, with 95 % intervals. The nearer the model with the effects added is to the green "
-        "noise floor, the less is missing. Whether an effect helps at a length is told by the ratio in the table: its "
-        "interval should stay below 1.",
+        "Errors on drives kept aside, with 95 % intervals, on logarithmic axes. The nearer the model with the effects "
+        "added is to the green noise floor, the less is missing. Whether an effect helps at a length is told by the "
+        "ratio in the table: its interval should stay below 1.",
     ),
     "effect_curve": (
         "What was added, against what was measured",
@@ -18,8 +18,9 @@ SAID = {
     ),
     "ranking": (
         "Evidence for each effect that was tried",
-        "The farther right, the more an effect explains of drives left out. Blue ones were added; light blue ones "
-        "these drives fit as well. Below: free curves over a signal, which need be no physics.",
+        "The farther right, the more an effect explains of drives left out. On top those added, in this order, each "
+        "with what it explains beyond those above it; below them what others explain alone: light blue ones fit these "
+        "drives as well as one that was added. At the bottom: free curves over a signal, which need be no physics.",
     ),
     "learnt": (
         "What was learnt where no named effect explains it",
@@ -28,12 +29,13 @@ SAID = {
     ),
     "residual_over_time": (
         "Where in time predictions stray",
-        "On drives that nothing was fitted to. A curve that rises within the drives is something that changes "
-        "with time, as a battery; one that is level is not.",
+        "On drives, or the later part of each, that nothing was fitted to. A curve that rises within the drives is "
+        "something that changes with time, as a battery; one that is level is not.",
     ),
     "residual_map": (
         "Where on the floor predictions stray",
-        "Errors that keep to one place are of the floor or of the tracker there, others of the robot.",
+        "Errors that keep to one place are of the floor or of the tracker there, others of the robot. The maps share "
+        "one logarithmic scale; arrows point where the robot drove.",
     ),
     "camera_markings": (
         "Markings as the model sees them",

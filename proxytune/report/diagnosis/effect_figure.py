@@ -15,7 +15,7 @@ from proxytune.diagnosis.result import Diagnosis
 from proxytune.effects import Catalogue, Means, WheelCurve
 from proxytune.report.diagnosis.means import ANY, GROUPS, draw_means, means_figure, rates_of, retuned
 from proxytune.report.diagnosis.model_names import BEFORE, after
-from proxytune.report.style import BLUE, GREY, PURPLE, VERMILLION, dress, legend_below
+from proxytune.report.style import BLUE, COLUMN, LIGHT_GREY, PURPLE, VERMILLION, dress, legend_below
 from proxytune.space import Theta
 
 HELD_S = 5.0
@@ -59,7 +59,7 @@ def _curve(curves: Sequence[Curve], name: str) -> Curve | None:
 def _wheels_figure(diagnosis: Diagnosis) -> Figure:
     """Steady wheel speed against command above, what is added to the declared model beneath."""
     drives = diagnosis.found.declared.drives
-    figure = Figure(figsize=(5.4, 4.2), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 3.4), layout="constrained")
     panels = figure.subplots(2, 2, sharex="col", sharey="row")
     rates = rates_of(diagnosis, _curve(diagnosis.found.curves, "wheel command"))
     commands = np.linspace(float(drives.duties.min()), float(drives.duties.max()), COMMANDS)
@@ -70,7 +70,7 @@ def _wheels_figure(diagnosis: Diagnosis) -> Figure:
         draw_means(panels[1, column], rates, place, GROUPS["wheel command"][column])
         panels[0, column].set_title(f"{side} wheel", fontsize=8)
         panels[1, column].set_xlabel("command [duty]", fontsize=8)
-    for row, label in enumerate(("steady speed [m/s]", "speed − declared [mm/s]")):
+    for row, label in enumerate(("steady speed [m/s]", "speed − declared\n[mm/s]")):
         panels[row, 0].set_ylabel(label, fontsize=8)
         panels[row, 1].set_ylabel("")
     legend_below(figure, *panels.ravel())
@@ -122,7 +122,7 @@ def _flexible(diagnosis: Diagnosis, curve: Curve, column: int) -> tuple[Floats, 
 def _steps_figure(diagnosis: Diagnosis) -> Figure:
     """Wheel speed after a step of the command and, for backlash, after its reversal."""
     found, drives = diagnosis.found, diagnosis.found.declared.drives
-    figure = Figure(figsize=(5.2, 2.8), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
     axes = figure.subplots()
     catalogue = diagnosis.robot.catalogue
     reverses = any(_curve_kind(one, catalogue) is WheelCurve.REVERSAL for one in found.adopted)
@@ -132,7 +132,8 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     duties = np.repeat(np.where(times < STEP_S, size, -size)[None, :, None], 2, axis=2)
     column = int(found.adopted[0].form.startswith("right"))
     full = drives.robot.figures["full_speed"]
-    axes.plot(times, duties[0, :, 0] * full, color=GREY, lw=0.8, ls=":", label="command")
+    # An area, which no line on its edge can hide.
+    axes.fill_between(times, duties[0, :, 0] * full, color=LIGHT_GREY, linewidth=0, zorder=0, label="command")
     for fitted, colour, name in ((found.declared, VERMILLION, BEFORE), (found.model, BLUE, after(diagnosis))):
         draws = full * _responses(_driven(drives, duties), fitted.theta)[..., column]
         _draw_responses(axes, times, draws, colour, name)

@@ -1,6 +1,7 @@
 """What is added to the declared model's motion, as means over a signal: measured, by effects, by any curve."""
 
 from collections.abc import Mapping
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +17,13 @@ from proxytune.diagnosis.naming.flexible import Curve
 from proxytune.diagnosis.result import Diagnosis
 from proxytune.effects.trace import TURN, Panel
 from proxytune.report.diagnosis.model_names import BEFORE, after
-from proxytune.report.style import BLUE, GREY, PURPLE, VERMILLION, dress, legend_below
+from proxytune.report.style import BLUE, COLUMN, GREY, PURPLE, VERMILLION, dress, legend_below
 from proxytune.space import Theta
 
 BINS = 20
 """Values of the signal, equally often driven, over which means are taken."""
+
+COLUMNS = 2
 
 MEASURED, ANY = "measured", "free curve"
 
@@ -133,10 +136,11 @@ def _means(signal: Floats, added: Floats, share_of: Floats | None) -> tuple[Floa
 
 
 def means_figure(diagnosis: Diagnosis, curve: Curve | None, panels: tuple[Panel, ...]) -> Figure:
-    """Draw panels side by side; the curve is the flexible one, where there is one."""
-    figure = Figure(figsize=(max(3.6, 2.2 * len(panels) + 0.4), 2.8), layout="constrained")
-    rates = rates_of(diagnosis, curve)
-    all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    """Draw panels, two in a row; the curve is the flexible one, where there is one."""
+    rows = ceil(len(panels) / COLUMNS)
+    figure = Figure(figsize=(COLUMN, 1.7 * rows + 0.6), layout="constrained")
+    rates, across = rates_of(diagnosis, curve), min(COLUMNS, len(panels))
+    all_axes = [figure.add_subplot(rows, across, number + 1) for number in range(len(panels))]
     for axes, panel in zip(all_axes, panels, strict=True):
         signal = _signal(diagnosis.found.declared.drives, rates, curve, panel)
         draw_means(axes, rates, signal, panel)
@@ -153,5 +157,5 @@ def draw_means(axes: Axes, rates: Rates, signal: Floats, panel: Panel) -> None:
         places, values = _means(signal, added[panel.motion], rates.declared[panel.motion] if panel.share else None)
         style = {MEASURED: ("o", GREY, 3.0, 1), ANY: ("--", PURPLE, 0.0, 3)}.get(name, ("-", BLUE, 0.0, 2))
         axes.plot(places, factor * values, style[0], color=style[1], ms=style[2], lw=1.4, zorder=style[3], label=name)
-    axes.set_ylabel(f"{NAMES[panel.motion]} − declared [{unit}]", fontsize=8)
+    axes.set_ylabel(f"{NAMES[panel.motion]}\n− declared [{unit}]", fontsize=8)
     dress(axes)

@@ -1,20 +1,21 @@
 """How far predictions stray from what was measured, over time and over the floor."""
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection, LineCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from proxytune.diagnosis.horizon.windows import cut, pose_errors
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
 from proxytune.diagnosis.result import Diagnosis
 from proxytune.report.diagnosis.model_names import BEFORE, after
-from proxytune.report.style import BLUE, GREY, VERMILLION, dress, legend_below
+from proxytune.report.style import BLUE, COLUMN, GREY, VERMILLION, dress, legend_below
 from proxytune.space import Theta
 
 HORIZON_S = 2.0
@@ -35,8 +36,17 @@ MANY_WINDOWS = 400
 WIDE = 1.6
 """Floors longer in x than so many times their length in y are drawn above each other."""
 
-TITLE = 36
+TITLE = 26
 """Characters in a line above a map."""
+
+TALLEST = 3.0
+"""Height of a map at most [inch]."""
+
+TINIEST_MM = 1e-3
+"""Distances below this are drawn as this."""
+
+BEFORE_END = 4
+"""The direction at the end of a path is that of so many poses."""
 
 SQUARES = 60
 """So many squares along the longer side of the floor."""
@@ -79,17 +89,27 @@ def _strayed(drives: Drives, theta: Theta, horizon_s: float) -> Strayed:
 
 def residual_over_time(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     """Median and band where there are enough windows at a time, else a line per episode."""
-    figure = Figure(figsize=(5.2, 2.6), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
     axes = figure.subplots()
     for (name, one), colour, width in zip(both.items(), (VERMILLION, BLUE), (2.0, 1.2), strict=False):
         for number, (times, distance) in enumerate(_lines(axes, drives, one, colour)):
             axes.plot(times, distance, color=colour, lw=width, label=name if number == 0 else None)
-    axes.set_xlabel("time in the episode [s]", fontsize=8)
+    axes.set_xlabel(f"time in the episode [s]{_late(drives)}", fontsize=8)
     axes.set_ylabel(f"distance to prediction\nin {one.horizon_s:g}-s windows [mm]", fontsize=8)
     axes.set_ylim(bottom=0.0)
     dress(axes)
     legend_below(figure, axes)
     return figure
+
+
+def _late(drives: Drives) -> str:
+    """Why the axis does not begin at the start, where it does not."""
+    return "\nlater part of each drive: the first was fitted" if _begins_late(drives) else ""
+
+
+def _begins_late(drives: Drives) -> bool:
+    """Whether no drive is measured in the first quarter of the time."""
+    return bool(drives.first.min() > 0.25 * drives.last.max())
 
 
 def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tuple[Floats, Floats]]:
@@ -130,27 +150,43 @@ def _quantiles(place: Whole, distance: Floats) -> Floats:
 
 
 def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
-    """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap."""
+    """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap.
+
+    All maps share one logarithmic scale. Arrows say in which direction the paths were driven.
+    """
     before = next(iter(both.values()))
     extent = np.ptp(drives.poses[before.increment, 1, :2], axis=0)
-    figure, panels = _panels(len(both), extent[0] > WIDE * extent[1])
-    scale = Normalize(0.0, float(np.quantile(before.rms, 0.98)))
+    figure, panels = _panels(len(both), extent)
+    scale = _scale(both)
     for axes, (name, one) in zip(panels, both.items(), strict=True):
         colours = (_paths if len(one.rms) <= MANY_WINDOWS else _floor)(axes, drives, one, scale)
-        axes.set_title(textwrap.fill(name, TITLE), fontsize=8)
+        axes.set_title(textwrap.fill(name, TITLE), fontsize=7)
         axes.set_aspect("equal")
         dress(axes)
-    bar = figure.colorbar(colours, ax=list(panels), extend="max", shrink=0.85)
-    bar.set_label(f"distance to prediction\nin {before.horizon_s:g}-s windows [mm]", fontsize=8)
+    bar = figure.colorbar(colours, ax=list(panels), location="bottom", extend="both", aspect=30)
+    bar.ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    bar.ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    bar.ax.xaxis.set_minor_formatter(NullFormatter())
+    bar.set_label(f"distance to prediction in {before.horizon_s:g}-s windows [mm]", fontsize=8)
     bar.ax.tick_params(labelsize=7)
     return figure
 
 
-def _panels(count: int, stacked: bool) -> tuple[Figure, list[Axes]]:
-    """Maps above each other or side by side."""
-    size = (5.2, 0.6 + 1.9 * count) if stacked else (0.9 + 2.7 * count, 3.0)
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(*((count, 1) if stacked else (1, count)), sharex=True, sharey=True, squeeze=False)
+def _scale(both: Mapping[str, Strayed]) -> LogNorm:
+    """From the smallest distances of any model to the largest of all, but for a few; at least a factor of ten."""
+    every = np.concatenate([one.rms for one in both.values()])
+    low, high = np.quantile(every, (0.02, 0.98))
+    high = max(float(high), TINIEST_MM)
+    return LogNorm(max(min(float(low), high / 10.0), high / 1000.0), high)
+
+
+def _panels(count: int, extent: Floats) -> tuple[Figure, list[Axes]]:
+    """Maps above each other, where the floor is long, or side by side."""
+    stacked = count > 1 and extent[0] > WIDE * extent[1]
+    across = 1 if stacked else count
+    tall = float(np.clip(extent[1] / max(extent[0], 1e-9), 0.4, 1.6)) * (COLUMN - 0.5) / across
+    figure = Figure(figsize=(COLUMN, min(tall, TALLEST) * (count // across) + 1.2), layout="constrained")
+    grid = figure.subplots(count // across, across, sharex=True, sharey=True, squeeze=False)
     for axes in grid[:, 0]:
         axes.set_ylabel("y [m]", fontsize=8)
     for axes in grid[-1]:
@@ -158,16 +194,30 @@ def _panels(count: int, stacked: bool) -> tuple[Figure, list[Axes]]:
     return figure, list(grid.ravel())
 
 
-def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: Normalize) -> LineCollection:
+def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> LineCollection:
     rows = np.split(strayed.increment, np.flatnonzero(np.diff(strayed.window)) + 1)
     lines = [np.concatenate((drives.poses[own[:1], 0, :2], drives.poses[own, 1, :2])) for own in rows]
     paths = LineCollection(lines, array=strayed.rms, cmap="viridis", norm=scale, linewidths=1.2, capstyle="round")
     axes.add_collection(paths)
     axes.autoscale_view()
+    _arrows(axes, lines)
     return paths
 
 
-def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: Normalize) -> Collection:
+def _arrows(axes: Axes, lines: Sequence[Floats]) -> None:
+    """A small arrow at the end of every path that leads somewhere."""
+    last = np.array([line[-1] for line in lines])
+    along = np.array([line[-1] - line[max(0, len(line) - BEFORE_END)] for line in lines])
+    length = np.hypot(*along.T)
+    if length.max() > 0.0:
+        ahead = along / np.where(length > 0.0, length, 1.0)[:, None]
+        axes.quiver(
+            *last.T, *ahead.T, pivot="mid", angles="xy", scale=40.0, width=0.004,
+            headwidth=9.0, headlength=9.0, headaxislength=8.0, minlength=0.0, color="0.25", zorder=3,
+        )  # fmt: skip
+
+
+def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> Collection:
     """The mean over squares of the floor."""
     places = drives.poses[strayed.increment, 1, :2]
     side = float(np.ptp(places, axis=0).max()) / SQUARES

@@ -5,28 +5,39 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from scipy.stats import rankdata
 
-from proxytune.report.style import BLUE, LIGHT_GREY, ORANGE, VERMILLION, dress
+from proxytune.report.line_names import spread
+from proxytune.report.style import BLUE, COLUMN, LIGHT_BLUE, LIGHT_GREY, ORANGE, VERMILLION, dress, plain
 from proxytune.scores import Array, ScoreTable
 from proxytune.usefulness import Assessment, Comparison, Prpv
 
-PANEL = 3.4
-NEAR = 0.035
-"""Agents nearer than this fraction of the axes share one label."""
+PANEL = 2.2
+"""Height of a metric's panel, where names do not need more [inch]."""
+MOST = 28
+"""Agents that can be named at 85 mm. Of more, the scatter names those whose rank in the proxy is farthest from that on
+the target, and pairs are drawn over ranks on the target."""
+LINE = 0.1
+"""Height of a name [inch]."""
+LONGEST = 24
+"""Characters of a name; of a longer one its end is shown, which tells agents of one module apart."""
 FLIP_COLOURS = {"same": LIGHT_GREY, "lost": BLUE, "invented": ORANGE, "reversed": VERMILLION}
 
 
 def scatter(assessment: Assessment) -> Figure:
     """Draw each agent's mean score in the proxy against that on the target, one panel per metric.
 
-    Error bars are standard errors over episodes; on the dashed line, proxy and target agree.
+    Names stand on the right, highest score in the proxy on top. Error bars are standard errors over episodes; on the
+    dashed line, proxy and target agree.
     """
-    metrics = assessment.inputs.metrics
-    figure = Figure(figsize=(PANEL * len(metrics), PANEL), layout="constrained")
-    for column, axes in enumerate(figure.subplots(1, len(metrics), squeeze=False)[0]):
+    metrics, agents = assessment.inputs.metrics, assessment.inputs.agents
+    height = max(PANEL, LINE * min(MOST, len(agents)) + 0.6)
+    figure = Figure(figsize=(COLUMN, height * len(metrics)), layout="constrained")
+    for column, axes in enumerate(figure.subplots(len(metrics), 1, squeeze=False)[:, 0]):
         _scatter_panel(axes, assessment.inputs, column)
+        _name_points(axes, assessment.inputs, column, LINE / (height - 0.6))
         r = assessment.srcc.value[metrics[column].name]
-        axes.set_title("SRCC undefined" if r is None else f"SRCC {r:.2f}".replace("-", "−"), fontsize=9)
+        axes.set_title("SRCC undefined" if r is None else f"SRCC {r:.2f}".replace("-", "−"), fontsize=8)
     return figure
 
 
@@ -40,15 +51,26 @@ def flipped_pairs(prpv: Prpv) -> Figure:
     for pair in prpv.pairs:
         high, low = sorted((place[pair.better], place[pair.worse]))
         cells[low, high] = kinds.index(pair.flip)
-    side = max(PANEL, 0.19 * len(order) + 1.2)
-    figure = Figure(figsize=(side, side), layout="constrained")
+    figure = Figure(figsize=(COLUMN, COLUMN), layout="constrained")
     axes = figure.subplots()
-    colours = ListedColormap(list(FLIP_COLOURS.values()))
-    axes.pcolormesh(cells, cmap=colours, vmin=-0.5, vmax=len(kinds) - 0.5, edgecolor="white", linewidth=1.0)
-    _name_agents(axes, order)
-    axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=9)
+    _draw_pairs(axes, cells, named=len(order) <= MOST)
+    _name_agents(axes, [_short(agent) for agent in order])
+    axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=8)
     axes.legend(handles=_legend(prpv), loc="upper right", fontsize=7, frameon=False)
     return figure
+
+
+def _draw_pairs(axes: Axes, cells: Array, *, named: bool) -> None:
+    """Squares with gaps between them, or a picture where there are more than can be named."""
+    colours, ends = ListedColormap(list(FLIP_COLOURS.values())), (-0.5, len(FLIP_COLOURS) - 0.5)
+    if named:
+        axes.pcolormesh(cells, cmap=colours, vmin=ends[0], vmax=ends[1], edgecolor="white", linewidth=0.8)
+        return
+    # Colours are mixed where squares are smaller than a pixel: none is lost.
+    axes.imshow(
+        cells, cmap=colours, vmin=ends[0], vmax=ends[1], extent=(0, len(cells), 0, len(cells)), origin="lower",
+        interpolation="antialiased", interpolation_stage="rgba",
+    )  # fmt: skip
 
 
 def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
@@ -60,11 +82,10 @@ def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
     limits = axes.axis()
     axes.axline((0, 0), slope=1, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
     axes.axis(limits)
-    name = inputs.metrics[column].name
+    name = plain(inputs.metrics[column].name)
     axes.set_xlabel(f"{name} on the target", fontsize=8)
     axes.set_ylabel(f"{name} in the proxy", fontsize=8)
     dress(axes)
-    _label_agents(axes, inputs.agents, target, proxy)
 
 
 def _standard_errors(table: ScoreTable) -> Array:
@@ -74,24 +95,30 @@ def _standard_errors(table: ScoreTable) -> Array:
     return np.asarray(np.sqrt(squares / np.maximum(counts - 1, 1) / counts), dtype=np.float64)
 
 
-def _label_agents(axes: Axes, agents: tuple[str, ...], x: Array, y: Array) -> None:
-    """Name the points, those that lie together in one label."""
-    spans = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
-    places = np.column_stack([x / spans[0], y / spans[1]])
-    left = list(range(len(agents)))
-    while left:
-        near = [i for i in left if np.hypot(*(places[i] - places[left[0]])) < NEAR]
-        text = ", ".join(agents[i] for i in near[:3]) + (f", {len(near) - 3} more" if len(near) > 3 else "")
-        right = places[near[0], 0] * spans[0] > np.mean(axes.get_xlim())
+def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> None:
+    """Name points right of the panel, each with a thin line to its point."""
+    proxy, target = (means[:, column] for means in inputs.means)
+    shown = _to_name(proxy, target)
+    bottom, top = axes.get_ylim()
+    # Points of one score in the proxy: those farther right on top, so that their lines cross less.
+    shown = sorted(shown, key=lambda row: (proxy[row], target[row]))
+    look = {"arrowstyle": "-", "lw": 0.4, "color": LIGHT_BLUE, "shrinkA": 0, "shrinkB": 2, "relpos": (0, 0.5)}
+    places = spread([(proxy[row] - bottom) / (top - bottom) for row in shown], apart)
+    for row, place in zip(shown, places, strict=True):
         axes.annotate(
-            text,
-            (x[near[0]], y[near[0]]),
-            xytext=(-4 if right else 4, 3),
-            textcoords="offset points",
-            ha="right" if right else "left",
-            fontsize=6,
-        )
-        left = [i for i in left if i not in near]
+            _short(inputs.agents[row]), (target[row], proxy[row]), (1.04, place), textcoords="axes fraction",
+            ha="left", va="center", fontsize=6, annotation_clip=False, arrowprops=look,
+        )  # fmt: skip
+
+
+def _to_name(proxy: Array, target: Array) -> list[int]:
+    """The agents to name: all, or of many those whose ranks in proxy and target differ most."""
+    moved = np.abs(rankdata(proxy) - rankdata(target))
+    return [int(row) for row in np.argsort(-moved, kind="stable")[:MOST]]
+
+
+def _short(agent: str) -> str:
+    return agent if len(agent) <= LONGEST else f"…{agent[1 - LONGEST :]}"
 
 
 def _target_order(inputs: Comparison) -> list[str]:
@@ -102,12 +129,14 @@ def _target_order(inputs: Comparison) -> list[str]:
 
 
 def _name_agents(axes: Axes, order: list[str]) -> None:
-    ticks = np.arange(len(order)) + 0.5
-    axes.set_xticks(ticks[:-1], order[:-1], rotation=90, fontsize=6)
-    axes.set_yticks(ticks[1:], order[1:], fontsize=6)
+    """Names beside the pairs, or ranks on the target where they are too many."""
+    if len(order) <= MOST:
+        ticks = np.arange(len(order)) + 0.5
+        axes.set_xticks(ticks[:-1], order[:-1], rotation=90, fontsize=6)
+        axes.set_yticks(ticks[1:], order[1:], fontsize=6)
     axes.invert_yaxis()
     axes.set_aspect("equal")
-    axes.tick_params(length=0)
+    axes.tick_params(length=0, labelsize=6)
     axes.spines[:].set_visible(False)
     axes.set_xlabel("agent (best on the target first)", fontsize=8)
     axes.set_ylabel("agent", fontsize=8)

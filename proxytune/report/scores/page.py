@@ -5,17 +5,20 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from proxytune.report.page import Foot, Page, Picture, Table, terminal_tables
+from proxytune.report.scores.figures import MOST
 from proxytune.report.scores.table import measures, ranking
 from proxytune.report.scores.words import score_answer, score_next_step
 from proxytune.usefulness import Assessment, Selection
 
 SCATTER = (
     "A point is an agent: its mean score on the target (across) and in the proxy (up), with standard errors. On the "
-    "dashed line both agree; two points that fall from left to right are a pair ranked wrongly."
+    "dashed line both agree; two points that fall from left to right are a pair ranked wrongly. Names are in the "
+    f"proxy's order, highest score on top; of more than {MOST} agents those whose rank differs most are named."
 )
 FLIPPED = (
     "A square is a pair of agents, in the target's order, best first. Grey pairs are ranked as on the target; coloured "
-    "ones are what PRPV counts: reversed, lost (a tie in the proxy alone) or invented (a tie on the target alone)."
+    "ones are what PRPV counts: reversed, lost (a tie in the proxy alone) or invented (a tie on the target alone). "
+    f"Of more than {MOST} agents the axes are ranks on the target."
 )
 SAID = {
     "scatter": ("Scores in the proxy and on the target", SCATTER),

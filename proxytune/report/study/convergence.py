@@ -5,9 +5,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from proxytune.report.style import BLUE, COLUMN, GREEN, ORANGE, VERMILLION, dress, floor_name, legend_below
+from proxytune.report.line_names import LineName, name_lines
+from proxytune.report.style import BLUE, COLUMN, GREEN, VERMILLION, dress, floor_name, legend_below
 from proxytune.study.objective import PRPV
 from proxytune.study.result import StudyResult
+
+TWO_LINES = 0.14
+"""How far apart names of two lines are, as a share of the panel's height."""
 
 
 def convergence(result: StudyResult) -> Figure:
@@ -23,30 +27,33 @@ def convergence(result: StudyResult) -> Figure:
     figure = Figure(figsize=(COLUMN, 2.9), layout="constrained")
     axes = figure.subplots()
     _trials(axes, result)
-    _answer(axes, result)
+    named = [_answer(axes, result)]
     if result.study.objective == PRPV:
         _fresh(axes, result)
-        _levels(axes, result)
+        named += _levels(axes, result)
     axes.set_xlabel("trial", fontsize=8)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylabel(result.study.objective.label, fontsize=8)
     if result.study.objective == PRPV:
         axes.set_ylabel("PRPV [ordered pairs]", fontsize=8)
         axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
-        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     dress(axes)
-    legend_below(figure, axes)
+    name_lines(axes, named, TWO_LINES)
+    legend_below(figure, axes, without=[name.words for name in named])
     return figure
 
 
-def _levels(axes: Axes, result: StudyResult) -> None:
-    """Chance, and the noise floor that a perfect proxy would score."""
+def _levels(axes: Axes, result: StudyResult) -> list[LineName]:
+    """Chance, and the noise floor that a perfect proxy would score; with their names."""
     chance, floor = result.judged.chance, result.floor
-    axes.axhline(chance.mean, color="0.45", linewidth=1.0, linestyle=":", label=f"chance {chance.mean:.1f}")
+    named = [LineName(f"chance\n{chance.mean:.1f}", "0.45", chance.mean)]
+    axes.axhline(chance.mean, color="0.45", linewidth=1.0, linestyle=":", label=named[0].words)
     if floor.value is not None and floor.low is not None and floor.high is not None:
         axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
-        label = f"{floor_name(floor)} {floor.value:.1f}"
-        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=label)
+        named.append(LineName(f"{floor_name(floor)}\n{floor.value:.1f}", GREEN, floor.value))
+        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=named[-1].words)
+    return named
 
 
 def _trials(axes: Axes, result: StudyResult) -> None:
@@ -57,7 +64,7 @@ def _trials(axes: Axes, result: StudyResult) -> None:
     _points(axes, [point for point in scored if point[0] <= initial], "white", "design")
     _points(axes, [point for point in scored if point[0] > initial], BLUE, "proposed")
     if failed:
-        axes.plot(failed, np.zeros(len(failed)), "x", color=VERMILLION, markersize=4, label="failed")
+        axes.plot(failed, np.zeros(len(failed)), "x", color="black", markersize=4, label="failed")
     if bounds:
         axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="stopped early, at least")
 
@@ -68,12 +75,18 @@ def _points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) 
         axes.plot(numbers, scores, "o", color=BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)
 
 
-def _answer(axes: Axes, result: StudyResult) -> None:
-    """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's."""
+def _answer(axes: Axes, result: StudyResult) -> LineName:
+    """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's.
+
+    Returns:
+        The line's name.
+    """
     pairs = zip(result.trials, result.answers, strict=True)
     answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
     ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
-    axes.step(*zip(*ends, strict=True), where="post", color=ORANGE, linewidth=1.5, label="answer so far")
+    named = LineName("answer\nso far", VERMILLION, ends[-1][1] or 0.0)
+    axes.step(*zip(*ends, strict=True), where="post", color=VERMILLION, linewidth=1.5, label=named.words)
+    return named
 
 
 def _fresh(axes: Axes, result: StudyResult) -> None:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.ndimage import gaussian_filter1d
 
+from proxytune.report.numbers import span
 from proxytune.report.style import BLUE, COLUMN, VERMILLION, dress, legend_below, with_unit
 from proxytune.search.surrogate import Array
 from proxytune.study.result import StudyResult
@@ -22,13 +23,13 @@ SMOOTH = 0.5
 def profiles_figure(result: StudyResult) -> Figure:
     """Draw how probable each value of each parameter is, given the target's scores, over the box that was searched.
 
-    Grey is excluded: outside the 95 % interval. The vertical line is the answer; the triangle is the θ that made
-    the target, where that is known.
+    Grey is excluded: outside the 95 % interval, which is written above. The vertical line is the answer; the triangle
+    is the θ that made the target, where that is known.
     """
     intervals = result.study.settings.space.intervals
     columns = min(COLUMNS, len(intervals))
     rows = ceil(len(intervals) / columns)
-    figure = Figure(figsize=(COLUMN, 1.15 * rows + 0.45), layout="constrained")
+    figure = Figure(figsize=(COLUMN, 1.3 * rows + 0.45), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False)
     for place in range(len(intervals)):
         _panel(panels.ravel()[place], result, place)
@@ -53,7 +54,8 @@ def _panel(axes: Axes, result: StudyResult, place: int) -> None:
         at_top = axes.get_xaxis_transform()
         (mark,) = axes.plot(result.truth[box.name], 1.0, "v", color="black", transform=at_top, label="truth")
         mark.set(markersize=5, clip_on=False, zorder=4)
-    axes.set_title("" if box.name not in learnt.unidentified else "unidentified", fontsize=7, color="0.35")
+    left = span((low, high))
+    axes.set_title(f"unidentified: {left}" if box.name in learnt.unidentified else f"{left} remain", fontsize=7)
     axes.set_xlabel(with_unit(box.name, result.study.family.parameters[box.name].unit), fontsize=8)
     axes.set_xlim(box.low, box.high)
     axes.set_ylim(0.0, 1.08 * density.max())

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.ndimage import gaussian_filter
 
-from proxytune.report.style import COLUMN, LIGHT_BLUE, VERMILLION, dress, with_unit
+from proxytune.report.style import COLUMN, LIGHT_BLUE, VERMILLION, dress, floor_name, with_unit
 from proxytune.search.surrogate import Array
 from proxytune.study.result import StudyResult
 
@@ -31,9 +31,9 @@ MARKS = {"answer": (VERMILLION, "o", 8.0, "none"), "truth": ("black", "v", 4.5, 
 def evaluations_figure(result: StudyResult) -> Figure:
     """Draw where the trials went, each pair of parameters in a panel, on the shadow of the 95 % region.
 
-    A long, slanting shadow is a pair that makes up for each other. The darker a point, the lower its PRPV, or its
-    estimate where a trial was cut off; crosses are trials that failed; the ring is the answer, the triangle the θ that
-    made the target, where that is known. Of a single parameter, PRPV is drawn over its range.
+    A long, slanting shadow is a pair that makes up for each other. The darker a point, the lower its PRPV; an open one
+    was cut off, and its PRPV is an estimate; crosses are trials that failed; the ring is the answer, the triangle the θ
+    that made the target, where that is known. Of a single parameter, PRPV is drawn over its range.
     """
     count = len(result.study.settings.space.intervals)
     cells = max(1, count - 1)
@@ -48,7 +48,8 @@ def evaluations_figure(result: StudyResult) -> Figure:
         _pair(figure.add_subplot(grid[row - 1, column]), result, (column, row), norm)
     if not pairs:
         _alone(figure.add_subplot(grid[0, 0]), result, norm)
-    _key(figure.add_subplot(grid[0, 1:]), figure.axes[: len(pairs) or 1], norm)
+    floor = "" if result.floor.value is None else f"\n{floor_name(result.floor)} {result.floor.value:.1f}"
+    _key(figure.add_subplot(grid[0, 1:]), figure.axes[: len(pairs) or 1], norm, f"PRPV [ordered pairs]{floor}")
     return figure
 
 
@@ -87,9 +88,14 @@ def _trials(axes: Axes, result: StudyResult, points: Array, norm: Normalize) -> 
     scores = [trial.score for trial in result.trials if trial.score is not None]
     across, up = points[scored].T
     axes.scatter(across, up, c=scores, cmap=COLOURS, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
+    cut = np.array([trial.state == "cut" for trial in result.trials])
+    if cut.any():
+        # Hollow: their colour is an estimate.
+        axes.scatter(*points[cut & scored].T, color="white", s=4, linewidths=0, clip_on=False, zorder=3)
+        axes.scatter([], [], facecolors="white", edgecolors="0.4", s=10, linewidths=1.2, label="stopped early")
     if not scored.all():
         across, up = points[~scored].T
-        axes.scatter(across, up, marker="x", color=VERMILLION, s=12, linewidths=0.8, clip_on=False, label="failed")
+        axes.scatter(across, up, marker="x", color="black", s=12, linewidths=0.8, clip_on=False, label="failed")
 
 
 def _mark(axes: Axes, place: list[float], label: str) -> None:
@@ -137,13 +143,13 @@ def _name(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
         axes.set_yticklabels([])
 
 
-def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize) -> None:
+def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize, title: str) -> None:
     """The colours of PRPV and what the marks are, in the corner that the pairs leave free."""
     axes.set_axis_off()
     bar = axes.figure.colorbar(
         ScalarMappable(norm, COLOURS), cax=axes.inset_axes((0.15, 0.8, 0.8, 0.08)), orientation="horizontal"
     )
-    bar.ax.set_title("PRPV [ordered pairs]", fontsize=7)
+    bar.ax.set_title(title, fontsize=7)
     bar.ax.tick_params(labelsize=7)
     named = {label: handle for one in panels for handle, label in zip(*one.get_legend_handles_labels(), strict=True)}
     axes.legend(

@@ -2,13 +2,16 @@
 
 import csv
 import io
+import json
 from collections.abc import Sequence
 from dataclasses import asdict
+from hashlib import sha256
 from typing import Any
 
 from rich.table import Table
 
 from proxytune.report.scores.document import document_of
+from proxytune.space import Theta
 from proxytune.sweep.curves import Series, series_of
 from proxytune.sweep.discrepancy import METRICS
 from proxytune.sweep.sweep import Curve, PodMean, SweepPoint
@@ -29,8 +32,18 @@ NO_POD = "POD was left out: give --target-model MODEL.toml, the model of the tar
 
 
 def curve_name(curve: Curve) -> str:
-    """A file name for the curve: its parameter, what the others are held at, and whether POD is in it."""
-    return "_".join(["sweep", curve.parameter, *held(curve), *(["pod"] if curve.has_pod else [])])
+    """A file name for the curve: its parameter, a mark of what is held, and whether POD is in it.
+
+    The mark is left out where the others are nominal; the curve's JSON has what is held.
+    """
+    mark = [held_mark(curve.base)] if held(curve) else []
+    return "_".join(["sweep", curve.parameter, *mark, *(["pod"] if curve.has_pod else [])])
+
+
+def held_mark(base: Theta) -> str:
+    """Six characters that stand for the values that parameters are held at."""
+    values = sorted((name, float(value)) for name, value in base.items())
+    return sha256(json.dumps(values).encode()).hexdigest()[:6]
 
 
 def held(curve: Curve) -> list[str]:

@@ -12,12 +12,14 @@ from proxytune.sweep.sweep import Curve
 from proxytune.sweep.trend import shape_of
 
 BANDS = "Bands are 95 % intervals: where they overlap, the values cannot be told apart."
-CAPTION = (
-    f"{BANDS} The thin vertical line is where the parameter is held when others are swept. PRPV and PPV are better "
-    "low, SRCC is better high."
+LINES = (
+    "The dashed vertical line is where the parameter is held when others are swept; the triangle, where the truth is "
+    "known, is the target's own value, where a good measure is at its best."
 )
+CAPTION = f"{BANDS} {LINES} PRPV, PPV and POD are better low, SRCC is better high."
 TOGETHER = (
-    f"Each column is a parameter; lower is better. {BANDS} The dashed line is the noise floor, the dotted one chance."
+    f"Each row is a parameter; lower is better. {BANDS} Green is the noise floor or, as the key says, the target's "
+    f"halves; the dotted line is chance. {LINES}"
 )
 BARS = (
     "PRPV at a lower, the held (dark) and a higher value of each parameter. Where the 95 % intervals (lines) of a "

@@ -51,6 +51,8 @@ def _panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> None:
     axes.set_xticks([places[place] for place in shown], [f"{counts[place]:g}" for place in shown])
     axes.set_title(lesson.name, fontsize=8)
     dress(axes)
+    # The axis is broken there: 0 is no halving of the first number.
+    axes.text(GAP / 2, 0.0, "//", transform=axes.get_xaxis_transform(), fontsize=7, ha="center", va="center", zorder=5)
 
 
 def places_of(curve: Curve) -> list[float]:

@@ -9,7 +9,7 @@ from proxytune.storage.records import TrialRecord
 from proxytune.study.evaluation import plan
 from proxytune.study.knowledge import goal_of
 from proxytune.study.outputs import score_trials
-from proxytune.study.settings import StopRules
+from proxytune.study.stop_rules import StopRules
 from proxytune.study.study_run import StudyRun
 
 FILE_REMEDY = "raise or remove it to continue"

@@ -7,6 +7,7 @@ import pytest
 from drives import HEADINGS, PLACES, ROWS, SPEEDS, TIMES, write_arrays, write_csv
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from one_line import complaint_of
 
 from proxytune.errors import LogError
 from proxytune.importing.tables.arrays import is_arrays, read_arrays
@@ -24,11 +25,9 @@ def read(path, **wanted):
 
 
 def complaint(path, **wanted):
-    with pytest.raises(LogError) as caught:
-        read(path, **wanted)
-    assert "\n" not in str(caught.value)
-    assert str(caught.value).startswith(str(path))
-    return str(caught.value)
+    complaint = complaint_of(read_arrays, path, Wanted(**wanted))
+    assert complaint.startswith(str(path))
+    return complaint
 
 
 def test_gym_duckietown_s_arrays_are_duties_and_poses(tmp_path):

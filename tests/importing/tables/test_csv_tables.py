@@ -5,6 +5,7 @@ import pytest
 from drives import HEADINGS, PLACES, SPEEDS, TIMES, write_csv
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from one_line import complaint_of
 
 from proxytune.errors import LogError
 from proxytune.importing.tables.csv_tables import is_csv_tables, read_csv_tables
@@ -16,13 +17,8 @@ COMMANDS = "time,v,omega\n0.01,0.5,0\n0.15,0.6,0.1\n"
 
 
 @pytest.fixture
-def file(tmp_path):
-    def write(text, name="run1.csv"):
-        path = tmp_path / name
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return path
-
-    return write
+def file(write_file):
+    return lambda content, name="run1.csv": write_file(content, name)
 
 
 def read(path, **wanted):
@@ -30,10 +26,7 @@ def read(path, **wanted):
 
 
 def complaint(path, **wanted):
-    with pytest.raises(LogError) as caught:
-        read(path, **wanted)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+    return complaint_of(read_csv_tables, path, Wanted(**wanted))
 
 
 def test_a_file_in_ns_mm_and_degrees_is_read_by_its_names(tmp_path):

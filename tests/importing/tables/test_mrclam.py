@@ -8,6 +8,7 @@ import pytest
 from drives import HEADINGS, PLACES, SPEEDS, TIMES, write_csv, write_mrclam
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from one_line import complaint_of
 
 from proxytune.errors import LogError
 from proxytune.importing.tables.csv_tables import read_csv_tables
@@ -18,10 +19,7 @@ LOG = Path(__file__).resolve().parents[3] / "../shared/data/logs/mrclam6_robot1"
 
 
 def complaint(path, **wanted):
-    with pytest.raises(LogError) as caught:
-        read_mrclam(path, Wanted(**wanted))
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+    return complaint_of(read_mrclam, path, Wanted(**wanted))
 
 
 def test_a_robot_s_two_files_are_a_drive(tmp_path):

@@ -5,6 +5,7 @@ import pytest
 from drives import HEADINGS, PLACES, SPEEDS, TIMES, write_csv, write_tum
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from one_line import complaint_of
 
 from proxytune.errors import LogError
 from proxytune.importing.tables.csv_tables import read_csv_tables
@@ -15,20 +16,12 @@ LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"
 
 
 @pytest.fixture
-def file(tmp_path):
-    def write(text, name="run1.tum"):
-        path = tmp_path / name
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return path
-
-    return write
+def file(write_file):
+    return lambda content, name="run1.tum": write_file(content, name)
 
 
 def complaint(path, **wanted):
-    with pytest.raises(LogError) as caught:
-        read_tum(path, Wanted(**wanted))
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+    return complaint_of(read_tum, path, Wanted(**wanted))
 
 
 def test_a_trajectory_and_its_commands_are_read(tmp_path):

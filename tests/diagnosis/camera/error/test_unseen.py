@@ -68,6 +68,7 @@ def test_poses_of_frames_left_out_are_fitted_and_all_others_held():
     assert (after[:, :2].std() < 0.9 * before[:, :2].std()).all()
 
 
+@pytest.mark.slow
 def test_the_right_camera_has_the_smaller_error_on_unseen_frames():
     full = everything({"camera_roll": 4.0}, count=COUNT)
     fits_ = [fit_set(full, effects) for effects in (("camera_pitch",), NAMES)]

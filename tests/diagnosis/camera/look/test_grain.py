@@ -12,6 +12,7 @@ sys.path.append(str(Path(__file__).parent))
 from photographs import drawn, floor, logged, measured, needs_measured, on_the_road, photographed, predicted, scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [2.0, 5.0])
 def test_noise_on_a_plain_floor_is_told_outright(noise):
     """2 → 1.98, 5 → 4.94."""

@@ -14,6 +14,7 @@ from proxytune.diagnosis.camera.model.scatter import pose_scatter
 from proxytune.diagnosis.camera.naming.search import fit_everything
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("place", "turn"), [(0.002, 0.3), (0.008, 1.5)])
 def test_a_scatter_that_nobody_states_is_learnt(place, turn):
     poses, truth = lane_poses(50), (place, np.radians(turn))

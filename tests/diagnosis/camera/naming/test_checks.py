@@ -39,8 +39,8 @@ def fitted(poses, pictures_):
     return fit_everything(views, OPTICS.mounting, {}, learn_scatter=False)
 
 
-OFTEN = ("the pictures are mirrored", "heading is clockwise")
-"""Mistakes that every run tries; the others are undone in the same way."""
+OFTEN = ("heading is clockwise",)
+"""What every run tries; the others are undone in the same way."""
 
 
 @pytest.mark.parametrize(
@@ -56,6 +56,7 @@ def test_a_mistake_is_refused_in_one_line_that_names_it(mistake):
     assert "\n" not in line
 
 
+@pytest.mark.slow
 def test_a_mistake_is_named_where_few_frames_match_a_little_by_chance():
     """With 30 frames one row off, a camera with everything free matches 22 %."""
     poses = lane_poses(30)
@@ -65,12 +66,14 @@ def test_a_mistake_is_named_where_few_frames_match_a_little_by_chance():
         check_match("log", full)
 
 
+@pytest.mark.slow
 def test_frames_of_somewhere_else_are_refused_with_what_to_check():
     poses = np.random.default_rng(7).permutation(lane_poses(COUNT))
     with pytest.raises(LogError, match="check that frames and rows are the same instants, the map is the right one"):
         check_match("log", fitted(poses, shown()))
 
 
+@pytest.mark.slow
 def test_poses_three_centimetres_off_are_told():
     off = np.random.default_rng(3).normal(0.0, (0.03, 0.03, 0.0), (COUNT, 3))
     (note,) = check_match("log", fitted(lane_poses(COUNT) + off, shown()))

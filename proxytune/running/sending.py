@@ -1,0 +1,90 @@
+"""Work as it goes to other processes, which end with the one that sent it."""
+
+import faulthandler
+import os
+import pickle
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, cast
+
+from proxytune.errors import RunError
+from proxytune.extensions import describe, place_of
+from proxytune.extensions.beside import folders, open_folders
+
+WATCH_S = 0.5
+
+
+class NotSendableError(RunError):
+    """Work that cannot go to another process."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Work pickled once, and where its modules are found: a process unpickles it once."""
+
+    pickled: bytes
+    path: tuple[str, ...]
+    own: tuple[str, ...]
+
+
+def recipe_of(work: Callable[..., Any]) -> Recipe:
+    """Work as it is sent.
+
+    Raises:
+        NotSendableError: If it cannot be pickled.
+    """
+    try:
+        return Recipe(pickle.dumps(work), tuple(sys.path), folders())
+    except Exception as problem:
+        remedy = "make it of classes and functions that a module has by name, without open files, or set jobs = 1"
+        line = f"what is to be run cannot be sent to other processes ({describe(problem)}){place_of(problem)}"
+        raise NotSendableError(f"{line}; {remedy}") from problem
+
+
+def do_sent(recipe: Recipe, piece: Any) -> Any:
+    """Do one piece of the work, in the process it was sent to.
+
+    Raises:
+        NotSendableError: If the work cannot be loaded there.
+    """
+    return load_sent(recipe)(piece)
+
+
+@lru_cache(maxsize=1)
+def load_sent(recipe: Recipe) -> Callable[[Any], Any]:
+    """The work, unpickled.
+
+    Raises:
+        NotSendableError: If that fails.
+    """
+    sys.path.extend(folder for folder in recipe.path if folder not in sys.path)
+    open_folders(recipe.own)
+    try:
+        return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))
+    except Exception as problem:
+        line = f"another process cannot load what is to be run: {describe(problem)}{place_of(problem)}"
+        remedy = "what it needs must be there when its modules are imported, or set jobs = 1"
+        raise NotSendableError(f"{line}; {remedy}") from None
+
+
+def end_with(parent: int) -> None:
+    """End this process, which a parent has just started, with that parent and not before.
+
+    After a `kill -9` it would wait for work for minutes. Ctrl-C reaches every process of a terminal; the parent answers
+    it, and ends this one. Of a crash the parent tells in one line.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if "PYTHONFAULTHANDLER" not in os.environ:
+        faulthandler.disable()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

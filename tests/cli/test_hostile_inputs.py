@@ -1,0 +1,97 @@
+"""Inputs that nobody means: one line, at once, and never a number that is none."""
+
+import json
+import re
+import warnings
+
+import pytest
+from processes import besides_progress
+
+from proxytune.cli import listing
+from proxytune.cli.compare import read_runs
+from proxytune.cli.main import main
+from proxytune.cli.terminal.answer import Answer
+from proxytune.report.writing import file_names
+
+TABLE = "agent,episode,d\n" + "".join(f"{a},{e},{i + 0.1 * e}\n" for i, a in enumerate("ABC") for e in (0, 1))
+
+
+def refused(capsys, *words):
+    """The one line of a command that is refused as bad input."""
+    assert main([*map(str, words)]) == 2
+    out, told = capsys.readouterr()
+    told = besides_progress(told)
+    assert (out, told.count("\n")) == ("", 1)
+    return told
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.csv").write_text(TABLE)
+    return ("score", "--proxy", "t.csv", "--target", "t.csv", "--metric")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--resamples", "10000000"], "--resamples must be between 100 and 1000000"),
+        (["--beta", "d:1e308"], "--beta d:1e308: the weight must be at most 1e+70"),
+    ],
+)
+def test_score_refuses_what_would_take_for_ever_or_overflow(table, capsys, words, says):
+    assert says in refused(capsys, *table, "d:max", *words)
+
+
+@pytest.mark.parametrize("name", [r"$\frac$", "a$b$", "tab\x01le", "p" * 500])
+def test_names_are_drawn_as_they_are_and_without_a_word(table, tmp_path, capsys, name):
+    (tmp_path / "t.csv").write_text(TABLE.replace("A,", f"{name},").replace("d\n", f"{name}\n", 1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert main([*table, f"{name}:max", "--output", "F", "--resamples", "100"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_names_that_are_alike_in_file_names_have_files_of_their_own(table, tmp_path, capsys):
+    assert file_names(["a b", "a/b", "a_b_2", "c"]) == {"a b": "a_b", "a/b": "a_b_2", "a_b_2": "a_b_2_2", "c": "c"}
+    lines = TABLE.splitlines()
+    both = [f"{domain},{line}" for domain in ("a b", "a/b") for line in lines[1:]]
+    (tmp_path / "both.csv").write_text("\n".join([f"domain,{lines[0]}", *both]) + "\n")
+    proxies = ["--proxy", "both.csv:a b", "--proxy", "both.csv:a/b"]
+    words = ["score", *proxies, "--target", "t.csv", "--metric", "d:max", "--resamples", "100", "--json"]
+    assert main([*words, "--output", "F"]) == 0
+    figures = json.loads(capsys.readouterr().out)["figures"]
+    assert len(figures) == len(set(figures)) == 4 == len(list((tmp_path / "F").glob("*.png")))
+
+
+def test_a_number_that_is_none_is_null_in_json(monkeypatch, capsys):
+    document = {"a": float("nan"), "b": [float("inf"), 1.0], "c": (1, "x")}
+    monkeypatch.setattr(listing, "run", lambda arguments: Answer(document, ""))
+    assert main(["list", "maps", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"a": None, "b": [None, 1.0], "c": [1, "x"]}
+
+
+ENDLESS = {
+    "record": (["--model", "m.toml", "--output", "log", "--repeats", "1000000000"], "--repeats must be between 1 and"),
+    "measure": (["--model", "m.toml", "--output", "t.csv", "--repeats", "1" + "0" * 12], "--repeats must be between"),
+    "compare": (["--output", "out", "--seeds", "1000000000"], "--seeds 1000000000: give at least 2 and at most 100000"),
+}
+
+
+@pytest.mark.parametrize("command", ENDLESS)
+def test_what_would_never_end_is_not_begun(command, make_study, capsys):
+    words, says = ENDLESS[command]
+    assert says in refused(capsys, command, make_study(), *words)
+
+
+def test_a_folder_in_place_of_a_table_is_told_before_anything_is_simulated(make_study, tmp_path, capsys):
+    (tmp_path / "m.toml").write_text("trim = 0.1\n")
+    told = refused(capsys, "measure", make_study(), "--model", tmp_path / "m.toml", "--output", tmp_path)
+    assert re.search(r"--output .*: is a folder; give the name of a file in it", told)
+
+
+@pytest.mark.parametrize("line", [b"\xff\xfe", b"[" * 20_000, b"[]", b"3", b"{}"])
+def test_spoilt_lines_of_finished_runs_are_skipped(tmp_path, line):
+    path = tmp_path / "runs.jsonl"
+    path.write_bytes(line + b"\n")
+    assert read_runs(path) == {}

@@ -1,0 +1,89 @@
+"""Standard output is the answer alone, in whatever letters it can hold."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from proxytune.cli import listing
+from proxytune.cli.main import FAILED, main
+from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal.own_output import prints_to_stderr
+
+CHATTER = """
+import os, subprocess, sys
+from proxytune.cli import listing
+from proxytune.cli.main import main
+answer = listing.run
+def chatty(arguments):
+    print("an agent")
+    os.write(1, b"its library\\n")
+    subprocess.run(["echo", "its process"], check=True)
+    return answer(arguments)
+listing.run = chatty
+sys.exit(main(["list", "maps", "--json"]))
+"""
+
+
+def run(code, **environment):
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, env={**os.environ, **environment})
+
+
+def test_what_an_agent_its_libraries_and_its_processes_print_goes_to_standard_error():
+    done = run(CHATTER)
+    assert json.loads(done.stdout)["maps"]
+    assert set(done.stderr.decode().splitlines()) == {"an agent", "its library", "its process"}
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "ascii", "cp1252"])
+@pytest.mark.parametrize("word", ["effects", "--json"])
+def test_a_standard_output_of_few_letters_gets_the_answer_with_the_others_escaped(encoding, word):
+    words = ["list", "effects", word][: 3 if word == "--json" else 2]
+    done = run(f"import sys; from proxytune.cli.main import main; sys.exit(main({words}))", PYTHONIOENCODING=encoding)
+    assert (done.returncode, done.stderr) == (0, b"")
+    if word == "--json":
+        assert json.loads(done.stdout.decode(encoding))["effects"]
+
+
+def test_a_path_that_is_no_utf_8_is_json_all_the_same(monkeypatch, capsys):
+    monkeypatch.setattr(listing, "run", lambda arguments: Answer({"path": "caf\udce9"}, ""))
+    assert main(["list", "maps", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.encode("utf-8")) == {"path": "caf\udce9"}
+
+
+def test_a_closed_standard_output_is_no_trouble_before_the_answer():
+    code = "import os; os.close(1); from proxytune.cli.terminal.own_output import prints_to_stderr as p\nwith p(): pass"
+    assert run(code).returncode == 0
+
+
+def test_standard_output_is_back_after_an_error(capfd):
+    with pytest.raises(ValueError, match="x"), prints_to_stderr():
+        raise ValueError("x")
+    os.write(1, b"here")
+    assert capfd.readouterr().out == "here"
+
+
+TROUBLES = {
+    "an exit of code that is not ours": (
+        SystemExit(0),
+        "code that is not proxytune's ended the command (SystemExit: 0)",
+    ),
+    "too little memory": (MemoryError("7.28 TiB"), "memory ran out (MemoryError: 7.28 TiB); ask for less"),
+    "a refusal of the system": (OSError(36, "File name too long", "a\nb"), "the system refused something (OSError: "),
+}
+
+
+@pytest.mark.parametrize("trouble", TROUBLES)
+def test_a_trouble_that_nobody_named_is_one_line_and_a_failure(trouble, monkeypatch, capsys):
+    problem, told = TROUBLES[trouble]
+
+    def run(arguments):
+        raise problem
+
+    monkeypatch.setattr(listing, "run", run)
+    assert main(["list", "maps"]) == FAILED
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith(f"proxytune list: {told}")

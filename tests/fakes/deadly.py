@@ -1,0 +1,59 @@
+"""The family that is a formula, with agents that end their process, never end, or meet the limits of the machine."""
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from wobbly import Wobbly, wobbly
+
+from proxytune.domain import Episode
+from proxytune.errors import EpisodeError
+from proxytune.settings import Section
+
+
+class OwnError(BaseException):
+    """No Exception, as sys.exit's is none."""
+
+
+def _own_error() -> None:
+    raise OwnError("of its\nown caf\udce9")
+
+
+def _short_of_memory() -> None:
+    """As a family tells of what its agent has raised."""
+    raise EpisodeError("raised MemoryError at 1.20 s: no room") from MemoryError("no room")
+
+
+def _short_of_files() -> None:
+    raise EpisodeError("raised OSError at 1.20 s: too many") from OSError(24, "Too many open files")
+
+
+ENDINGS = {
+    "exits": lambda: sys.exit(0),
+    "own error": _own_error,
+    "hangs": lambda: time.sleep(600.0),
+    "leaves": lambda: os._exit(9),
+    "aborts": lambda: os.kill(os.getpid(), signal.SIGABRT),
+    "is killed": lambda: os.kill(os.getpid(), signal.SIGKILL),
+    "memory": _short_of_memory,
+    "files": _short_of_files,
+}
+
+
+class Deadly(Wobbly):
+    """Wobbly, with the faults of ENDINGS."""
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        scores = super().run(episode)
+        for agent, start, fault in (one.split(":") for one in self.faults):
+            if agent == episode.agent and start in ("*", str(episode.start)):
+                ENDINGS[fault]()
+        return scores
+
+
+def deadly(section: Section, *, model: Path | None) -> Deadly:
+    """The family that a [domain] table describes."""
+    return Deadly(**vars(wobbly(section, model=model)))

@@ -1,0 +1,199 @@
+"""No file, whatever is in it, makes a reader fail otherwise than by one line that a person can act on.
+
+    python -m pytest tests/fuzzing -m slow --fuzz 100000
+
+spoils each kind of file so often; every spoilt file depends on its kind and number alone.
+"""
+
+import json
+import shutil
+import sys
+import warnings
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import foreign_robot
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parent))
+
+from mutation import mutated
+
+from proxytune.cli.compare import read_runs
+from proxytune.closing.steps import Kept
+from proxytune.driving.road.reading import read_map
+from proxytune.driving.robot import read_robot
+from proxytune.effects.model import read_model
+from proxytune.errors import ProxytuneError
+from proxytune.importing.reading import read_source
+from proxytune.importing.wanted import Wanted
+from proxytune.learning.cache import Cache
+from proxytune.logs import read_log
+from proxytune.scores import read_scores
+from proxytune.shipped import shipped
+from proxytune.storage.store import Store
+from proxytune.study.result import result_of
+from proxytune.study.run import as_stored
+from proxytune.study.study import open_study
+from proxytune.study.study_run import StudyRun
+
+MODEL = """\
+format = 1
+robot = "duckiebot"
+plant = "planar"
+[geometry]
+wheel_radius_m = 0.0318
+[effects.trim]
+trim = { value = 0.06, interval = [0.05, 0.07] }
+[effects.delay]
+delay = 0.19
+[effects.dead_band]
+width = 0.15
+"""
+SCORES = "agent,episode,distance,time\nA,1,1.5,10\nA,2,2.5,20\nB,1,3,30\nB,2,1e-3,7\n"
+KEY = {"objective": "made up", "engine": "gp", "seed": 1, "budget": 5, "initial": 3, "code": "1a2b"}
+MAP = "small_loop.toml"
+ONE_DRIVE = 12.0
+"""Seconds: short, so that many can be read."""
+
+
+class Reader(NamedTuple):
+    """How to come by good files in a folder, which of them to spoil, what reads them, and whether that complains."""
+
+    make: Callable[[Path, Path], object]
+    spoil: tuple[str, ...]
+    read: Callable[[Path], object]
+    complains: bool = True
+
+
+def write(name: str, content: str) -> Callable[[Path, Path], object]:
+    return lambda home, finished: (home / name).write_text(content)
+
+
+def copy(source: Path) -> Callable[[Path, Path], object]:
+    return lambda home, finished: shutil.copytree(source, home, dirs_exist_ok=True)
+
+
+def copy_finished(home: Path, finished: Path) -> None:
+    shutil.copytree(finished, home, dirs_exist_ok=True)
+
+
+def copy_robot(home: Path, finished: Path) -> None:
+    shutil.copytree(shipped("robots") / "duckiebot", home / "own")
+    text = (home / "own" / "robot.toml").read_text()
+    (home / "own" / "robot.toml").write_text(text.replace('name = "duckiebot"', 'name = "own"'))
+
+
+def read_own_robot(home: Path) -> object:
+    return read_robot.__wrapped__("own", home)  # read_robot reads each robot once
+
+
+def read_both(home: Path) -> object:
+    return read_scores(home / "scores.csv", ["distance", "time"])
+
+
+def write_a_log(home: Path, finished: Path) -> None:
+    foreign_robot.write_own_times(home, [foreign_robot.drive(1, seconds=ONE_DRIVE)])
+
+
+def write_tables(form: str) -> Callable[[Path, Path], object]:
+    def make(home: Path, finished: Path) -> None:
+        foreign_robot.write_form(home.parent / f"{home.name}_made", form, [foreign_robot.drive(1, seconds=ONE_DRIVE)])
+        shutil.copytree(home.parent / f"{home.name}_made" / form, home, dirs_exist_ok=True)
+
+    return make
+
+
+def write_arrays(home: Path, finished: Path) -> None:
+    Cache(home).get("lesson", {"one": 1}, lambda: {"samples": np.arange(12.0).reshape(3, 4), "name": np.array("x")})
+    next(home.glob("lesson-*.npz")).rename(home / "lesson.npz")
+
+
+def read_arrays(home: Path) -> object:
+    cache = Cache(home / "cache")
+    path = cache.path("lesson", {"one": 1})
+    path.parent.mkdir(exist_ok=True)
+    shutil.copy(home / "lesson.npz", path)
+    return cache.get("lesson", {"one": 1}, dict)
+
+
+def read_study(home: Path) -> object:
+    study = open_study(home)
+    with Store.read(home) as store:
+        return result_of(StudyRun(as_stored(study, store), store))
+
+
+def write_runs(home: Path, finished: Path) -> None:
+    judgement = {"code": "1a2b", "score": 3.0, "theta": {"trim": 0.1}}
+    run = {"key": KEY, "visited": [[0.1, 0.2]], "seconds": 0.1, "judgement": judgement}
+    (home / "runs.jsonl").write_text("".join(json.dumps({**run, "key": {**KEY, "seed": n}}) + "\n" for n in range(5)))
+
+
+READERS = {
+    "study.toml": Reader(copy_finished, ("study.toml",), lambda home: open_study(home)),
+    "target.csv": Reader(copy_finished, ("target.csv",), lambda home: open_study(home)),
+    "study.db": Reader(copy_finished, ("study.db",), read_study),
+    "model.toml": Reader(write("model.toml", MODEL), ("model.toml",), lambda home: read_model(home / "model.toml")),
+    "robot.toml": Reader(
+        copy_robot,
+        ("own/robot.toml", "own/duckiebot.urdf"),
+        read_own_robot,
+    ),
+    "map": Reader(
+        copy(shipped("robots") / "maps"), ("small_loop.toml",), lambda home: read_map(home / "small_loop.toml")
+    ),
+    "log": Reader(write_a_log, ("log.toml", "samples.csv", "commands.csv"), read_log),
+    "scores": Reader(write("scores.csv", SCORES), ("scores.csv",), read_both),
+    "table": Reader(write_tables("csv"), ("run0.csv",), lambda home: read_source(home / "run0.csv", Wanted())),
+    "arrays": Reader(write_arrays, ("lesson.npz",), read_arrays),
+    "runs": Reader(write_runs, ("runs.jsonl",), lambda home: read_runs(home / "runs.jsonl"), False),
+    "loop.json": Reader(
+        write("loop.json", '{"format": 1, "steps": {"study": "0123456789abcdef", "log": "0123"}}'), ("loop.json",), Kept
+    ),
+}
+SHARE = {"study.db": 0.3, "log": 0.5, "table": 0.5}
+"""What takes longer to read is read less often."""
+
+
+def outcome(read: Callable[[Path], object], home: Path) -> Any:
+    """What came of reading: nothing, or the complaint; a warning counts as a failure."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            read(home)
+        except ProxytuneError as problem:
+            return str(problem)
+    return None
+
+
+@pytest.fixture
+def inputs(request):
+    """How many files of each kind are spoilt."""
+    return request.config.getoption("fuzz")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", READERS)
+def test_a_spoilt_file_is_read_or_told_of_in_one_line(name, inputs, tmp_path, finished_once):
+    reader, home = READERS[name], tmp_path / "spoilt"
+    home.mkdir()
+    reader.make(home, finished_once)
+    good = {file: (home / file).read_bytes() for file in reader.spoil}
+    assert outcome(reader.read, home) is None
+    complaints = 0
+    for number in range(round(inputs * SHARE.get(name, 1.0))):
+        random = np.random.default_rng((zlib.crc32(name.encode()), number))
+        file = reader.spoil[int(random.integers(len(reader.spoil)))]
+        content = mutated(good[file], random)
+        (home / file).write_bytes(content)
+        try:
+            complaint = outcome(reader.read, home)
+        except Exception as problem:
+            pytest.fail(f"{file}, number {number}: {type(problem).__name__}: {problem}\n{content[:3000]!r}")
+        assert complaint is None or "\n" not in complaint, f"{file}, number {number}: {complaint!r}"
+        complaints += complaint is not None
+        (home / file).write_bytes(good[file])
+    assert not reader.complains or complaints > 0.1 * number, "hardly any change was noticed"

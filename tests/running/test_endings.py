@@ -1,0 +1,139 @@
+"""Episodes that end their process, never end, or meet the limits of the machine."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from deadly import Deadly
+from processes import ENVIRONMENT
+
+from proxytune.domain import make_episode
+from proxytune.errors import RunError
+from proxytune.running.episodes import Watch, run_episode, running
+
+EPISODES = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for a in range(3) for s in range(3)]
+LAST = EPISODES[-1]
+
+
+def run_all(faults, jobs=1, **watch):
+    with running(Deadly(faults=faults), EPISODES, jobs, watch=Watch(**watch)) as outcomes:
+        return {one.episode: one.metrics if one.metrics else one.failure for one in outcomes}
+
+
+def but_last(outcomes):
+    return {episode: outcome for episode, outcome in outcomes.items() if episode != LAST}
+
+
+@pytest.mark.parametrize(
+    ("fault", "raised"),
+    [("exits", "SystemExit: 0"), ("own error", r"OwnError: of its own caf\udce9")],
+)
+def test_what_an_agent_raises_that_is_no_exception_fails_its_episode_alone(fault, raised):
+    whole, found = run_all(()), run_all((f"agent2:2:{fault}",))
+    assert but_last(found) == but_last(whole)
+    assert found[LAST].startswith(f"the agent or the domain family raised {raised} (deadly.py, line ")
+
+
+def test_ctrl_c_is_nobodys_failure():
+    class Interrupted(Deadly):
+        def run(self, episode):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_episode(Interrupted(), EPISODES[0])
+
+
+@pytest.mark.parametrize(("fault", "what"), [("memory", "MemoryError: no room"), ("files", "OSError: .*Too many open")])
+def test_what_the_machine_lacks_is_no_failure_of_the_agent_that_met_it(fault, what):
+    with pytest.raises(RunError, match=rf"agent 'agent2' from start 2: the machine failed \({what}.*run again"):
+        run_all((f"agent2:2:{fault}",))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fault", "how"), [("leaves", "exit status 9"), ("aborts", "SIGABRT")])
+def test_an_episode_that_ends_two_processes_has_failed_and_the_others_are_what_they_are(fault, how):
+    whole, found = run_all(()), run_all((f"agent2:2:{fault}",), jobs=2)
+    assert but_last(found) == but_last(whole)
+    assert found[LAST] == f"it ended its process twice ({how})"
+
+
+@pytest.mark.slow
+def test_an_episode_whose_process_is_killed_twice_is_named_and_not_called_failed():
+    with pytest.raises(RunError, match=r"agent 'agent2' from start 2: its process was killed twice .*out of memory"):
+        run_all(("agent2:2:is killed",), jobs=2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_episode_that_takes_too_long_has_failed_and_the_others_are_what_they_are(jobs, monkeypatch):
+    monkeypatch.setattr("proxytune.running.workers.START_S", 5.0)
+    whole, found = run_all(()), run_all(("agent2:2:hangs",), jobs, timeout_s=1.0)
+    assert but_last(found) == but_last(whole)
+    assert found[LAST] == "it took longer than 1 s"
+
+
+@pytest.mark.slow
+def test_an_episode_during_which_an_earlier_process_ended_does_not_end_this_one():
+    begun = []
+    found = run_all(("agent2:2:leaves",), suspect=LAST.__eq__, begins=begun.append)
+    assert but_last(found) == but_last(run_all(()))
+    assert found[LAST] == "it ended its process twice (exit status 9)"
+    assert begun == EPISODES[:-1]
+
+
+def test_a_suspect_that_cannot_be_sent_to_another_process_is_run_in_this_one():
+    class Local(Deadly):
+        pass
+
+    with running(Local(), EPISODES, 1, watch=Watch(suspect=lambda _: True)) as outcomes:
+        assert [one.metrics is not None for one in outcomes] == [True] * len(EPISODES)
+
+
+PARENT = """
+import sys; sys.path.append({fakes!r})
+from deadly import Deadly
+from test_endings import EPISODES
+from proxytune.running.episodes import running
+with running(Deadly(faults=("agent0:*:hangs",)), EPISODES, 2) as outcomes: list(outcomes)
+"""
+
+
+def descendants(parent):
+    """Processes that a process has started, directly or not, by their numbers."""
+    parents = {}
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            parents[int(status.parent.name)] = int(status.read_text().rpartition(")")[2].split()[1])
+    family = {parent}
+    while more := {one for one, its in parents.items() if its in family and one not in family}:
+        family |= more
+    return family - {parent}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="this system does not list processes in /proc")
+@pytest.mark.parametrize("delay_s", [0.0, 0.5])
+def test_workers_end_with_a_parent_that_is_killed_as_they_start(delay_s):
+    folder = Path(__file__).parent
+    path = os.pathsep.join([str(folder), ENVIRONMENT["PYTHONPATH"]])
+    command = [sys.executable, "-c", PARENT.format(fakes=str(folder.with_name("fakes")))]
+    parent = subprocess.Popen(command, env={**ENVIRONMENT, "PYTHONPATH": path})
+    while len(descendants(parent.pid)) < 2:
+        time.sleep(0.005)
+    time.sleep(delay_s)
+    workers = descendants(parent.pid)
+    parent.kill()
+    parent.wait()
+    for _ in range(600):
+        left = {one for one in workers if Path(f"/proc/{one}/cwd").exists()}
+        if not left:
+            break
+        time.sleep(0.1)
+    for one in left:
+        os.kill(one, signal.SIGKILL)
+    assert not left

@@ -1,0 +1,73 @@
+"""Studies whose agents end their process or never end: the real command, run again as a user would."""
+
+import json
+import re
+
+import pytest
+from processes import besides_progress, start, trials
+
+from proxytune.cli.main import main
+from proxytune.domain import make_episode
+from proxytune.storage.store import Store
+
+FAMILY = {"family": '"deadly:deadly"', "budget": "2", "initial": "2"}
+
+
+def run(folder):
+    """The command's status, and what it says besides progress."""
+    process = start("study", folder, "--json")
+    out, told = process.communicate(timeout=300)
+    return process.returncode, out, besides_progress(told)
+
+
+def failures(folder):
+    with Store.read(folder) as store:
+        thetas = [trial.theta for trial in store.trials()]
+        known = [one for theta in thetas for one in store.outcomes("wobbly 1 ()", theta).values()]
+    return {(one.episode.agent, one.episode.start): one.failure for one in known if one.failure}
+
+
+def domain(fault):
+    return {"faults": f'["agent1:1:{fault}"]'}
+
+
+@pytest.mark.slow
+def test_an_agent_that_ends_the_study_s_own_process_is_named_by_the_next_run_which_goes_on(make_study):
+    folder = make_study(domain=domain("leaves"), **FAMILY)
+    assert run(folder) == (9, "", "")
+    assert not failures(folder)
+    status, out, _ = run(folder)
+    assert (status, json.loads(out)["episodes"]["failed"]) == (0, 2)
+    assert failures(folder) == {("agent1", 1): "it ended its process twice (exit status 9)"}
+
+
+@pytest.mark.slow
+def test_an_agent_that_hangs_fails_where_the_study_limits_its_time(make_study):
+    folder = make_study(domain=domain("hangs"), episode_timeout_s="1.5", **FAMILY)
+    status, out, _ = run(folder)
+    assert (status, json.loads(out)["episodes"]["failed"]) == (0, 2)
+    assert failures(folder) == {("agent1", 1): "it took longer than 1.5 s"}
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_an_agent_that_exits_fails_and_the_study_goes_on(make_study, capsys, jobs):
+    assert main(["study", str(make_study(domain=domain("exits"), jobs=jobs, **FAMILY)), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"]["failed"] == 2
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_what_the_machine_lacks_stops_the_study_and_is_not_kept(make_study, capsys, jobs):
+    folder = make_study(domain=domain("memory"), jobs=jobs, **FAMILY)
+    assert main(["study", str(folder)]) == 1
+    told = besides_progress(capsys.readouterr().err)
+    assert re.fullmatch(r"proxytune study: agent 'agent1' from start 1: the machine failed \(MemoryError.*\n", told)
+    assert not failures(folder)
+
+
+@pytest.mark.slow
+def test_an_episode_under_way_when_the_study_was_killed_becomes_what_it_would_have_been(make_study, finished):
+    folder = make_study("killed")
+    with Store.open(folder) as store:
+        store.under_way("wobbly 1 ()").begin(make_episode({}, agent="agent0", start=0, seed=1))
+    assert main(["study", str(folder)]) == 0
+    assert trials(folder) == trials(finished)

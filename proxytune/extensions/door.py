@@ -146,7 +146,8 @@ def _attribute(name: str, kind: str, beside: Path | None) -> Any:
 
 
 def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleType:
-    check_permitted(module, beside or Path.cwd())
+    if beside is None:
+        check_permitted(module, Path.cwd())
     try:
         return importlib.import_module(module) if beside is None else import_beside(module, beside)
     except (ProxytuneError, KeyboardInterrupt):

@@ -1,9 +1,9 @@
 """What tells a damaged study.db: a checksum over every row, and a chain over the trials of each search.
 
-A row's checksum is the CRC-32 of its values as Python writes them, each text as UTF-8. That of an episode covers the θ
-of its instance, so that it holds wherever instances are numbered anew. A trial's digest is the SHA-256 of its values
-and of the digest before it: a trial that is changed, deleted or renumbered breaks the chain from there on. This tells
-damage and careless edits; who wants to deceive can compute it as well.
+A row's checksum is the CRC-32 of its values as Python writes them in ASCII. That of an episode covers the θ of its
+instance, so that it holds wherever instances are numbered anew. A trial's digest is the SHA-256 of its values and of
+the digest before it: a trial that is changed, deleted or renumbered breaks the chain from there on. This tells damage
+and careless edits; who wants to deceive can compute it as well.
 """
 
 import hashlib
@@ -59,14 +59,24 @@ def name_trials(first: int, last: int) -> str:
     return f"trial {first}" if first == last else f"trials {first} to {last}"
 
 
+@contextmanager
+def readable_texts(connection: sqlite3.Connection) -> Iterator[None]:
+    """Have damaged text that is no UTF-8 read too; a text that has become a BLOB remains one."""
+    connection.text_factory = lambda text: str(text, "utf-8", "surrogateescape")
+    try:
+        yield
+    finally:
+        connection.text_factory = str
+
+
 def checksum(*values: Any) -> int:
     """The checksum of a row's values."""
-    return zlib.crc32(repr(_as_bytes(values)).encode())
+    return zlib.crc32(ascii(values).encode())
 
 
 def link(before: str, row: tuple[Any, ...]) -> str:
     """The digest of a trial, of its values as LINKED has them, after the trial with another digest."""
-    return hashlib.sha256(repr((before, *_as_bytes(row))).encode()).hexdigest()[:16]
+    return hashlib.sha256(ascii((before, *row)).encode()).hexdigest()[:16]
 
 
 def prepare(connection: sqlite3.Connection) -> None:
@@ -112,51 +122,33 @@ def seal_all(connection: sqlite3.Connection) -> None:
 
 def find_damage(connection: sqlite3.Connection) -> Damage:
     """What is not as it was written."""
-    with _texts_as_bytes(connection):
+    with readable_texts(connection):
         counts = {table: _broken_rows(connection, table) for table in COLUMNS}
         ends = {name: (count, digest) for name, count, digest in connection.execute("SELECT * FROM chains")}
         names = [name for (name,) in connection.execute("SELECT DISTINCT objective FROM trials")]
-        ends = {**dict.fromkeys(names, (0, b"")), **ends}
+        ends = {**dict.fromkeys(names, (0, "")), **ends}
         first = {name: _first_broken(connection, name, *end) for name, end in ends.items()}
-    trials = {
-        name.decode(errors="replace"): (number, max(number, ends[name][0]))
-        for name, number in first.items()
-        if number is not None
-    }
+    trials = {name: (number, max(number, ends[name][0])) for name, number in first.items() if number is not None}
     return Damage({table: count for table, count in counts.items() if count}, trials)
 
 
 def _broken_rows(connection: sqlite3.Connection, table: str) -> int:
     rows = connection.execute(f"SELECT checksum, {COLUMNS[table]} FROM {table}")
-    return sum(row[0] != zlib.crc32(repr(row[1:]).encode()) for row in rows)
+    return sum(row[0] != checksum(*row[1:]) for row in rows)
 
 
-def _first_broken(connection: sqlite3.Connection, objective: bytes, count: int, end: bytes) -> int | None:
+def _first_broken(connection: sqlite3.Connection, objective: str, count: int, end: str) -> int | None:
     """The number of the first trial from which on the chain does not hold; None if it holds."""
     digest, number, whole = "", 0, 0
-    for row in _trials(connection, objective.decode(errors="replace"), 1, "digest"):
+    for row in _trials(connection, objective, 1, "digest"):
         expected = link(digest, row[:-1])
-        if row[-1] != expected.encode():
+        if row[-1] != expected:
             return number + 1
         digest, number, whole = expected, row[0], whole + 1
-    return None if (whole, digest.encode()) == (count, end) else number + 1
+    return None if (whole, digest) == (count, end) else number + 1
 
 
 def _trials(connection: sqlite3.Connection, objective: str, first: int, *more: str) -> list[tuple[Any, ...]]:
     columns = ", ".join([LINKED, *more])
     query = f"SELECT {columns} FROM trials WHERE objective = ? AND number >= ? ORDER BY number"
     return connection.execute(query, (objective, first)).fetchall()
-
-
-def _as_bytes(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    return tuple(value.encode() if isinstance(value, str) else value for value in values)
-
-
-@contextmanager
-def _texts_as_bytes(connection: sqlite3.Connection) -> Iterator[None]:
-    """Damaged text may be no UTF-8."""
-    connection.text_factory = bytes
-    try:
-        yield
-    finally:
-        connection.text_factory = str

@@ -82,11 +82,11 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
     if version > FORMAT:
         raise StoreError(f"{path}: has format {version}, this proxytune reads up to {FORMAT}; install a newer one")
     _refuse_programs(connection, path)
-    (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-    if verdict != "ok":
-        raise _corrupt(path, str(verdict))
     if _cut_off(connection, path):
         raise _corrupt(path, "its end has been cut off")
+    (verdict,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+    if verdict != "ok":
+        raise _corrupt(path, str(verdict))
 
 
 def _refuse_programs(connection: sqlite3.Connection, path: Path) -> None:
@@ -163,12 +163,14 @@ def sqlite_errors_as_store_errors(path: Path) -> Iterator[None]:
     """Raise every error of SQLite as one line with a remedy.
 
     Raises:
-        StoreError: In place of any sqlite3.Error.
+        StoreError: In place of any sqlite3.Error, and of text that is none.
     """
     try:
         yield
     except sqlite3.Error as problem:
         raise _explained(path, problem) from problem
+    except UnicodeDecodeError as problem:
+        raise _corrupt(path, "it has text that is no UTF-8") from problem
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.errors import InputError, StoreError
-from proxytune.storage.checksums import chain, checksum, link
+from proxytune.storage.checksums import chain, checksum, link, readable_texts
 from proxytune.storage.database import check_whole, copy_of_earlier, open_file, sqlite_errors_as_store_errors
 from proxytune.storage.formats import APPLICATION, FORMAT, make_tables, version_of
 from proxytune.storage.own_files import refuse_links
@@ -84,12 +84,12 @@ def _rebuild(path: Path) -> Salvage:
 
 
 def _rows(path: Path) -> dict[str, list[Row]]:
-    """All rows that can be read, with texts as bytes."""
+    """All rows that can be read."""
     connection = open_file(path, writable=False)
     try:
         connection = _ours(connection, path)
-        connection.text_factory = bytes
-        return {table: _readable(connection, table) for table in KEYS}
+        with readable_texts(connection):
+            return {table: _readable(connection, table) for table in KEYS}
     finally:
         connection.close()
 
@@ -146,16 +146,16 @@ def _whole(rows: Mapping[str, list[Row]]) -> Iterator[tuple[str, list[Row]]]:
     yield "trials", list(_linked(rows["trials"], theta)) if known and facts else []
 
 
-def _linked(trials: list[Row], theta: Mapping[Any, bytes]) -> Iterator[Row]:
+def _linked(trials: list[Row], theta: Mapping[Any, str]) -> Iterator[Row]:
     """The trials of each search up to the first that does not follow from the one before."""
-    digests: dict[bytes, str | None] = {}
+    digests: dict[Any, str | None] = {}
     for row in trials:
         objective, number, instance, *values, digest = row
         before = digests.get(objective, "")
         if before is None:
             continue
         expected = link(before, (number, theta.get(instance), *values))
-        follows = instance in theta and digest == expected.encode()
+        follows = instance in theta and digest == expected
         digests[objective] = expected if follows else None
         if follows:
             yield row
@@ -168,8 +168,7 @@ def _write(path: Path, rows: Mapping[str, list[Row]]) -> None:
         connection.execute("BEGIN")
         for table, kept in rows.items():
             for row in kept:
-                values = [value.decode() if isinstance(value, bytes) else value for value in row]
-                connection.execute(f"INSERT INTO {table} VALUES ({', '.join('?' * len(row))})", values)
+                connection.execute(f"INSERT INTO {table} VALUES ({', '.join('?' * len(row))})", row)
         for (objective,) in connection.execute("SELECT DISTINCT objective FROM trials").fetchall():
             chain(connection, objective)
         connection.execute("COMMIT")

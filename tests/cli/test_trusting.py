@@ -10,7 +10,10 @@ from pathlib import Path
 import pytest
 
 from proxytune.cli.main import main
-from proxytune.cli.terminal.trusting import is_trusted, memory, remember
+from proxytune.cli.terminal.trusting import is_trusted, memory, only_trusted_code, remember
+from proxytune.errors import ExtensionError
+from proxytune.extensions import load
+from proxytune.extensions.beside import import_beside
 from proxytune.shipped import shipped
 
 FAMILY = """
@@ -78,6 +81,20 @@ def test_an_installed_function_is_not_called_because_a_stranger_names_it(make_st
     folder = make_study("stranger", family=None, agents=f'["{name}", "steady"]', metrics='["distance:max"]')
     (folder / "target.csv").write_text(f"agent,episode,distance\n{name},0,1.0\nsteady,0,2.0\n")
     assert f"has not been run here before: module '{name.partition(':')[0]}'" in complaint(capsys, "study", folder)
+
+
+def test_an_effect_is_no_way_round(make_study, capsys):
+    agents = {"agents": '["laggy", "steady"]', "metrics": '["distance:max"]'}
+    folder = make_study("stranger", domain={"effects": '{ "os:getcwd" = {} }'}, family=None, **agents)
+    (folder / "target.csv").write_text("agent,episode,distance\nlaggy,0,1.0\nsteady,0,2.0\n")
+    assert "has not been run here before: module 'os'" in complaint(capsys, "study", folder)
+
+
+def test_what_is_named_beside_no_study_or_imported_by_another_way_is_asked_for_too(tmp_path):
+    for asking in (lambda: load("os:sep", kind="effect"), lambda: import_beside("os", tmp_path)):
+        assert asking() is not None
+        with only_trusted_code(False), pytest.raises(ExtensionError, match="module 'os'"):
+            asking()
 
 
 def test_a_folder_is_trusted_once_and_then_edited_freely(stranger, capsys):

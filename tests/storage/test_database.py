@@ -5,7 +5,7 @@ import pytest
 
 from proxytune.errors import StoreError
 from proxytune.storage.checksums import COLUMNS
-from proxytune.storage.database import connect, disconnect, sqlite_errors_as_store_errors
+from proxytune.storage.database import connect, disconnect, open_file, sqlite_errors_as_store_errors
 from proxytune.storage.formats import FORMAT, TRIALS_3
 
 
@@ -318,3 +318,14 @@ def test_format_4_knew_nothing_of_the_code_of_failures(tmp_path):
         assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
         rows = plain.execute("SELECT start, failure, code FROM episodes ORDER BY start").fetchall()
     assert rows == [(0, "it fell", None), (1, None, None)]
+
+
+def test_a_stranger_s_schema_may_not_call_our_functions(tmp_path):
+    path = made(tmp_path / "study.db")
+    with sqlite3.connect(path) as plain:
+        plain.create_function("row_checksum", -1, lambda *values: 0, deterministic=True)
+        plain.execute("CREATE VIEW evil AS SELECT row_checksum(key) FROM facts")
+    connection = open_file(path, writable=True)
+    with pytest.raises(sqlite3.OperationalError, match="unsafe use of row_checksum"):
+        connection.execute("SELECT * FROM evil").fetchall()
+    connection.close()

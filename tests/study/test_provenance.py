@@ -5,7 +5,7 @@ import sqlite3
 import pytest
 
 from proxytune.cli.main import main
-from proxytune.errors import SettingsError
+from proxytune.errors import SettingsError, StoreError
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.store import Store
 from proxytune.study.provenance import SEARCH, note_search
@@ -168,3 +168,19 @@ def test_a_sweep_finds_the_episodes_of_an_earlier_identity(make_study, newer, mo
     assert "36 episodes run" in capsys.readouterr().out
     assert main([*command, str(folder)]) == 0
     assert "\n0 episodes run" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("fact", "value"),
+    [(SEARCH, 7), (SEARCH, {"a": 1}), (SEARCH, [7]), (SEARCH, [{"first_trial": "x"}]), ("versions", [1])],
+)
+def test_what_code_a_study_was_made_by_is_refused_in_one_line_where_it_is_not_as_we_write_it(
+    finished, make_study, newer, fact, value
+):
+    make_study(budget="9")
+    with Store.open(finished) as store:
+        store.save_fact(fact, value)
+    with pytest.raises(StoreError, match=f"'{fact}' is not as proxytune writes it"), Store.open(finished) as store:
+        run = StudyRun(open_study(finished), store)
+        check_facts(run)
+        note_search(run.study, store)

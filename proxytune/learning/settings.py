@@ -2,16 +2,17 @@
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from proxytune.learning.lessons import Distribution
+from proxytune.learning.published import Published, read_published
 from proxytune.settings import Section
 
 DEFAULT_LEARNER = "proxytune.learning.cloning:BehaviourCloning"
 KEYS = (
     "target", "learner", "proxy_samples", "target_samples", "seeds", "lesson_s",
-    "level", "tolerance", "budget", "narrow", "width", "proxies",
+    "level", "tolerance", "budget", "narrow", "width", "proxies", "published", "published_in",
 )  # fmt: skip
 NONE = "none"
 """The name of the learner without a proxy, which no proxy may have."""
@@ -34,6 +35,8 @@ class TeachingSettings:
         narrow: Whether such a study first finds by PRPV the θ that cannot be told from the best, and searches there.
         widths: Bounds of the widths of p(θ) that such a study searches, by parameter; without one, θ is fixed.
         proxies: What `teach` compares, by name: p(θ) of each.
+        published: What others published of proxies of these names, or of learning without one.
+        published_in: Where, and what was different there.
     """
 
     target: Path
@@ -48,6 +51,8 @@ class TeachingSettings:
     narrow: bool
     widths: Mapping[str, tuple[float, float]]
     proxies: Mapping[str, Distribution]
+    published: Mapping[str, Published] = field(default_factory=dict)
+    published_in: str = ""
 
 
 def read_teaching(section: Section) -> TeachingSettings | None:
@@ -62,6 +67,7 @@ def read_teaching(section: Section) -> TeachingSettings | None:
     target = section.path.parent / section.text("target")
     if not target.is_file():
         raise section.error("target", f"no such file: {target}; give the target's model.toml")
+    proxies = _proxies(section.section("proxies"))
     return TeachingSettings(
         target=target,
         learner=section.text("learner", DEFAULT_LEARNER),
@@ -74,7 +80,9 @@ def read_teaching(section: Section) -> TeachingSettings | None:
         budget=section.whole("budget", 12, low=1, high=100_000),
         narrow=_flag(section, "narrow"),
         widths=_widths(section.section("width")),
-        proxies=_proxies(section.section("proxies")),
+        proxies=proxies,
+        published=read_published(section.section("published"), proxies, NONE),
+        published_in=section.text("published_in", ""),
     )
 
 

@@ -1,6 +1,6 @@
 """The page of `teach` claims no more than the intervals allow."""
 
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import pytest
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Curve, Teaching
 from proxytune.learning.plv import Estimate as Worth
+from proxytune.learning.published import Published
 from proxytune.report.page import foot_of, html_of
 from proxytune.report.teaching.figure import places_of, teach_figure
 from proxytune.report.teaching.page import teach_page
@@ -18,6 +19,9 @@ from proxytune.teaching.experiment import Experiment, TeacherResult
 NOTHING = Worth(None, None, None)
 COUNTS = (0, 50, 100, 200, 400)
 EVIL = "<script>alert(1)</script>"
+
+
+NOBODY = MappingProxyType({})
 
 
 def lesson(name, plv):
@@ -35,9 +39,9 @@ LESSONS = (
 )
 
 
-def experiment(lessons=LESSONS, settled=True):
+def experiment(lessons=LESSONS, settled=True, published=NOBODY):
     without = Curve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
-    settings = SimpleNamespace(name=EVIL)
+    settings = SimpleNamespace(name=EVIL, teaching=SimpleNamespace(published=published, published_in="a paper"))
     return Experiment(settings, 60.0, without, Convergence(50.0, 5.0), settled, lessons)
 
 
@@ -55,6 +59,17 @@ def test_the_answer_names_each_proxy_with_its_interval_where_it_belongs():
     assert "wide" not in shown
     assert rest.index("harmful") < rest.index("Open, since") < rest.index("wide: 300 (-100 to 400)")
     assert "none is shown" in teach_answer(experiment(LESSONS[2:3]))
+
+
+def test_what_was_published_stands_beside_what_is_found_here_with_its_source():
+    theirs = {"none": Published(0.0, 9000, 0.0), "sure": Published(47.4, 250, 0.97)}
+    page = teach_page(experiment(published=theirs), {}, b"a picture", foot_of("teach"))
+    table = next(part for part in page.parts if getattr(part, "title", "") == "Beside what was published")
+    assert [row[:2] for row in table.rows] == [("none", "0"), ("sure", "47.4")]
+    assert table.rows[1][3:] == ("250", "100 (50 to 400)", "97%", "")
+    assert table.notes == ("a paper",)
+    nobody = teach_page(experiment(), {}, b"a picture", foot_of("teach"))
+    assert len(nobody.parts) == len(page.parts) - 1
 
 
 def test_the_next_step_is_more_seeds_while_something_is_open():

@@ -1,6 +1,7 @@
 """What `teach --json` prints; its keys are promises."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from proxytune.learning.plv import Curve, Estimate
@@ -54,4 +55,6 @@ def _settings(experiment: Experiment) -> dict[str, Any]:
         "target": str(taught.target),
         "target_samples": list(taught.target_samples),
         **{name: getattr(taught, name) for name in names},
+        "published": {name: asdict(row) for name, row in taught.published.items()},
+        "published_in": taught.published_in,
     }

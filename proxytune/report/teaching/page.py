@@ -1,6 +1,6 @@
 """An experiment in teaching, and a search by PLV, as pages."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from proxytune.report.page import Foot, Page, Picture, Table, Words, terminal_tables
 from proxytune.report.teaching.plv_document import plv_table
@@ -13,6 +13,17 @@ CURVES = (
     "One panel per proxy, against the learner without one (grey). A proxy saves samples where its curve comes to the "
     "dotted line sooner and stays above it; where the bands (95 %, over seeds) overlap, no difference is shown. The "
     "point on the left is the score before any target sample."
+)
+PUBLISHED = (
+    *(
+        "proxy",
+        "zero-shot score, published",
+        "here",
+        "samples needed, published",
+        "here",
+        "reduction, published",
+        "here",
+    ),
 )
 TRIALS = (
     "PLV of each proxy tried, with its 95 % interval; crosses have not converged. Above 0 samples are saved. Where "
@@ -27,7 +38,22 @@ def teach_page(experiment: Experiment, prpv: Mapping[str, float | None], figure:
     picture = Picture("What each proxy saves, curve by curve", figure, CURVES)
     table = Table("PLV of each proxy (the paper's table 1)", COLUMNS, rows, lines)
     name = f"{experiment.settings.name}: proxies as teachers"
-    return Page(name, teach_answer(experiment), teach_next_step(experiment), (table, picture), foot)
+    parts: tuple[Table | Picture, ...] = (table, *_published(experiment, rows), picture)
+    return Page(name, teach_answer(experiment), teach_next_step(experiment), parts, foot)
+
+
+def _published(experiment: Experiment, rows: Sequence[tuple[str, ...]]) -> tuple[Table, ...]:
+    """What others published of these proxies, beside what is found here; nothing where nothing is given."""
+    taught = experiment.settings.teaching
+    if taught is None or not taught.published:
+        return ()
+    here = {row[0]: row for row in rows}
+    cells = []
+    for name, theirs in taught.published.items():
+        _, _, zero_shot, needed, _, reduction = here[name]
+        published = (f"{theirs.zero_shot:g}", f"{theirs.samples}", f"{theirs.reduction:.0%}")
+        cells.append((name, published[0], zero_shot, published[1], needed, published[2], reduction))
+    return (Table("Beside what was published", PUBLISHED, tuple(cells), tuple(filter(None, [taught.published_in]))),)
 
 
 def plv_page(study: PlvStudy, figure: bytes, foot: Foot) -> Page:

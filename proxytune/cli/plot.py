@@ -2,7 +2,7 @@
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +10,20 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from proxytune.api.studies import StudyReport
-from proxytune.cli.sweep import draw_curves
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.typed import typed
 from proxytune.report.study.document import study_document
 from proxytune.report.study.table import study_table
 from proxytune.report.study.table_files import write_tables
+from proxytune.report.sweep.document import curve_name
+from proxytune.report.sweep.files import draw_curves, held_alike, held_values, write_page
 from proxytune.scores import Metric
 from proxytune.storage.store import Store
 from proxytune.study.evaluation import Spent
 from proxytune.study.rescoring import rescored, with_metrics
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.run import stored_run
-from proxytune.study.settings import read_study_settings
+from proxytune.study.settings import StudySettings, read_study_settings
 from proxytune.study.study_run import StudyRun
 from proxytune.study.without_code import open_to_look
 from proxytune.sweep.sweep import Curve, all_curves
@@ -55,6 +56,8 @@ def run(arguments: argparse.Namespace) -> Answer:
         result, curves = _read(stored_run(study, store), metrics)
     folder = _folder(settings.folder, metrics)
     figures = draw_curves(curves, folder / "figures", study.truth)
+    shown = result.study.settings if result else settings
+    pages = [str(page) for page in _pages(shown, curves, folder / "figures", typed(arguments))]
     document: dict[str, Any] = {}
     if result:
         found = StudyReport(result, Spent())
@@ -63,8 +66,18 @@ def run(arguments: argparse.Namespace) -> Answer:
         tables = [str(path) for path in write_tables(result, found.trials(), folder / "figures")]
         document = {**study_document(result), "report": str(report), "tables": tables}
     paths = [str(path) for path in figures]
-    files = Text("\n".join([*paths, *([*document["tables"], document["report"]] if result else [])]))
-    return Answer({**document, "figures": paths}, _by_other_metrics(result, files) if result and metrics else files)
+    files = Text("\n".join([*paths, *pages, *([*document["tables"], document["report"]] if result else [])]))
+    return Answer(
+        {**document, "figures": paths, "pages": pages},
+        _by_other_metrics(result, files) if result and metrics else files,
+    )
+
+
+def _pages(settings: StudySettings, curves: Sequence[Curve], folder: Path, command: str) -> Iterator[Path]:
+    """Write a page of all sweeps that hold the others at the same values."""
+    drawn = list({curve_name(curve): curve for curve in curves}.values())
+    for alike in held_alike(drawn):
+        yield write_page(settings, alike, folder, held_values(alike[0].base), command)
 
 
 def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:

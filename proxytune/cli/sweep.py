@@ -1,9 +1,7 @@
 """`sweep`: usefulness along one parameter, or along each parameter of the study."""
 
 import argparse
-import json
 from collections.abc import Sequence
-from itertools import groupby
 from pathlib import Path
 
 from rich.console import Group
@@ -16,22 +14,8 @@ from proxytune.cli.terminal.theta import read_theta
 from proxytune.cli.terminal.typed import typed
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.report.page import foot_of, html_of
-from proxytune.report.study.page import study_settings
-from proxytune.report.sweep.bars import bars_figure
-from proxytune.report.sweep.document import (
-    NO_POD,
-    curve_csv,
-    curve_document,
-    curve_lines,
-    curve_name,
-    curve_tables,
-    failures,
-    held_mark,
-)
-from proxytune.report.sweep.figures import panels_figure, sweep_figure
-from proxytune.report.sweep.page import sweep_page
-from proxytune.report.writing import save, write_text
+from proxytune.report.sweep.document import NO_POD, curve_document, curve_lines, curve_tables, failures
+from proxytune.report.sweep.files import draw_curves, held_values, write_curves, write_page
 from proxytune.running.progress import Bars
 from proxytune.space import Theta
 from proxytune.storage.lock import locked
@@ -94,34 +78,9 @@ def run(arguments: argparse.Namespace) -> Answer:
     output = arguments.output or folder / "figures"
     figures = draw_curves(curves, output, study.truth)
     held = _held(word, sweeps[0].base)
-    page = _write_page(arguments, study, curves, figures, held)
+    page = write_page(study.settings, curves, output, held, typed(arguments))
     answer = _answer(curves, run.spent, figures, [*write_curves(curves, output), page])
     return _say_base(answer, word, sweeps[0].base, held)
-
-
-def draw_curves(curves: Sequence[Curve], folder: Path, truth: Theta | None) -> list[Path]:
-    """Draw one figure per curve, and two of all curves with the same values of the others; return their paths."""
-    figures = {curve_name(curve): panels_figure(curve, truth) for curve in curves}
-    for base, members in groupby(sorted(curves, key=_base), key=_base):
-        together = list({curve.parameter: curve for curve in members}.values())
-        if len(together) > 1:
-            mark = f"_{held_mark(dict(base))}" if base else ""
-            figures[f"sweep_all{mark}"] = sweep_figure(together, truth)
-            figures[f"sweep_bars{mark}"] = bars_figure(together)
-    for name, figure in figures.items():
-        save(figure, folder / f"{name}.png")
-    return [folder / f"{name}.png" for name in figures]
-
-
-def write_curves(curves: Sequence[Curve], folder: Path) -> list[Path]:
-    """Write each curve as CSV and as JSON; return the paths."""
-    written = []
-    for curve in curves:
-        texts = {"csv": curve_csv(curve), "json": json.dumps(curve_document(curve), indent=2, allow_nan=False) + "\n"}
-        for ending, text in texts.items():
-            written.append(folder / f"{curve_name(curve)}.{ending}")
-            write_text(written[-1], text)
-    return written
 
 
 def _plan(study: Study, arguments: argparse.Namespace, word: str) -> list[SweepRecord]:
@@ -148,27 +107,12 @@ def _answer(curves: Sequence[Curve], spent: Spent, figures: Sequence[Path], file
     return Answer(document, Group(*parts, Text("\n".join(lines))))
 
 
-def _write_page(
-    arguments: argparse.Namespace, study: Study, curves: Sequence[Curve], figures: Sequence[Path], held: str
-) -> Path:
-    """Write the page beside the figures, named as the first of all curves, or as the only one."""
-    drawn = {path.stem: path.read_bytes() for path in figures}
-    together = [path for path in figures if path.stem.startswith("sweep_all")]
-    path = (together or figures)[0].with_suffix(".html")
-    foot = foot_of(typed(arguments), study_settings(study.settings))
-    said = f"{held[0].upper()}{held[1:]}"
-    write_text(path, html_of(sweep_page(study.settings.name, curves, drawn, said, foot)))
-    return path
-
-
 def _held(word: str, base: Theta) -> str:
     """What the other parameters are held at."""
-    values = ", ".join(f"{name}={value:g}" for name, value in sorted(base.items()))
-    lines = {
-        "best": f"the others are held at the study's best θ: {values}; --at nominal holds the robot's own",
-        "nominal": "the others are nominal",
-    }
-    return lines.get(word, f"the others are held at {values}")
+    if word == "best":
+        values = held_values(base).replace("held at", "held at the study's best θ:")
+        return f"{values}; --at nominal holds the robot's own"
+    return "the others are nominal" if word == "nominal" else held_values(base)
 
 
 def _say_base(answer: Answer, word: str, base: Theta, held: str) -> Answer:
@@ -176,7 +120,3 @@ def _say_base(answer: Answer, word: str, base: Theta, held: str) -> Answer:
     chosen = word if word in ("best", "nominal") else "given"
     document = {**answer.document, "at": {"chosen": chosen, "theta": dict(base)}}
     return Answer(document, Group(answer.text, Text(held)))
-
-
-def _base(curve: Curve) -> tuple[tuple[str, float], ...]:
-    return tuple(sorted(curve.base.items()))

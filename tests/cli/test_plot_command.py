@@ -20,7 +20,10 @@ def test_every_figure_is_drawn_again_without_simulating(finished, capsys):
     assert main(["plot", str(finished), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     tables = {"trials.csv", "parameters.tex", "usefulness.tex"}
-    assert sorted({*names, *tables}) == sorted(path.name for path in (finished / "figures").iterdir())
+    pages = {path.name for path in (finished / "figures").glob("*.html")}
+    assert sorted({*names, *tables, *pages}) == sorted(path.name for path in (finished / "figures").iterdir())
+    assert {str(finished / "figures" / name) for name in pages} == set(document["pages"])
+    assert len(pages) == 1
     assert {str(finished / "figures" / name) for name in tables} == set(document["tables"])
     assert len(names) == 8
     assert (finished / "report.html").exists()
@@ -33,7 +36,12 @@ def test_sweeps_are_drawn_also_where_the_study_itself_has_not_been_run(make_stud
     assert main(["sweep", str(folder), "--parameter", "trim", "--points", "2"]) == 0
     capsys.readouterr()
     assert main(["plot", str(folder), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"figures": [str(folder / "figures" / "sweep_trim.png")]}
+    home = folder / "figures"
+    drawn = {"figures": [str(home / "sweep_trim.png")], "pages": [str(home / "sweep_trim.html")]}
+    assert json.loads(capsys.readouterr().out) == drawn
+    page = (home / "sweep_trim.html").read_text()
+    assert f"python -m proxytune plot {folder}" in page
+    assert "The others are nominal." in page
 
 
 def test_a_study_that_has_not_been_run_is_told(make_study, capsys):
@@ -62,7 +70,7 @@ def drawn_again(folder, capsys):
     shutil.rmtree(folder / "figures")
     assert main(["plot", str(folder), "--json"]) == 0
     named = json.loads(capsys.readouterr().out)["figures"]
-    drawn = {path.name: path.read_bytes() for path in (folder / "figures").iterdir()}
+    drawn = {path.name: path.read_bytes() for path in (folder / "figures").glob("*.png")}
     assert sorted(named) == sorted(str(folder / "figures" / name) for name in drawn)
     return drawn
 

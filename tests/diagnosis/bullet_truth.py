@@ -99,7 +99,7 @@ def _tilt(plant: BulletPlant, degrees: float) -> None:
 
 
 def _torque(plant: BulletPlant, torque: float) -> None:
-    plant._torque = torque
+    plant._torques = [torque] * 2
 
 
 CHANGES: Mapping[str, Callable[[BulletPlant, float], None]] = {

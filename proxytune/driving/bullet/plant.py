@@ -44,7 +44,7 @@ class BulletPlant:
             if sideways:
                 self._shift(sideways * self._tick_s)
             poses.append(self._pose())
-        return np.array(poses), self._crashed()
+        return np.array(poses).reshape(-1, 3), self._crashed()
 
     def _build(self, urdf: Path, start: Signal) -> int:
         world: dict[str, Any] = {"physicsClientId": self._world}

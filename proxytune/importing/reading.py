@@ -50,6 +50,9 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
     """
     if not path.exists():
         raise LogError(f"{path}: no such folder; check the path")
+    if not (path.is_file() or path.is_dir()):
+        # A pipe would be waited for, and a device never ends.
+        raise LogError(f"{path}: is a device or a pipe; copy what it gives into a file, and give that")
     for form in FORMS:
         if form.recognise(path):
             return _checked(form.read(path, wanted), path, offset_s)

@@ -1,11 +1,14 @@
 """The form of a source is told by what is in it, and a log has one kind of commands."""
 
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import foreign_robot
 import numpy as np
 import pytest
 from imported_drives import drive
+from one_line import complaint_of
 
 from proxytune.errors import LogError
 from proxytune.importing import reading
@@ -58,3 +61,9 @@ def test_drives_with_several_kinds_of_commands_are_refused(monkeypatch, tmp_path
 def test_a_log_without_commands_says_nothing_of_clocks(monkeypatch, tmp_path):
     found = read_as(monkeypatch, tmp_path, replace(drive(TIMES, TIMES), commands=None))
     assert found.notes == ("taken as it is",)
+
+
+def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "run.csv")
+    for path in (tmp_path / "run.csv", Path("/dev/zero")):
+        assert "is a device or a pipe; copy" in complaint_of(read_source, path, Wanted())

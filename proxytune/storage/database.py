@@ -192,6 +192,8 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.
 
 def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
     code = getattr(problem, "sqlite_errorcode", None) or 0
+    if code == sqlite3.SQLITE_READONLY_ROLLBACK:
+        return StoreError(f"{path}: a write to it was broken off; run the study again, which undoes that write")
     match code & 0xFF:
         case sqlite3.SQLITE_FULL:
             return StoreError(f"{path}: the disk is full; make room and run again, everything finished is kept")

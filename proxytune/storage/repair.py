@@ -3,7 +3,7 @@
 import shutil
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,12 +56,20 @@ def salvage(folder: Path) -> Salvage | None:
     refuse_links(folder)
     if not path.is_file():
         raise InputError(f"{path}: no such file; there is nothing to repair")
+    _undo_broken_write(path)
     try:
         check_whole(path)
     except StoreError:
         with sqlite_errors_as_store_errors(path):
             return _rebuild(path)
     return None
+
+
+def _undo_broken_write(path: Path) -> None:
+    """Let SQLite undo a write that was broken off: it does so only for a writer, and readers are refused till then."""
+    if path.with_name(f"{path.name}-journal").exists():
+        with suppress(sqlite3.Error), closing(open_file(path, writable=True)) as connection:
+            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
 
 
 def _rebuild(path: Path) -> Salvage:
@@ -178,13 +186,14 @@ def _write(path: Path, rows: Mapping[str, list[Row]]) -> None:
 
 
 def _set_aside(path: Path) -> Path:
-    """Copy the damaged file with its log of writes, and take the log away: it belongs to no other file."""
+    """Copy the damaged file with its logs of writes, and take the logs away: they belong to no other file."""
     names = (f"{path.name}.damaged{number or ''}" for number in range(10_000))
     aside = next(path.with_name(name) for name in names if not path.with_name(name).exists())
     shutil.copyfile(path, aside)
-    log = path.with_name(f"{path.name}-wal")
-    if log.exists():
-        shutil.copyfile(log, aside.with_name(f"{aside.name}-wal"))
-    for ending in ("-wal", "-shm"):
+    for ending in ("-wal", "-journal"):
+        log = path.with_name(f"{path.name}{ending}")
+        if log.exists():
+            shutil.copyfile(log, aside.with_name(f"{aside.name}{ending}"))
+    for ending in ("-wal", "-shm", "-journal"):
         path.with_name(f"{path.name}{ending}").unlink(missing_ok=True)
     return aside

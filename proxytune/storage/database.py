@@ -2,7 +2,7 @@
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from proxytune.errors import StoreError
@@ -26,6 +26,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
         # Opening a pipe would wait for ever.
         raise StoreError(f"{path}: is no file, so no study's database; move it away")
     with sqlite_errors_as_store_errors(path):
+        undo_broken_write(path)
         connection = open_file(path, writable=writable)
         try:
             _check(connection, path, writable)
@@ -48,6 +49,19 @@ def open_file(path: Path, *, writable: bool) -> sqlite3.Connection:
     connection.execute("PRAGMA trusted_schema = OFF")
     prepare(connection)
     return connection
+
+
+def undo_broken_write(path: Path) -> None:
+    """Have SQLite undo what a kill broke off between two writes to a database: it does so for writers alone."""
+    if path.with_name(f"{path.name}-journal").exists() and path.is_file() and not path.is_symlink():
+        with suppress(sqlite3.Error), closing(open_file(path, writable=True)) as connection:
+            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+
+
+def is_begun(path: Path) -> bool:
+    """Whether there is a database; not where a kill came before its first table."""
+    undo_broken_write(path)
+    return path.is_file() and path.stat().st_size > 0
 
 
 def check_whole(path: Path) -> None:
@@ -192,8 +206,6 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.
 
 def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
     code = getattr(problem, "sqlite_errorcode", None) or 0
-    if code == sqlite3.SQLITE_READONLY_ROLLBACK:
-        return StoreError(f"{path}: a write to it was broken off; run the study again, which undoes that write")
     match code & 0xFF:
         case sqlite3.SQLITE_FULL:
             return StoreError(f"{path}: the disk is full; make room and run again, everything finished is kept")

@@ -3,7 +3,7 @@
 import shutil
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,20 +56,12 @@ def salvage(folder: Path) -> Salvage | None:
     refuse_links(folder)
     if not path.is_file():
         raise InputError(f"{path}: no such file; there is nothing to repair")
-    _undo_broken_write(path)
     try:
         check_whole(path)
     except StoreError:
         with sqlite_errors_as_store_errors(path):
             return _rebuild(path)
     return None
-
-
-def _undo_broken_write(path: Path) -> None:
-    """Let SQLite undo a write that was broken off: it does so only for a writer, and readers are refused till then."""
-    if path.with_name(f"{path.name}-journal").exists():
-        with suppress(sqlite3.Error), closing(open_file(path, writable=True)) as connection:
-            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
 
 
 def _rebuild(path: Path) -> Salvage:

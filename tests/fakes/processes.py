@@ -37,7 +37,7 @@ def besides_progress(told):
 def finished_episodes(folder):
     """How many episodes are in study.db."""
     try:
-        with sqlite3.connect(f"file:{folder}/study.db?mode=ro", uri=True) as plain:
+        with closing(sqlite3.connect(f"file:{folder}/study.db?mode=ro", uri=True)) as plain:
             return plain.execute("SELECT count(*) FROM episodes").fetchone()[0]
     except sqlite3.Error:
         return 0

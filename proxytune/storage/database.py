@@ -11,6 +11,8 @@ from proxytune.storage.formats import APPLICATION, FORMAT, convert, make_tables,
 from proxytune.storage.own_files import refuse_links
 
 PATIENCE_S = 30.0
+OF_SEVERAL_FILES = bytes.fromhex("d9d505f920a163d7")
+"""How a journal of SQLite ends that belongs to a write to several databases."""
 
 
 def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
@@ -52,14 +54,22 @@ def open_file(path: Path, *, writable: bool) -> sqlite3.Connection:
 
 
 def undo_broken_write(path: Path) -> None:
-    """Have SQLite undo what a kill broke off between two writes to a database: it does so for writers alone."""
-    if path.with_name(f"{path.name}-journal").exists() and path.is_file() and not path.is_symlink():
+    """Have SQLite undo what a kill broke off between two writes to a database: it does so for writers alone.
+
+    Raises:
+        StoreError: If what would be undone was not written by proxytune.
+    """
+    journal = path.with_name(f"{path.name}-journal")
+    if journal.is_file() and path.is_file():
+        if journal.read_bytes()[-8:] == OF_SEVERAL_FILES:
+            raise StoreError(f"{journal}: names another file for SQLite to delete, so no proxytune wrote it; remove it")
         with suppress(sqlite3.Error), closing(open_file(path, writable=True)) as connection:
             connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
 
 
 def is_begun(path: Path) -> bool:
     """Whether there is a database; not where a kill came before its first table."""
+    refuse_links(path.parent)
     undo_broken_write(path)
     return path.is_file() and path.stat().st_size > 0
 

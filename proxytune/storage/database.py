@@ -2,7 +2,7 @@
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from proxytune.errors import StoreError
@@ -11,6 +11,8 @@ from proxytune.storage.formats import APPLICATION, FORMAT, convert, make_tables,
 from proxytune.storage.own_files import refuse_links
 
 PATIENCE_S = 30.0
+OF_SEVERAL_FILES = bytes.fromhex("d9d505f920a163d7")
+"""How a journal of SQLite ends that belongs to a write to several databases."""
 
 
 def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
@@ -26,6 +28,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
         # Opening a pipe would wait for ever.
         raise StoreError(f"{path}: is no file, so no study's database; move it away")
     with sqlite_errors_as_store_errors(path):
+        undo_broken_write(path)
         connection = open_file(path, writable=writable)
         try:
             _check(connection, path, writable)
@@ -48,6 +51,27 @@ def open_file(path: Path, *, writable: bool) -> sqlite3.Connection:
     connection.execute("PRAGMA trusted_schema = OFF")
     prepare(connection)
     return connection
+
+
+def undo_broken_write(path: Path) -> None:
+    """Have SQLite undo what a kill broke off between two writes to a database: it does so for writers alone.
+
+    Raises:
+        StoreError: If what would be undone was not written by proxytune.
+    """
+    journal = path.with_name(f"{path.name}-journal")
+    if journal.is_file() and path.is_file():
+        if journal.read_bytes()[-8:] == OF_SEVERAL_FILES:
+            raise StoreError(f"{journal}: names another file for SQLite to delete, so no proxytune wrote it; remove it")
+        with suppress(sqlite3.Error), closing(open_file(path, writable=True)) as connection:
+            connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+
+
+def is_begun(path: Path) -> bool:
+    """Whether there is a database; not where a kill came before its first table."""
+    refuse_links(path.parent)
+    undo_broken_write(path)
+    return path.is_file() and path.stat().st_size > 0
 
 
 def check_whole(path: Path) -> None:

@@ -177,13 +177,14 @@ def _write(path: Path, rows: Mapping[str, list[Row]]) -> None:
 
 
 def _set_aside(path: Path) -> Path:
-    """Copy the damaged file with its log of writes, and take the log away: it belongs to no other file."""
+    """Copy the damaged file with its logs of writes, and take the logs away: they belong to no other file."""
     names = (f"{path.name}.damaged{number or ''}" for number in range(10_000))
     aside = next(path.with_name(name) for name in names if not path.with_name(name).exists())
     shutil.copyfile(path, aside)
-    log = path.with_name(f"{path.name}-wal")
-    if log.exists():
-        shutil.copyfile(log, aside.with_name(f"{aside.name}-wal"))
-    for ending in ("-wal", "-shm"):
+    for ending in ("-wal", "-journal"):
+        log = path.with_name(f"{path.name}{ending}")
+        if log.exists():
+            shutil.copyfile(log, aside.with_name(f"{aside.name}{ending}"))
+    for ending in ("-wal", "-shm", "-journal"):
         path.with_name(f"{path.name}{ending}").unlink(missing_ok=True)
     return aside

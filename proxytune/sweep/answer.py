@@ -2,6 +2,7 @@
 
 from proxytune.errors import InputError, SettingsError
 from proxytune.space import Theta
+from proxytune.storage.database import is_begun
 from proxytune.storage.store import FILE_NAME, Store
 from proxytune.study.result import result_of
 from proxytune.study.run import stored_run
@@ -11,7 +12,7 @@ from proxytune.study.study import Study
 
 def has_answer(study: Study) -> bool:
     """Whether a trial of the study's search by predictivity is finished; a search for PLV has its answer elsewhere."""
-    if study.settings.objective == LEARNING or not (study.settings.folder / FILE_NAME).is_file():
+    if study.settings.objective == LEARNING or not is_begun(study.settings.folder / FILE_NAME):
         return False
     with Store.read(study.settings.folder) as store:
         return any(trial.state == "finished" for trial in store.trials(study.objective.name))

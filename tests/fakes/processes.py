@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 FAKES = Path(__file__).resolve().parent
@@ -36,7 +37,7 @@ def besides_progress(told):
 def finished_episodes(folder):
     """How many episodes are in study.db."""
     try:
-        with sqlite3.connect(f"file:{folder}/study.db?mode=ro", uri=True) as plain:
+        with closing(sqlite3.connect(f"file:{folder}/study.db?mode=ro", uri=True)) as plain:
             return plain.execute("SELECT count(*) FROM episodes").fetchone()[0]
     except sqlite3.Error:
         return 0
@@ -50,7 +51,7 @@ def wait_for(folder, process, episodes):
 
 def trials(folder):
     """Every trial with its scores."""
-    with sqlite3.connect(folder / "study.db") as plain:
+    with closing(sqlite3.connect(folder / "study.db")) as plain:
         query = (
             "SELECT number, theta, state, score, measures, failed_episodes"
             " FROM trials JOIN instances ON instances.id = instance ORDER BY number"
@@ -60,6 +61,6 @@ def trials(folder):
 
 def episodes(folder):
     """Every episode with its scores, in an order of their own."""
-    with sqlite3.connect(folder / "study.db") as plain:
+    with closing(sqlite3.connect(folder / "study.db")) as plain:
         query = "SELECT theta, agent, start, seed, metrics FROM episodes JOIN instances ON instances.id = instance"
         return sorted(plain.execute(query).fetchall())

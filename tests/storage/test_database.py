@@ -1,12 +1,20 @@
 import json
+import shutil
 import sqlite3
 
 import pytest
 
 from proxytune.errors import StoreError
 from proxytune.storage.checksums import COLUMNS
-from proxytune.storage.database import connect, disconnect, open_file, sqlite_errors_as_store_errors
+from proxytune.storage.database import (
+    OF_SEVERAL_FILES,
+    connect,
+    disconnect,
+    open_file,
+    sqlite_errors_as_store_errors,
+)
 from proxytune.storage.formats import FORMAT, TRIALS_3
+from proxytune.storage.repair import salvage
 
 
 def made(path):
@@ -329,3 +337,46 @@ def test_a_stranger_s_schema_may_not_call_our_functions(tmp_path):
     with pytest.raises(sqlite3.OperationalError, match="unsafe use of row_checksum"):
         connection.execute("SELECT * FROM evil").fetchall()
     connection.close()
+
+
+@pytest.fixture
+def broken_off(tmp_path):
+    """A database with 3000 instances, killed in the middle of deleting them all."""
+    path, killed = filled(tmp_path / "study.db"), tmp_path / "killed" / "study.db"
+    killed.parent.mkdir()
+    writer = sqlite3.connect(path, isolation_level=None)
+    writer.executescript("PRAGMA cache_size = 1; BEGIN; DELETE FROM instances;")
+    for ending in ("", "-journal"):
+        shutil.copy(f"{path}{ending}", f"{killed}{ending}")
+    writer.close()
+    return killed
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_a_write_that_a_kill_broke_off_is_undone_also_by_who_only_looks(broken_off, writable):
+    connection = connect(broken_off, writable=writable)
+    assert connection.execute("SELECT count(*) FROM instances").fetchone() == (3000,)
+    connection.close()
+    assert salvage(broken_off.parent) is None, "nothing is damaged"
+
+
+def test_a_broken_off_write_is_no_damage_to_a_repair(broken_off):
+    assert salvage(broken_off.parent) is None
+    connection = connect(broken_off, writable=False)
+    assert connection.execute("SELECT count(*) FROM instances").fetchone() == (3000,)
+    connection.close()
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_a_journal_that_would_have_another_file_deleted_is_refused(broken_off, tmp_path, writable):
+    """SQLite takes that for the journal of a write to several databases, and deletes it once all is undone."""
+    victim = tmp_path / "precious"
+    victim.write_text("mine")
+    name = str(victim).encode()
+    numbers = [(1 << 30) // 4096 + 1, len(name), sum(name)]
+    place, length, total = (number.to_bytes(4, "big") for number in numbers)
+    with (broken_off.parent / "study.db-journal").open("ab") as journal:
+        journal.write(place + name + length + total + OF_SEVERAL_FILES)
+    with pytest.raises(StoreError, match="study.db-journal: names another file"):
+        connect(broken_off, writable=writable)
+    assert victim.read_text() == "mine"

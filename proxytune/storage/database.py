@@ -11,6 +11,8 @@ from proxytune.storage.formats import APPLICATION, FORMAT, convert, make_tables,
 from proxytune.storage.own_files import refuse_links
 
 PATIENCE_S = 30.0
+WRITING = ("journal_mode = WAL", "synchronous = NORMAL", "wal_autocheckpoint = 256")
+"""The write-ahead log stays at about 1 MiB: a disk may be small."""
 OF_SEVERAL_FILES = bytes.fromhex("d9d505f920a163d7")
 """How a journal of SQLite ends that belongs to a write to several databases."""
 
@@ -36,8 +38,8 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
             check_tables(connection, path)
             _check_rows(connection, path)
             if writable:
-                connection.execute("PRAGMA journal_mode = WAL")
-                connection.execute("PRAGMA synchronous = NORMAL")
+                for setting in WRITING:
+                    connection.execute(f"PRAGMA {setting}")
         except BaseException:
             connection.close()
             raise

@@ -11,7 +11,7 @@ from proxytune.storage.formats import APPLICATION, FORMAT, convert, make_tables,
 from proxytune.storage.own_files import refuse_links
 
 PATIENCE_S = 30.0
-WRITING = ("journal_mode = WAL", "synchronous = NORMAL", "wal_autocheckpoint = 256")
+WRITING = "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 256;"
 """The write-ahead log stays at about 1 MiB: a disk may be small."""
 OF_SEVERAL_FILES = bytes.fromhex("d9d505f920a163d7")
 """How a journal of SQLite ends that belongs to a write to several databases."""
@@ -24,11 +24,10 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
         StoreError: If it is damaged, is something else, comes from a newer proxytune, or cannot be written.
     """
     refuse_links(path.parent)
-    if path.is_dir():
-        raise StoreError(f"{path}: is a folder, not a study's database; move it away")
     if path.exists() and not path.is_file():
         # Opening a pipe would wait for ever.
-        raise StoreError(f"{path}: is no file, so no study's database; move it away")
+        what = "a folder" if path.is_dir() else "no file"
+        raise StoreError(f"{path}: is {what}, so no study's database; move it away")
     with sqlite_errors_as_store_errors(path):
         undo_broken_write(path)
         connection = open_file(path, writable=writable)
@@ -38,8 +37,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
             check_tables(connection, path)
             _check_rows(connection, path)
             if writable:
-                for setting in WRITING:
-                    connection.execute(f"PRAGMA {setting}")
+                connection.executescript(WRITING)
         except BaseException:
             connection.close()
             raise

@@ -103,7 +103,7 @@ def test_a_text_file_in_its_place_is_told(half, capsys):
 def test_a_folder_in_its_place_is_told(half, capsys):
     (half / "study.db").rename(half.parent / "aside")
     (half / "study.db").mkdir()
-    told_by_every_command(half, capsys, "is a folder, not a study's database; move it away")
+    told_by_every_command(half, capsys, "is a folder, so no study's database; move it away")
 
 
 CUTS = [1, 4096, -4096, -1]

@@ -309,7 +309,7 @@ def test_a_file_without_tables_is_refused_and_not_begun_anew(tmp_path):
 
 def test_a_folder_is_refused(tmp_path):
     (tmp_path / "study.db").mkdir()
-    with pytest.raises(StoreError, match=r"study\.db: is a folder, not a study's database; move it away"):
+    with pytest.raises(StoreError, match=r"study\.db: is a folder, so no study's database; move it away"):
         connect(tmp_path / "study.db", writable=True)
 
 

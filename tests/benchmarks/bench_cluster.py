@@ -119,6 +119,8 @@ def main() -> None:
     episodes = episodes_of(settings, arguments.episodes)
     times = [run_episode(family, episode).seconds for episode in episodes]
     print(f"{len(episodes)} episodes in this process: {sum(times):.1f} s, {len(times) / sum(times):.2f} a second")
+    pair = seconds_of(partial(run_episode, family), episodes, 2)
+    print(f"2 processes of this machine, without a cluster: {len(episodes) / pair:.2f} a second, their start included")
     each_s = 0.0
     for workers in map(int, arguments.workers.split(",")):
         busy, each_s = measured(family, episodes, workers)

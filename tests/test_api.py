@@ -101,6 +101,7 @@ def test_the_help_of_the_commands_loads_no_library():
     assert loaded(f"{code}\nexcept SystemExit: pass") == set()
 
 
+@pytest.mark.slow
 def test_drawing_convergence_loads_no_simulator_and_no_search():
     drawn = loaded("from proxytune.report.study.convergence import convergence")
     assert drawn & {"pybullet", "sklearn", "skopt", "torch"} == set()

@@ -133,6 +133,7 @@ def test_help_says_every_exit_status(status, capsys):
     assert re.search(rf"\b{status}\b", capsys.readouterr().out.partition("exit status:")[2])
 
 
+@pytest.mark.slow
 def test_no_color_leaves_tables_without_colours():
     """On a terminal of many colours; bold is no colour."""
     import pty

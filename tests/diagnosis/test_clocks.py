@@ -160,6 +160,7 @@ def test_another_log_of_the_same_robot_is_put_on_the_same_latency():
     assert not read_clocks(one, ROBOT, read_clocks(one, ROBOT)).differ
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["drive_husky", "gym_duckietown", "mrclam6_robot1", "mrclam6_robot4"])
 def test_measured_logs_are_on_one_clock(name):
     if not (LOGS / name).is_dir():

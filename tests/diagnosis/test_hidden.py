@@ -231,6 +231,7 @@ def test_a_heading_offset_turns_the_heading_and_leaves_the_place():
     np.testing.assert_allclose(there, (1.0, 2.0, 0.5 + np.pi / 30), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_what_is_hidden_moves_the_robot_by_more_than_a_millimetre_in_two_seconds(case):
     short = {"episodes": 6, "seconds": 40.0, "noiseless": True}
@@ -373,6 +374,7 @@ def test_the_nominal_bullet_plant_and_this_robot_agree_within_a_centimetre_in_tw
     assert np.sqrt(np.mean(np.sum(apart[..., :2] ** 2, axis=-1))) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BULLET[1:], ids=lambda case: case.name)
 def test_changed_physics_moves_the_bullet_robot_by_more_than_2_millimetres_in_two_seconds(case):
     apart = bullet_motion(case) - bullet_motion(replace(case, changes={}))

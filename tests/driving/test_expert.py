@@ -70,6 +70,7 @@ def pushes(seed, steps=80, disturbance=DISTURBANCE):
     return driven - np.array(memory.commands)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("theta", [NOMINAL, SHIFTED], ids=("nominal", "shifted"))
 def test_undisturbed_it_keeps_both_wheels_in_the_lane_from_all_ten_starts(theta):
     scores = [score(lesson(start, theta)) for start in range(len(ROAD.starts))]

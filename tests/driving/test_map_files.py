@@ -70,6 +70,7 @@ def test_an_unknown_map_is_told_with_the_nearest():
         shipped_map("horse_shoe")
 
 
+@pytest.mark.slow
 def test_a_map_beside_the_study_is_driven(tmp_path):
     written(tmp_path, HORSESHOE)
     mine, theirs = family(tmp_path), family(tmp_path, "horseshoe")

@@ -195,6 +195,7 @@ class Dark:
         return np.zeros((len(poses), 1, 1, 3), dtype=np.uint8)
 
 
+@pytest.mark.slow
 @every_shipped
 @both_lanes
 @pytest.mark.parametrize("plant", ["planar", "bullet"])

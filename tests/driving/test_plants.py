@@ -92,6 +92,7 @@ def test_bullet_and_planar_agree_within_2_cm_and_3_degrees_after_5_seconds_of_mi
     assert abs(np.degrees(apart[2])) < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "theta"), list(values_to_agree_on()))
 def test_bullet_and_planar_agree_with_every_effect_on_how_the_robot_moves(name, theta):
     """Within 2 cm and 3°; with backlash within 7 cm and 4°.

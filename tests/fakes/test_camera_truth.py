@@ -106,6 +106,7 @@ def test_rays_are_those_of_the_figures_definitions(roll, pitch, yaw, k1, right, 
     assert np.allclose(rays(sight, *PLACES), up * (1.0, 1.0, -1.0), atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changed", OTHERS, ids=lambda changed: "+".join(changed) or "nominal")
 def test_pictures_are_the_ground_plane_cameras_with_the_same_figures(changed):
     """Mean difference 0.7 to 1.4 grey levels, from the nominal camera's picture 5 to 18."""

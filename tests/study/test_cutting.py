@@ -101,6 +101,7 @@ def test_two_jobs_cut_off_the_same_trials_at_the_same_agents_as_one(cutting, eng
         assert found.spared[0] == BUDGET * ALL - spent.episodes, "what was run in vain was not spared"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_interrupted_anywhere_it_goes_on_to_the_same_trials(cutting, done, jobs):
     folder = cutting("stopped", jobs=str(jobs))

@@ -187,6 +187,7 @@ def test_before_the_first_finished_trial_everything_may_change(make_study):
     assert len(run(folder)[1]) == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["outcomes", "gp", "composite", "random", "sobol", "tpe"])
 def test_with_every_engine_an_interrupted_study_goes_on_to_the_same_trials(make_study, engine):
     if engine == "tpe":

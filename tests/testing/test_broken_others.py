@@ -159,6 +159,7 @@ def test_a_family_that_keeps_every_promise_passes_also_with_a_parameter_that_is_
     assert check_family(Altered(idle="trim"), agents=["agent0"], without_effect=["trim"]) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", FAMILIES)
 def test_a_family_that_breaks_a_promise_is_refused(case):
     refused(check_family, FAMILIES[case][0], FAMILIES[case][1], agents=["agent0"])
@@ -264,6 +265,7 @@ def test_a_measure_that_breaks_a_promise_is_refused(case):
     refused(check_measure, measure(MEASURES[case][0]), MEASURES[case][1], perfect=0.0)
 
 
+@pytest.mark.slow
 def test_the_checks_need_no_test_runner():
     code = "import sys, proxytune.testing; sys.exit(bool({'pytest', 'hypothesis'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -30,6 +30,7 @@ SINGLE = {
 """A planted value of each, and how far from it the fit may end."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SINGLE)
 def test_a_planted_figure_comes_back(name):
     truth, most = SINGLE[name]

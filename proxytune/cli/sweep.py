@@ -110,7 +110,7 @@ def _answer(curves: Sequence[Curve], spent: Spent, figures: Sequence[Path], file
 def _held(word: str, base: Theta) -> str:
     """What the other parameters are held at."""
     if word == "best":
-        values = held_values(base).replace("held at", "held at the study's best θ:")
+        values = held_values(base, whose="the study's best θ: ")
         return f"{values}; --at nominal holds the robot's own"
     return "the others are nominal" if word == "nominal" else held_values(base)
 

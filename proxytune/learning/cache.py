@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.drafts import draft_of
 from proxytune.errors import StoreError
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -66,19 +67,15 @@ def _text(facts: Mapping[str, Any]) -> str:
 
 
 def _write(path: Path, arrays: Arrays) -> None:
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with draft.open("wb") as file:
+        with draft_of(path) as draft, draft.open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(path)
     except OSError as problem:
         raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
     finally:
-        for left in path.parent.glob(f"{draft.stem}.*"):
-            if left == draft or not _is_alive(int(left.suffix[1:])):
+        for left in path.parent.glob(f".{path.name}.*"):
+            if not _is_alive(int(left.suffix[1:])):
                 with contextlib.suppress(OSError):
                     left.unlink()
 

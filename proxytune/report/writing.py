@@ -1,7 +1,6 @@
 """Writing a file whole or not at all."""
 
 import contextlib
-import os
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -18,6 +17,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 from PIL import Image
 
+from proxytune.drafts import draft_of
 from proxytune.errors import RunError
 
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -118,31 +118,9 @@ def write_whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
     Raises:
         RunError: If it cannot be written.
     """
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _make_anew(draft)
-        write(draft)
-        _to_disk(draft)
-        draft.replace(path)
-    except BaseException as problem:
-        with contextlib.suppress(OSError):
-            draft.unlink()
-        if not isinstance(problem, OSError):
-            raise
+        with draft_of(path) as draft:
+            write(draft)
+    except OSError as problem:
         raise RunError(f"{path}: {what}cannot be written ({problem.strerror}); fix that and run again") from None
-
-
-def _make_anew(draft: Path) -> None:
-    """Make the file: what lies there may be left of a killed process, or a link that leads elsewhere."""
-    draft.unlink(missing_ok=True)
-    os.close(os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
-
-
-def _to_disk(draft: Path) -> None:
-    """Wait until the disk has the file: after a power cut a name may else stand for nothing."""
-    descriptor = os.open(draft, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -1,14 +1,13 @@
 """Score tables as CSV files."""
 
-import contextlib
 import csv
 import io
-import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from proxytune.drafts import draft_of
 from proxytune.errors import ScoresError
 from proxytune.scores.cells import LABELS, Cells, Columns, read_cells
 from proxytune.scores.table import ScoreTable
@@ -123,18 +122,10 @@ def write_scores(table: ScoreTable, path: Path) -> None:
         for column, episode in enumerate(table.episodes):
             if table.driven[row, column]:
                 writer.writerow([agent, episode, *(repr(float(value)) for value in table.values[row, column])])
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        with draft.open("w", encoding="utf-8", newline="") as file:
-            file.write(text.getvalue())
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(path)
-    except BaseException as problem:
-        with contextlib.suppress(OSError):
-            draft.unlink()
-        if not isinstance(problem, OSError):
-            raise
+        with draft_of(path) as draft:
+            draft.write_text(text.getvalue(), encoding="utf-8", newline="")
+    except OSError as problem:
         raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None
 
 

@@ -2,7 +2,7 @@
 
 FLOORS = (
     {"errors"},
-    {"settings", "seeds", "meaning", "versions", "extensions", "space", "shipped", "scores", "logs"},
+    {"settings", "drafts", "seeds", "meaning", "versions", "extensions", "space", "shipped", "scores", "logs"},
     {"usefulness", "effects", "importing"},
     {"domain"},
     {"driving"},

@@ -65,10 +65,10 @@ def held_alike(curves: Sequence[Curve]) -> list[list[Curve]]:
     return [list(members) for _, members in groupby(sorted(curves, key=_base), key=_base)]
 
 
-def held_values(base: Theta) -> str:
-    """What the others are held at, in words."""
+def held_values(base: Theta, whose: str = "") -> str:
+    """What the others are held at, in words, and whose values these are."""
     values = ", ".join(f"{name}={value:g}" for name, value in sorted(base.items()))
-    return f"the others are held at {values}" if values else "the others are nominal"
+    return f"the others are held at {whose}{values}" if values else "the others are nominal"
 
 
 def _together(alike: Sequence[Curve], truth: Theta | None) -> dict[str, Figure]:

@@ -1,6 +1,6 @@
 """`study` with objective = "plv": the proxy whose samples save most on the target."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 from proxytune.cli.terminal.answer import Answer
@@ -15,25 +15,30 @@ from proxytune.running.progress import Bars
 from proxytune.search.engines.registry import make_proposer
 from proxytune.storage.lock import locked
 from proxytune.storage.store import Store
+from proxytune.study.result import StudyResult
 from proxytune.study.settings import LEARNING
 from proxytune.study.study import Study
 from proxytune.teaching.box import search_space
-from proxytune.teaching.experiment import count_points, load_setup
+from proxytune.teaching.examining import count_examinations
+from proxytune.teaching.experiment import load_setup
 from proxytune.teaching.search import PlvSearch
 
 
-def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], Mapping[str, tuple[float, float]]]) -> Answer:
+def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]) -> Answer:
     """Run what is left of a search by PLV; first narrow the box by PRPV where the study asks for it."""
     settings = study.settings
     setup = load_setup(settings)
     widths = setup.settings.widths
     search_space(settings, widths, {})
-    space = search_space(settings, widths, by_prpv() if setup.settings.narrow else {})
-    points = count_points(setup, setup.settings.budget)
+    predictive = by_prpv() if setup.settings.narrow else None
+    space = search_space(settings, widths, predictive.knowledge.as_good[1] if predictive else {})
+    # The learner without a proxy is taught twice, and at most four finalists are.
+    points = count_examinations(setup.settings, setup.settings.budget + 6)
     watching = renewed_page(settings, LEARNING, Bars(points, "points of learning curves"))
     with locked(folder), Store.open(folder) as store, watching as bars:
         search = PlvSearch(settings, setup, store, space, bars)
-        result = search.run(make_proposer(study.engine, settings.initial))
+        chosen = predictive.best.trial.theta if predictive else None
+        result = search.run(make_proposer(study.engine, settings.initial), chosen)
     figure = folder / "figures" / "plv.png"
     save(plv_figure(result), figure)
     page, foot = folder / "report.html", foot_of(study_command(settings), study_settings(settings))

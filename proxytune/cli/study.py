@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     study = with_spending(open_study(folder), budget=arguments.budget, jobs=arguments.jobs)
     again = arguments.retry_failed
     if study.settings.objective == LEARNING:
-        return search_by_plv(study, folder, lambda: _search(study, again).result.knowledge.as_good[1])
+        return search_by_plv(study, folder, lambda: _search(study, again).result)
     report = _search(study, again)
     figures, page = report.write(folder)
     costs = _costs(report.result, report.spent, time.perf_counter() - begun)

@@ -24,7 +24,8 @@ from proxytune.storage.store import Store
 from proxytune.study.provenance import adopt
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
-from proxytune.teaching.experiment import count_points, load_setup, run_experiment
+from proxytune.teaching.examining import count_examinations
+from proxytune.teaching.experiment import load_setup, run_experiment
 from proxytune.teaching.predictivity import predictivity
 
 
@@ -45,10 +46,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     proxies = setup.settings.proxies
     with locked(folder), Store.open(folder) as store:
         adopt(study, store)
-        with Bars(count_points(setup, len(proxies)), "points of learning curves") as bars:
+        with Bars(count_examinations(setup.settings, len(proxies) + 1), "points of learning curves") as bars:
             experiment = run_experiment(study.settings, setup, bars)
         agents = len(study.settings.agents) * study.settings.starts
-        with Bars(agents * sum(proxy.fixed for proxy in proxies.values())) as bars:
+        with Bars(agents * len(proxies)) as bars:
             prpv = predictivity(StudyRun(study, store, bars), proxies)
     figure = folder / "figures" / "teach.png"
     save(teach_figure(experiment), figure)

@@ -73,7 +73,7 @@ def collect_samples(
         if found < LEAST_SHARE * asked and (lessons >= TRIED or found >= count):
             raise LearnerError(
                 f"the expert cannot drive here: it kept to the road for {found / asked:.0%} of {lessons} lessons at "
-                f"{_describe(where)}; move θ closer to where the robot can be driven"
+                f"{describe(where)}; move θ closer to where the robot can be driven"
             )
     return Demonstration(np.concatenate(observations)[:count], np.concatenate(commands)[:count])
 
@@ -84,7 +84,8 @@ def _lesson(classroom: Classroom, where: Distribution, seed: int, number: int) -
     return make_episode(where.draw(drawn.theta), agent=EXPERT, start=start, seed=drawn.episode)
 
 
-def _describe(where: Distribution) -> str:
+def describe(where: Distribution) -> str:
+    """p(θ) in words."""
     spans = [
         f"{n} = {low:g}" if low == high else f"{n} in [{low:g}, {high:g}]" for n, (low, high) in where.bounds.items()
     ]

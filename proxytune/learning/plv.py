@@ -1,50 +1,16 @@
 """Proxy learning value: how many target samples a proxy saves (Courchesne et al. 2021, equations 5 and 6)."""
 
-import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.errors import InputError
+from proxytune.learning.curves import Array, Curve
+from proxytune.learning.posterior import DRAWS, Draws, crossing, draw_curves
 
-Array = NDArray[np.float64]
-RESAMPLES = 2000
-LEVELS = (2.5, 97.5)
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A learning curve: scores in the target by number of target samples.
-
-    Attributes:
-        counts: Numbers of target samples, rising, the first 0.
-        scores: Scores (seeds, counts); a column is NaN where there is nothing that could drive.
-
-    Raises:
-        InputError: If the counts do not rise from 0, or do not match the scores.
-    """
-
-    counts: tuple[int, ...]
-    scores: Array
-
-    def __post_init__(self) -> None:
-        if not self.counts or self.counts[0] != 0:
-            raise InputError("a learning curve starts at 0 target samples; add 0 to the grid")
-        if any(later <= earlier for earlier, later in itertools.pairwise(self.counts)):
-            raise InputError(f"the grid of target samples must rise, got {list(self.counts)}")
-        if self.scores.ndim != 2 or self.scores.shape[1] != len(self.counts) or not len(self.scores):
-            raise InputError(f"scores have shape {self.scores.shape}; give (seeds, {len(self.counts)})")
-
-    @property
-    def mean(self) -> Array:
-        """Mean over seeds at each count (counts,)."""
-        return np.asarray(self.scores.mean(axis=0))
-
-    def resampled(self, rows: NDArray[np.int64]) -> "Curve":
-        """The curve of these seeds, some of them more than once."""
-        return Curve(self.counts, self.scores[rows])
+LEVELS = (0.025, 0.975)
+Samples = TypeVar("Samples", float, Array)
 
 
 @dataclass(frozen=True)
@@ -63,27 +29,6 @@ class Convergence:
     def threshold(self) -> float:
         """The lowest mean score that counts."""
         return self.level - self.tolerance
-
-
-def converged_level(curve: Curve) -> float:
-    """What a learner without a proxy converges to: its mean score at the largest count."""
-    return float(curve.mean[-1])
-
-
-def settled(curve: Curve, tolerance: float) -> bool:
-    """Whether the mean score gains no more than the tolerance over the last doubling of samples."""
-    half = [place for place, count in enumerate(curve.counts) if 2 * count <= curve.counts[-1]]
-    return bool(curve.mean[-1] - curve.mean[half[-1]] <= tolerance)
-
-
-def samples_needed(curve: Curve, when: Convergence) -> int | None:
-    """η: the smallest count of the grid from which on the mean score stays converged; None where it never does.
-
-    Nothing is interpolated or extrapolated: the answer is one of the counts that were tried.
-    """
-    below = ~(curve.mean >= when.threshold)
-    first = int(np.flatnonzero(below)[-1]) + 1 if below.any() else 0
-    return curve.counts[first] if first < len(curve.counts) else None
 
 
 @dataclass(frozen=True)
@@ -114,7 +59,32 @@ class Teaching:
     reduction: Estimate
 
 
-def plv(*, without: float, with_proxy: float) -> float:
+@dataclass(frozen=True)
+class SampleNeeds:
+    """How many target samples each learner needs, draw by draw from the posterior of the learning curves.
+
+    Attributes:
+        curves: The scores that the examinations gave, by name.
+        draws: The mean curves.
+        when: When a learner counts as converged; its level is the posterior's mean where none was stated.
+        settled: Whether the learner without a proxy converges: over the last doubling of samples it gains no more than
+            the tolerance.
+        needed: η by name (draws,); infinite where it is not reached up to the largest count.
+    """
+
+    curves: Mapping[str, Curve]
+    draws: Draws
+    when: Convergence
+    settled: bool
+    needed: Mapping[str, Array]
+
+    @property
+    def last(self) -> float:
+        """The largest number of target samples."""
+        return float(self.draws.counts[-1])
+
+
+def plv(*, without: Samples, with_proxy: Samples) -> Samples:
     """PLV (eq. 5): target samples needed without the proxy, less those needed with it."""
     return without - with_proxy  # eq. (5)
 
@@ -137,67 +107,81 @@ def general_plv(
     return cost_on * (without[0] - with_proxy[0]) + cost_off * (without[1] - with_proxy[1])  # eq. (6)
 
 
-def teaching(*, without: Curve, with_proxy: Curve, when: Convergence, seed: int = 0) -> Teaching:
-    """What a proxy is worth as a teacher, with intervals from resampling the seeds of both curves together.
+def sample_needs(
+    curves: Mapping[str, Curve],
+    *,
+    none: str,
+    best_score: float,
+    tolerance: float,
+    level: float | None = None,
+    draws: int = DRAWS,
+) -> SampleNeeds:
+    """How many target samples each learner needs, from the posterior of all learning curves together.
 
-    The two curves' rows belong to the same seeds, and so to the same target samples. A resample in which convergence
-    is not reached counts as beyond the grid: an interval's end that lies there is None.
-
-    Raises:
-        InputError: If the two are not on the same grid and seeds.
+    Args:
+        curves: Scores by name of the learning curve.
+        none: The name of the learner without a proxy.
+        best_score: The score of a flawless examination; none lies beyond it, nor below its negative.
+        tolerance: How far below the level still counts as converged.
+        level: The score that counts as converged; None for what the learner without a proxy comes to.
+        draws: How many draws.
     """
-    if without.counts != with_proxy.counts or without.scores.shape != with_proxy.scores.shape:
-        raise InputError("the two learning curves have other counts or seeds; teach both on one grid and seeds")
-    rows = np.random.default_rng(seed).integers(0, len(without.scores), (RESAMPLES, len(without.scores)))
-    pairs = [
-        (_samples_or_infinity(without.resampled(row), when), _samples_or_infinity(with_proxy.resampled(row), when))
-        for row in rows
-    ]
-    base, helped = np.array(pairs).T
-    first, second = _samples_or_infinity(without, when), _samples_or_infinity(with_proxy, when)
-    return Teaching(
-        without=_estimate(first, base),
-        needed=_estimate(second, helped),
-        plv=_estimate(_difference(first, second), _difference(base, helped)),
-        factor=_estimate(_ratio(first, second), _ratio(base, helped)),
-        reduction=_estimate(_share(first, second), _share(base, helped)),
+    drawn = draw_curves(curves, (-best_score, best_score), draws)
+    alone = drawn.scores[none]
+    levels = alone[:, -1] if level is None else np.full(len(alone), level)
+    half = int(np.flatnonzero(2.0 * drawn.counts <= drawn.counts[-1])[-1])
+    settled = bool(alone[:, -1].mean() - alone[:, half].mean() <= tolerance)
+    needed = {name: crossing(drawn.counts, scores, levels - tolerance) for name, scores in drawn.scores.items()}
+    return SampleNeeds(
+        curves, drawn, Convergence(float(levels.mean()) if level is None else level, tolerance), settled, needed
     )
 
 
-def _samples_or_infinity(curve: Curve, when: Convergence) -> float:
-    """η, infinite where it is not reached."""
-    found = samples_needed(curve, when)
-    return np.inf if found is None else float(found)
+def teaching(needs: SampleNeeds, *, none: str, proxy: str) -> Teaching:
+    """What a proxy is worth as a teacher, with 95 % intervals.
+
+    Where convergence is not reached, η is known to lie beyond the largest count: ends that this leaves open are None.
+    """
+    without, needed, last = needs.needed[none], needs.needed[proxy], needs.last
+    return Teaching(
+        without=_estimate(lambda alone, taught: alone, without, needed, last),
+        needed=_estimate(lambda alone, taught: -taught, without, needed, last, sign=-1.0),
+        plv=_estimate(lambda alone, taught: plv(without=alone, with_proxy=taught), without, needed, last),
+        factor=_estimate(lambda alone, taught: alone / taught, without, needed, last),
+        reduction=_estimate(lambda alone, taught: (alone - taught) / alone, without, needed, last),
+    )
 
 
-def _difference(without: Array | float, needed: Array | float) -> Array:
-    """η(∅) − η(S); where neither is reached nothing is known."""
-    with np.errstate(invalid="ignore"):
-        return np.subtract(without, needed)
+def difference(needs: SampleNeeds, *, more: str, less: str) -> Estimate:
+    """How many more target samples one learner needs than another, with its 95 % interval."""
+    return _estimate(lambda one, other: one - other, needs.needed[more], needs.needed[less], needs.last)
 
 
-def _ratio(without: Array | float, needed: Array | float) -> Array:
-    """η(∅) / η(S); where η(S) is not reached it lies below anything known."""
+def mean_score(needs: SampleNeeds, name: str, place: int) -> Estimate:
+    """The mean score of a learner at a place of the drawn curves; None before anything can have been learnt."""
+    scores = needs.draws.scores[name][:, place]
+    return Estimate(*(_finite(float(end)) for end in (scores.mean(), *np.quantile(scores, LEVELS))))
+
+
+def _estimate(
+    figure: Callable[[Array, Array], Array], without: Array, needed: Array, last: float, sign: float = 1.0
+) -> Estimate:
+    """A figure that rises with η(∅) and falls with η(S): its median, and the ends that unreached η leave possible."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(np.isinf(needed), -np.inf, np.divide(without, needed))
+        reached = np.isfinite(needed)
+        least = np.where(reached, figure(np.minimum(without, last), needed), -np.inf)
+        most = figure(without, np.minimum(needed, last))
+        middle = np.where(reached, figure(without, needed), -np.inf)
+    ends = (_quantile(middle, 0.5), _quantile(least, LEVELS[0]), _quantile(most, LEVELS[1]))
+    value, low, high = (_finite(sign * end) for end in ends)
+    return Estimate(value, low, high) if sign > 0 else Estimate(value, high, low)
 
 
-def _share(without: Array | float, needed: Array | float) -> Array:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.divide(np.subtract(without, needed), without)
-
-
-def _estimate(value: Array | float, resampled: Array) -> Estimate:
-    """The figure and its interval; ends that are not finite are None."""
-    known: Sequence[float] = np.sort(resampled[~np.isnan(resampled)]).tolist()
-    ends = [_quantile(known, level) for level in LEVELS]
-    return Estimate(_finite(float(value)), *(_finite(end) for end in ends))
-
-
-def _quantile(ordered: Sequence[float], level: float) -> float:
-    """The value at a level, without interpolating towards infinity."""
-    return ordered[min(len(ordered) - 1, round(level / 100.0 * (len(ordered) - 1)))] if ordered else np.nan
+def _quantile(values: Array, level: float) -> float:
+    """The value at a level, without interpolating towards infinity; NaN where nothing is known."""
+    known = np.sort(values[~np.isnan(values)])
+    return float(known[round(level * (len(known) - 1))]) if len(known) else np.nan
 
 
 def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    return float(value) if np.isfinite(value) else None

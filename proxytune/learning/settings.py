@@ -7,12 +7,13 @@ from pathlib import Path
 
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.published import Published, read_published
+from proxytune.learning.spending import FIRST_COUNTS, FIRST_REPETITIONS
 from proxytune.settings import Section
 
 DEFAULT_LEARNER = "proxytune.learning.cloning:BehaviourCloning"
 KEYS = (
     "target", "learner", "proxy_samples", "target_samples", "seeds", "lesson_s",
-    "level", "tolerance", "budget", "narrow", "width", "proxies", "published", "published_in",
+    "level", "tolerance", "examinations", "budget", "narrow", "width", "proxies", "published", "published_in",
 )  # fmt: skip
 NONE = "none"
 """The name of the learner without a proxy, which no proxy may have."""
@@ -27,7 +28,7 @@ class TeachingSettings:
         learner: Who learns, as "module:attribute".
         proxy_samples: Samples that a proxy teaches.
         target_samples: The grid of numbers of target samples, rising from 0.
-        seeds: How many times the whole is repeated.
+        seeds: How many times the whole is repeated; the most there may be of it where examinations are chosen.
         lesson_s: How long the expert drives from one start [s].
         level: The score that counts as converged; None for what a learner without a proxy converges to.
         tolerance: How far below it still counts.
@@ -37,6 +38,8 @@ class TeachingSettings:
         proxies: What `teach` compares, by name: p(θ) of each.
         published: What others published of proxies of these names, or of learning without one.
         published_in: Where, and what was different there.
+        examinations: How many a learning curve takes, on average over all curves, where those that tell most are
+            chosen; None where every number of the grid is examined in every repetition.
     """
 
     target: Path
@@ -53,6 +56,7 @@ class TeachingSettings:
     proxies: Mapping[str, Distribution]
     published: Mapping[str, Published] = field(default_factory=dict)
     published_in: str = ""
+    examinations: int | None = None
 
 
 def read_teaching(section: Section) -> TeachingSettings | None:
@@ -77,6 +81,7 @@ def read_teaching(section: Section) -> TeachingSettings | None:
         lesson_s=section.number("lesson_s", 5.0, low=0.1, high=3600.0),
         level=section.number("level") if "level" in section.values else None,
         tolerance=section.number("tolerance", 5.0, low=0.0),
+        examinations=_examinations(section),
         budget=section.whole("budget", 12, low=1, high=100_000),
         narrow=_flag(section, "narrow"),
         widths=_widths(section.section("width")),
@@ -98,6 +103,13 @@ def _grid(section: Section) -> tuple[int, ...]:
     if len(counts) < 2 or any(later <= earlier for earlier, later in itertools.pairwise(counts)):
         raise section.error(key, f"must rise, over two numbers at least, got {counts}")
     return tuple(counts)
+
+
+def _examinations(section: Section) -> int | None:
+    """How many examinations a curve takes; no fewer than are made before any is chosen."""
+    if "examinations" not in section.values:
+        return None
+    return section.whole("examinations", low=FIRST_COUNTS * FIRST_REPETITIONS, high=1_000_000)
 
 
 def _flag(section: Section, key: str) -> bool:

@@ -12,8 +12,8 @@ def digits(ends: Ends) -> int:
 
 
 def fixed(value: float, decimals: int) -> str:
-    """A number with so many decimals; one that rounds to zero has no sign."""
-    text = f"{value:.{decimals}f}"
+    """A number with so many decimals, to tens where these are −1; one that rounds to zero has no sign."""
+    text = f"{round(value, decimals):.{max(0, decimals)}f}"
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
 
 

@@ -2,26 +2,26 @@
 
 import hashlib
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
-
-import numpy as np
 
 from proxytune.domain import Classroom
 from proxytune.errors import InputError
 from proxytune.extensions import make
 from proxytune.learning.cache import Cache
+from proxytune.learning.curves import Curve
 from proxytune.learning.learner import Learner
 from proxytune.learning.lessons import Distribution
-from proxytune.learning.plv import Convergence, Curve, Teaching, converged_level, settled, teaching
+from proxytune.learning.plv import Convergence, Estimate, SampleNeeds, Teaching, mean_score, teaching
 from proxytune.learning.settings import NONE, TeachingSettings
 from proxytune.meaning import meaning_of
 from proxytune.running.progress import Watcher
 from proxytune.study.family import check_bounds, load_family
 from proxytune.study.settings import StudySettings
-from proxytune.teaching.points import Point, TeachingSetup, prepare_shared, score_points
+from proxytune.teaching.examining import curves_of, examine_curves, needs_of
+from proxytune.teaching.points import TeachingSetup
 
 CACHE = "teaching"
 """The folder, within a study's, where all that was taught is kept."""
@@ -35,12 +35,14 @@ class TeacherResult:
         name: What it is called.
         proxy: Its p(θ).
         curve: Scores in the target after so many target samples, having learnt from the proxy first.
+        zero_shot: Mean score before any target sample.
         worth: PLV and what it is made of; None where the learner without a proxy has not converged.
     """
 
     name: str
     proxy: Distribution
     curve: Curve
+    zero_shot: Estimate
     worth: Teaching | None
 
 
@@ -51,18 +53,29 @@ class Experiment:
     Attributes:
         settings: Of the study.
         best_score: The score of a flawless examination.
-        without: The learning curve without a proxy.
-        when: When a learner counts as converged.
-        settled: Whether it has, without a proxy: over the last doubling of samples it gains no more than the tolerance.
+        needs: How many target samples each learner needs, from the posterior of all learning curves.
         teachers: One per proxy, in the order of study.toml.
     """
 
     settings: StudySettings
     best_score: float
-    without: Curve
-    when: Convergence
-    settled: bool
+    needs: SampleNeeds
     teachers: tuple[TeacherResult, ...]
+
+    @property
+    def without(self) -> Curve:
+        """The learning curve without a proxy."""
+        return self.needs.curves[NONE]
+
+    @property
+    def when(self) -> Convergence:
+        """When a learner counts as converged."""
+        return self.needs.when
+
+    @property
+    def settled(self) -> bool:
+        """Whether the learner without a proxy converges."""
+        return self.needs.settled
 
 
 def load_setup(settings: StudySettings) -> TeachingSetup:
@@ -107,67 +120,20 @@ def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watch
     if not proxies:
         raise settings.error("teaching.proxies", "is missing; name at least one, as in [teaching.proxies.nominal]")
     check_proxies(settings, setup, proxies)
-    curves = learning_curves(setup, {NONE: None, **proxies}, settings.jobs, watcher)
-    return judge_curves(settings, setup, curves)
+    scores = examine_curves(setup, {NONE: None, **proxies}, settings.jobs, watcher)
+    return judge_curves(settings, setup, curves_of(setup.settings, scores))
 
 
 def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, Curve]) -> Experiment:
     """Judge each proxy by the learning curves: a pure function of them and of what counts as converged."""
-    taught, without = setup.settings, curves[NONE]
-    when = convergence(taught, without)
-    steady = settled(without, taught.tolerance)
-    teachers = [
-        TeacherResult(
-            name, proxy, curves[name], teaching(without=without, with_proxy=curves[name], when=when) if steady else None
-        )
-        for name, proxy in taught.proxies.items()
-    ]
-    return Experiment(settings, setup.target.best_score, without, when, steady, tuple(teachers))
+    needs = needs_of(setup, curves)
+    teachers = [_teacher(needs, name, proxy) for name, proxy in setup.settings.proxies.items()]
+    return Experiment(settings, setup.target.best_score, needs, tuple(teachers))
 
 
-def convergence(taught: TeachingSettings, without: Curve) -> Convergence:
-    """When a learner counts as converged: at the level stated, or at what it comes to without a proxy."""
-    level = converged_level(without) if taught.level is None else taught.level
-    return Convergence(level, taught.tolerance)
-
-
-def learning_curves(
-    setup: TeachingSetup, proxies: Mapping[str, Distribution | None], jobs: int, watcher: Watcher
-) -> dict[str, Curve]:
-    """The learning curve of each proxy, by name; what is cached is not made again."""
-    points = [
-        Point(name, proxy, repetition, count)
-        for name, proxy in proxies.items()
-        for repetition in range(setup.settings.seeds)
-        for count in setup.settings.target_samples
-    ]
-    missing = [point for point in points if not setup.is_cached(point)]
-    watcher.begin("demonstrations", len(points) - len(missing))
-    with prepare_shared(setup, missing, jobs) as made:
-        for _ in made:
-            pass
-    watcher.begin("learning", 0)
-    with score_points(setup, missing, jobs) as scored:
-        for point, score in scored:
-            watcher.episode()
-            watcher.finished(_came_to(point, score))
-    return {name: _curve(setup, [point for point in points if point.name == name]) for name in proxies}
-
-
-def _came_to(point: Point, score: float) -> str:
-    """What became of a point of a learning curve, in one line."""
-    came = "nothing learnt yet" if np.isnan(score) else f"score {score:.3g}"
-    return f"{point.name}, repetition {point.repetition + 1}, {point.count} target samples: {came}"
-
-
-def count_points(setup: TeachingSetup, proxies: int) -> int:
-    """The number of points on the learning curves of this many proxies and of the learner without one."""
-    return (proxies + 1) * setup.settings.seeds * len(setup.settings.target_samples)
-
-
-def _curve(setup: TeachingSetup, points: Sequence[Point]) -> Curve:
-    scores = np.array([setup.score(point) for point in points])
-    return Curve(setup.settings.target_samples, scores.reshape(setup.settings.seeds, -1))
+def _teacher(needs: SampleNeeds, name: str, proxy: Distribution) -> TeacherResult:
+    worth = teaching(needs, none=NONE, proxy=name) if needs.settled else None
+    return TeacherResult(name, proxy, needs.curves[name], mean_score(needs, name, 0), worth)
 
 
 def check_proxies(settings: StudySettings, setup: TeachingSetup, proxies: Mapping[str, Distribution]) -> None:

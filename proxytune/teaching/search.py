@@ -5,15 +5,15 @@ A proposal is a pure function of seed and finished trials, trials are kept in st
 """
 
 import json
-import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from proxytune.errors import RunError
+from proxytune.learning.curves import Curve
 from proxytune.learning.lessons import Distribution
-from proxytune.learning.plv import Convergence, Curve, Teaching, settled, teaching
+from proxytune.learning.plv import Convergence, Estimate, Teaching, mean_score, teaching
 from proxytune.learning.settings import NONE
 from proxytune.running.progress import Watcher
 from proxytune.search.engines.gaussian_process import expected_improvement
@@ -26,7 +26,9 @@ from proxytune.study.outputs import score_trials
 from proxytune.study.settings import StudySettings
 from proxytune.study.stages.stopping import nothing_to_gain, out_of_time
 from proxytune.teaching.box import distribution
-from proxytune.teaching.experiment import convergence, learning_curves, teaching_settings
+from proxytune.teaching.examining import Scores, curves_of, examine_curves, needs_of
+from proxytune.teaching.experiment import Experiment, teaching_settings
+from proxytune.teaching.finalists import confirm, finalists
 from proxytune.teaching.points import TeachingSetup
 
 OBJECTIVE = "plv"
@@ -42,6 +44,7 @@ class PlvTrial:
         proxy: That p(θ).
         curve: Its learning curve.
         worth: What it is worth.
+        zero_shot: Its mean score before any target sample.
     """
 
     number: int
@@ -49,6 +52,7 @@ class PlvTrial:
     proxy: Distribution
     curve: Curve
     worth: Teaching
+    zero_shot: Estimate
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,7 @@ class PlvStudy:
         when: When a learner counts as converged.
         trials: Every proxy tried, in order.
         stopped: Why no further one was.
+        confirmed: The finalists, taught anew under seeds that the search has not used.
     """
 
     settings: StudySettings
@@ -69,7 +74,8 @@ class PlvStudy:
     without: Curve
     when: Convergence
     trials: tuple[PlvTrial, ...]
-    stopped: str = ""
+    stopped: str
+    confirmed: Experiment
 
     @property
     def narrowed(self) -> bool:
@@ -106,29 +112,37 @@ class PlvSearch:
     space: Space
     watcher: Watcher
 
-    def run(self, proposer: Proposer) -> PlvStudy:
+    def run(self, proposer: Proposer, by_prpv: Theta | None = None) -> PlvStudy:
         """Try proxies until the budget of [teaching] is spent or a rule says stop, from wherever it was left.
+
+        Args:
+            proposer: Proposes what is tried next.
+            by_prpv: The θ of lowest PRPV, where that is known: it is taught beside the finalists.
 
         Raises:
             RunError: If the learner does not converge without a proxy, so that no PLV is known.
             LearnerError: If an expert cannot drive somewhere in the box.
         """
         settings, taught = self.settings, self.setup.settings
-        without = learning_curves(self.setup, {NONE: None}, settings.jobs, self.watcher)[NONE]
-        if not settled(without, taught.tolerance):
+        alone = examine_curves(self.setup, {NONE: None}, settings.jobs, self.watcher)
+        needs = needs_of(self.setup, curves_of(taught, alone))
+        if not needs.settled:
             raise RunError(
                 f"{settings.path}: without a proxy the score still rises by more than {taught.tolerance:g} up to "
-                f"{without.counts[-1]} target samples, so PLV is not known; raise teaching.target_samples"
+                f"{taught.target_samples[-1]} target samples, so PLV is not known; raise teaching.target_samples"
             )
         self._check_facts()
-        tried = ProxyTrials(self, without, convergence(taught, without))
+        tried = ProxyTrials(self, alone)
         Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
-        return PlvStudy(settings, self.space, without, tried.when, tuple(tried.tried()), tried.ended())
+        named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
+        confirmed = confirm(settings, self.setup, named, self.watcher)
+        without = needs.curves[NONE]
+        return PlvStudy(settings, self.space, without, needs.when, tuple(tried.tried()), tried.ended(), confirmed)
 
     def facts(self) -> dict[str, Any]:
         """All that a trial depends on; if it changes, trials lose their meaning."""
         settings, taught = self.settings, self.setup.settings
-        named = ("proxy_samples", "target_samples", "seeds", "lesson_s", "level", "tolerance")
+        named = ("proxy_samples", "target_samples", "seeds", "lesson_s", "level", "tolerance", "examinations")
         return {
             "domains": list(self.setup.identities),
             "learner": self.setup.learner_identity,
@@ -147,9 +161,8 @@ class PlvSearch:
 class ProxyTrials:
     """The proxies tried, as the search loop evaluates them."""
 
-    def __init__(self, search: PlvSearch, without: Curve, when: Convergence) -> None:
-        self.when = when
-        self._search, self._without = search, without
+    def __init__(self, search: PlvSearch, alone: Scores) -> None:
+        self._search, self._alone = search, alone
         self._records = [trial for trial in search.store.trials(OBJECTIVE) if trial.state != "open"]
 
     def trials(self) -> Sequence[Trial]:
@@ -192,16 +205,16 @@ class ProxyTrials:
         return self._search.setup.identities[0]
 
     def _tried(self, thetas: Mapping[int, Theta]) -> list[PlvTrial]:
-        search = self._search
-        proxies = {f"trial {number}": distribution(search.setup, theta) for number, theta in thetas.items()}
-        curves = learning_curves(search.setup, proxies, search.settings.jobs, search.watcher)
-        return [
-            PlvTrial(number, theta, proxies[name], curves[name], self._worth(curves[name]))
-            for (number, theta), name in zip(thetas.items(), proxies, strict=True)
-        ]
+        return [self._try(number, theta) for number, theta in thetas.items()]
 
-    def _worth(self, curve: Curve) -> Teaching:
-        return teaching(without=self._without, with_proxy=curve, when=self.when)
+    def _try(self, number: int, theta: Theta) -> PlvTrial:
+        """Teach from one proxy: what that comes to depends on no other trial."""
+        search, name = self._search, f"trial {number}"
+        setup, proxy = search.setup, distribution(search.setup, theta)
+        scores = examine_curves(setup, {name: proxy}, search.settings.jobs, search.watcher, self._alone)
+        needs = needs_of(setup, curves_of(setup.settings, scores))
+        worth = teaching(needs, none=NONE, proxy=name)
+        return PlvTrial(number, theta, proxy, needs.curves[name], worth, mean_score(needs, name, 0))
 
 
 def _record(trial: PlvTrial, seconds: float) -> TrialRecord:
@@ -210,9 +223,5 @@ def _record(trial: PlvTrial, seconds: float) -> TrialRecord:
     if plv is None:
         failure = f"the learner does not converge within {trial.curve.counts[-1]} target samples"
         return TrialRecord(trial.number, trial.theta, "failed", failure=failure, seconds=seconds)
-    measures = {OBJECTIVE: plv, "needed": trial.worth.needed.value, "zero_shot": _finite(trial.curve.mean[0])}
+    measures = {OBJECTIVE: plv, "needed": trial.worth.needed.value, "zero_shot": trial.zero_shot.value}
     return TrialRecord(trial.number, trial.theta, "finished", -plv, measures, seconds=seconds)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -21,9 +21,14 @@ def test_teach_prints_one_document_with_the_promised_keys(make_study, capsys):
     assert {"theta", "prpv", "zero_shot", "plv", "needed", "factor", "reduction", "scores"} <= set(right)
     assert right["target_samples"] == document["without"]["target_samples"] == GRID
     assert document["without"]["scores"][0][0] is None
-    assert right["plv"]["value"] == document["proxies"]["right"]["without"]["value"] - right["needed"]["value"]
-    assert document["proxies"]["wide"]["prpv"] is None
-    assert isinstance(right["prpv"], float | int)
+    assert right["plv"]["value"] == pytest.approx(right["without"]["value"] - right["needed"]["value"], abs=5.0)
+    assert right["zero_shot_interval"][0] <= right["zero_shot"] <= right["zero_shot_interval"][1]
+    for proxy in document["proxies"].values():
+        assert isinstance(proxy["prpv"], float | int)
+        assert proxy["prpv_interval"][0] <= proxy["prpv"] <= proxy["prpv_interval"][1]
+    for figure in ("zero_shot", "prpv"):
+        tau = document["kendall_tau"][figure]
+        assert -1.0 <= tau["interval"][0] <= tau["value"] <= tau["interval"][1] <= 1.0
     assert (folder / "figures" / "teach.png").stat().st_size > 1000
     assert document["report"] == str(folder / "figures" / "teach.html")
     assert "Target samples saved (PLV" in (folder / "figures" / "teach.html").read_text()
@@ -56,12 +61,14 @@ def test_a_study_of_learning_value_tells_its_best_proxy(make_study, capsys):
     plvs = [trial["plv"]["value"] for trial in document["trials"]]
     assert len(plvs) == 3
     assert document["best"]["plv"]["value"] == max(plvs)
+    assert document["confirmed"]["best"] == "best single θ"
+    assert document["confirmed"]["finalists"]["best single θ"]["theta"].keys() == {"trim"}
     assert document["narrowed_by_prpv"] is False
     assert document["searched"] == {"trim": [-0.3, 0.3]}
     assert (folder / "figures" / "plv.png").stat().st_size > 1000
     page = (folder / "report.html").read_text()
     assert document["report"] == str(folder / "report.html")
-    assert "Of 3 proxies tried, trim" in page
+    assert "After 3 proxies tried, best single θ (trim = " in page
     assert "refresh" not in page
 
 

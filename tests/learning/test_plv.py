@@ -1,114 +1,100 @@
-"""PLV counts target samples on the grid that was tried, and says where nothing was reached."""
+"""PLV counts target samples where the mean curve crosses, and says where nothing was reached."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from proxytune.errors import InputError
-from proxytune.learning.plv import (
-    Convergence,
-    Curve,
-    converged_level,
-    general_plv,
-    plv,
-    samples_needed,
-    settled,
-    teaching,
-)
+from proxytune.learning.curves import Curve
+from proxytune.learning.plv import difference, general_plv, mean_score, plv, sample_needs, teaching
 
 GRID = (0, 100, 200, 400, 800)
-WHEN = Convergence(level=50.0, tolerance=5.0)
 
 
-def curve(*means, seeds=4, wobble=0.0):
+def curve(*means, seeds=6, wobble=0.5):
     noise = wobble * np.random.default_rng(1).normal(size=(seeds, len(GRID)))
     return Curve(GRID, np.tile(np.array(means, dtype=float), (seeds, 1)) + noise)
 
 
-def test_the_samples_needed_are_the_first_count_from_which_on_it_stays_converged():
-    assert samples_needed(curve(0, 20, 45, 50, 50), WHEN) == 200
-    assert samples_needed(curve(0, 46, 30, 50, 50), WHEN) == 400
-    assert samples_needed(curve(45, 45, 45, 45, 45), WHEN) == 0
+WITHOUT = curve(np.nan, 10, 20, 50, 50)
 
 
-def test_what_is_not_reached_is_said_and_never_extrapolated():
-    assert samples_needed(curve(0, 10, 20, 30, 44.9), WHEN) is None
+def judged(level=None, **curves):
+    return sample_needs({"none": WITHOUT, **curves}, none="none", best_score=60.0, tolerance=5.0, level=level)
 
 
-def test_without_any_sample_there_is_no_learner_so_none_are_not_enough():
-    assert samples_needed(curve(np.nan, 50, 50, 50, 50), WHEN) == 100
+def worth(proxy, level=None):
+    return teaching(judged(proxy=proxy, level=level), none="none", proxy="proxy")
 
 
 def test_a_proxy_that_helps_has_a_plv_above_zero_and_one_that_harms_below():
-    without = curve(np.nan, 10, 20, 50, 50)
-    helped = teaching(without=without, with_proxy=curve(20, 48, 50, 50, 50), when=WHEN)
-    harmed = teaching(without=without, with_proxy=curve(-9, -9, 10, 20, 50), when=WHEN)
-    assert (helped.plv.value, helped.factor.value, helped.reduction.value) == (300.0, 4.0, 0.75)
-    assert (harmed.plv.value, harmed.factor.value, harmed.reduction.value) == (-400.0, 0.5, -1.0)
+    helped, harmed = worth(curve(20, 48, 50, 50, 50)), worth(curve(-9, -9, 10, 20, 50))
+    assert 0.0 < helped.plv.low < helped.plv.value < helped.plv.high
+    assert helped.factor.low > 1.0
+    assert 0.0 < helped.reduction.low <= helped.reduction.high <= 1.0
+    assert harmed.plv.low < harmed.plv.value < harmed.plv.high < 0.0
+    assert harmed.factor.high < 1.0
+    assert harmed.reduction.high < 0.0
+
+
+def test_the_samples_needed_lie_between_the_counts_where_the_curve_crosses():
+    found = worth(curve(0, 40, 47, 50, 50))
+    assert 100.0 < found.needed.low < found.needed.value < found.needed.high < 200.0
+    assert 200.0 < found.without.low < found.without.value < found.without.high < 400.0
 
 
 def test_where_the_target_needs_no_sample_at_all_the_reduction_is_whole_and_the_factor_unbounded():
-    found = teaching(without=curve(np.nan, 10, 20, 50, 50), with_proxy=curve(50, 50, 50, 50, 50), when=WHEN)
+    found = worth(curve(50, 50, 50, 50, 50))
     assert (found.needed.value, found.reduction.value, found.factor.value) == (0.0, 1.0, None)
 
 
-def test_a_proxy_with_which_the_learner_never_converges_has_no_plv():
-    found = teaching(without=curve(np.nan, 10, 20, 50, 50), with_proxy=curve(0, 0, 0, 0, 0), when=WHEN)
-    assert found.needed.value is None
+def test_a_proxy_with_which_the_learner_never_converges_has_no_plv_but_a_bound_of_it():
+    found = worth(curve(0, 0, 0, 0, 0))
+    assert (found.needed.value, found.needed.low, found.needed.high) == (None, pytest.approx(800.0), None)
+    assert (found.plv.value, found.plv.low, found.factor.value) == (None, None, None)
+    assert found.plv.high < 0.0
+    assert found.plv.high == pytest.approx(found.without.high - 800.0)
+
+
+def test_a_level_that_the_learner_without_a_proxy_does_not_reach_leaves_plv_unknown():
+    found = worth(curve(55, 58, 59, 59, 59), level=59.0)
+    assert found.without.value is None
     assert found.plv.value is None
-    assert found.plv.high is None
-    assert found.factor.value is None
+    assert found.plv.low > 0.0
 
 
-def test_the_interval_holds_the_value_and_is_wider_where_seeds_differ_more():
-    without = curve(np.nan, 10, 30, 50, 50, seeds=6)
+def test_a_learner_counts_as_settled_where_the_last_doubling_gains_no_more_than_the_tolerance():
+    rising = curve(np.nan, 10, 20, 30, 50)
+    assert judged(proxy=curve(0, 10, 20, 30, 40)).settled
+    assert not sample_needs({"none": rising}, none="none", best_score=60.0, tolerance=5.0).settled
+
+
+def test_intervals_are_wider_where_seeds_differ_more():
     spans = []
-    for wobble in (0.0, 6.0):
-        found = teaching(without=without, with_proxy=curve(0, 40, 47, 52, 54, seeds=6, wobble=wobble), when=WHEN)
-        assert found.needed.low <= found.needed.value <= found.needed.high
-        spans.append(found.needed.high - found.needed.low)
-    assert spans[0] == 0.0 < spans[1]
+    for wobble in (1.0, 8.0):
+        found = worth(curve(0, 20, 40, 52, 54, wobble=wobble)).needed
+        spans.append(found.high - found.low)
+    assert spans[0] < spans[1]
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
-@given(st.lists(st.floats(-60, 60), min_size=10, max_size=10), st.floats(0, 60))
-def test_better_scores_never_need_more_samples(scores, more):
-    worse = Curve(GRID, np.array(scores).reshape(2, 5))
-    better = Curve(GRID, worse.scores + more)
-    needed = [samples_needed(one, WHEN) for one in (better, worse)]
-    assert needed[1] is None or (needed[0] is not None and needed[0] <= needed[1])
+def test_two_proxies_are_compared_by_what_the_one_needs_more_than_the_other():
+    needs = judged(good=curve(20, 48, 50, 50, 50), poor=curve(0, 10, 20, 48, 50))
+    more = difference(needs, more="poor", less="good")
+    assert 0.0 < more.low < more.value < more.high
+    assert difference(needs, more="good", less="good").value == 0.0
 
 
-def test_the_general_form_is_equation_5_where_all_samples_are_an_experts():
-    assert general_plv(without=(0, 400), with_proxy=(0, 100)) == plv(without=400, with_proxy=100) == 300
-    assert general_plv(without=(50, 400), with_proxy=(10, 100), cost_on=10.0, cost_off=0.5) == 550.0
+def test_the_mean_score_before_any_target_sample_has_an_interval_and_without_a_proxy_there_is_none():
+    needs = judged(proxy=curve(20, 48, 50, 50, 50))
+    found = mean_score(needs, "proxy", 0)
+    assert found.low < 20.0 < found.high
+    assert found.high - found.low < 5.0
+    assert mean_score(needs, "none", 0).value is None
 
 
-def test_a_curve_that_still_rises_has_not_settled():
-    assert settled(curve(0, 20, 40, 48, 52), 5.0)
-    assert not settled(curve(0, 10, 20, 30, 40), 5.0)
-    assert not settled(Curve((0, 100), np.array([[np.nan, 50.0]])), 5.0)
+def test_the_same_scores_come_to_the_same_figures_to_the_last_bit():
+    first, second = (worth(curve(0, 20, 40, 52, 54)) for _ in range(2))
+    assert first == second
 
 
-def test_without_a_stated_level_it_is_what_the_largest_count_comes_to():
-    assert converged_level(curve(0, 10, 20, 30, 41)) == 41.0
-
-
-@pytest.mark.parametrize(
-    ("counts", "scores", "says"),
-    [
-        ((100, 200), np.zeros((2, 2)), "add 0"),
-        ((0, 200, 200), np.zeros((2, 3)), "must rise"),
-        ((0, 200), np.zeros((2, 3)), "shape"),
-        ((), np.zeros((2, 0)), "add 0"),
-    ],
-)
-def test_a_curve_that_is_none_is_refused(counts, scores, says):
-    with pytest.raises(InputError, match=says):
-        Curve(counts, scores)
-
-
-def test_curves_of_other_grids_are_not_compared():
-    with pytest.raises(InputError, match="one grid"):
-        teaching(without=curve(0, 0, 0, 0, 0), with_proxy=curve(0, 0, 0, 0, 0, seeds=2), when=WHEN)
+def test_general_plv_with_unit_costs_and_an_expert_only_is_plv():
+    assert general_plv(without=(0.0, 900.0), with_proxy=(0.0, 100.0)) == plv(without=900.0, with_proxy=100.0) == 800.0
+    assert general_plv(without=(10.0, 5.0), with_proxy=(4.0, 1.0), cost_on=2.0, cost_off=3.0) == 24.0

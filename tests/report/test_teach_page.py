@@ -1,16 +1,17 @@
 """The page of `teach` claims no more than the intervals allow."""
 
+from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
-import pytest
 
+from proxytune.learning.curves import Curve
 from proxytune.learning.lessons import Distribution
-from proxytune.learning.plv import Convergence, Curve, Teaching
 from proxytune.learning.plv import Estimate as Worth
+from proxytune.learning.plv import Teaching, sample_needs
 from proxytune.learning.published import Published
 from proxytune.report.page import foot_of, html_of
-from proxytune.report.teaching.figure import places_of, teach_figure
+from proxytune.report.teaching.figure import teach_figure
 from proxytune.report.teaching.page import teach_page
 from proxytune.report.teaching.words import sorted_by_worth, teach_answer, teach_next_step
 from proxytune.report.writing import save
@@ -21,13 +22,14 @@ COUNTS = (0, 50, 100, 200, 400)
 EVIL = "<script>alert(1)</script>"
 
 
+PREDICTS = SimpleNamespace(prpv=3.0, interval=(2.0, 5.0), resampled=None, chance=SimpleNamespace(explains=False))
 NOBODY = MappingProxyType({})
 
 
 def lesson(name, plv):
     worth = Teaching(Worth(400, 200, 400), Worth(100, 50, 400), plv, NOTHING, NOTHING)
     scores = np.linspace(10.0, 50.0, 5) + np.arange(3)[:, None]
-    return TeacherResult(name, Distribution({}), Curve(COUNTS, scores), worth)
+    return TeacherResult(name, Distribution({}), Curve(COUNTS, scores), Worth(10.0, 8.0, 12.0), worth)
 
 
 LESSONS = (
@@ -39,10 +41,13 @@ LESSONS = (
 )
 
 
-def experiment(lessons=LESSONS, settled=True, published=NOBODY):
+def experiment(lessons=LESSONS, settled=True, published=NOBODY, examinations=None):
     without = Curve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
-    settings = SimpleNamespace(name=EVIL, teaching=SimpleNamespace(published=published, published_in="a paper"))
-    return Experiment(settings, 60.0, without, Convergence(50.0, 5.0), settled, lessons)
+    curves = {"none": without, **{one.name: one.curve for one in lessons}}
+    needs = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, level=50.0, draws=60)
+    teaching = SimpleNamespace(published=published, published_in="a paper", examinations=examinations)
+    settings = SimpleNamespace(name=EVIL, teaching=teaching)
+    return Experiment(settings, 60.0, replace(needs, settled=settled), lessons)
 
 
 def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so():
@@ -57,7 +62,7 @@ def test_the_answer_names_each_proxy_with_its_interval_where_it_belongs():
     shown, rest = answer.split(" None saved: ")
     assert "sure: 300 (100 to 350)" in shown
     assert "wide" not in shown
-    assert rest.index("harmful") < rest.index("Open, since") < rest.index("wide: 300 (-100 to 400)")
+    assert rest.index("harmful") < rest.index("Open, since") < rest.index("wide: 300 (−100 to 400)")
     assert "none is shown" in teach_answer(experiment(LESSONS[2:3]))
 
 
@@ -83,27 +88,33 @@ def test_without_convergence_plv_is_unknown_and_more_samples_are_next():
     assert "raise teaching.target_samples" in teach_next_step(experiment(settled=False))
 
 
-def test_each_proxy_has_a_panel_of_its_own_against_no_proxy():
-    figure = teach_figure(experiment())
-    panels = [axes for axes in figure.axes if axes.get_visible()]
+def test_where_examinations_are_chosen_more_of_them_are_next():
+    assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
+
+
+def test_each_proxy_has_a_panel_of_its_own_against_no_proxy_with_what_each_needs():
+    drawn = experiment()
+    panels = [axes for axes in teach_figure(drawn).axes if axes.get_visible()]
     assert [axes.get_title() for axes in panels] == [one.name for one in LESSONS]
     for axes, one in zip(panels, LESSONS, strict=True):
         curves = {line.get_label(): line for line in axes.lines}
         assert {"with the proxy", "without a proxy", "converged"} <= curves.keys()
-        assert list(curves["with the proxy"].get_ydata()) == pytest.approx(list(one.curve.mean[1:]))
-    assert figure.get_figwidth() * 25.4 <= 86.0
+        mean = drawn.needs.draws.scores[one.name].mean(axis=0)
+        assert list(curves["with the proxy"].get_ydata()) == list(mean)
+        dots = [line for line in axes.lines if line.get_linestyle() == "None"]
+        assert sum(len(line.get_ydata()) for line in dots) == 3 * 5 + 3 * 4
+        ends = [path.vertices[:, 0].tolist() for bars in axes.collections[2:] for path in bars.get_paths()]
+        assert ends[-1][0] < ends[-1][1]
 
 
-def test_the_zero_shot_score_stands_apart_from_the_counts():
-    assert places_of(LESSONS[0].curve) == [0.0, 1.5, 2.5, 3.5, 4.5]
-    for axes in teach_figure(experiment()).axes[: len(LESSONS)]:
-        assert [(text.get_text(), text.get_position()[0]) for text in axes.texts] == [("//", 0.75)]
+def test_the_figure_fits_a_column():
+    assert teach_figure(experiment()).get_figwidth() * 25.4 <= 86.0
 
 
 def test_the_page_has_table_1_and_takes_no_name_for_markup(tmp_path):
     save(teach_figure(experiment()), tmp_path / "teach.png")
-    page = teach_page(experiment(), {"sure": 3.0}, (tmp_path / "teach.png").read_bytes(), foot_of("teach"))
+    page = teach_page(experiment(), {"sure": PREDICTS}, (tmp_path / "teach.png").read_bytes(), foot_of("teach"))
     text = html_of(page)
     assert "<script" not in text
-    assert '<th scope="row">sure</th><td class="number">3</td>' in text
+    assert '<th scope="row">sure</th><td class="number">3 (2 to 5)</td>' in text
     assert "converged: the mean score is at least 45.0 of 60" in text

@@ -25,7 +25,8 @@ def test_the_right_proxy_saves_target_samples_and_the_wrong_one_harms(make_study
     worth = {lesson.name: lesson.worth for lesson in found.teachers}
     assert found.settled
     assert worth["right"].needed.value == 0.0
-    assert worth["right"].plv.value == worth["right"].without.value > 0.0
+    assert worth["right"].plv.value == pytest.approx(worth["right"].without.value, rel=0.02)
+    assert worth["right"].plv.low > 0.0
     assert worth["wrong"].plv.value < 0.0
     assert np.isnan(found.without.scores[:, 0]).all()
     assert np.isfinite(found.without.scores[:, 1:]).all()
@@ -43,7 +44,7 @@ def test_every_point_of_a_learning_curve_is_told_with_its_score(make_study):
 
 def test_a_stated_level_is_what_counts_as_converged(make_study):
     strict = run(make_taught(make_study, more="level = 59.9"))
-    assert (strict.when.level, strict.when.threshold) == (59.9, 53.9)
+    assert (strict.when.level, strict.when.threshold) == (59.9, pytest.approx(53.9))
 
 
 @pytest.mark.slow

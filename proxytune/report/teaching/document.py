@@ -4,13 +4,19 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from proxytune.learning.plv import Curve, Estimate
+from proxytune.learning.curves import Curve
+from proxytune.learning.lessons import Distribution
+from proxytune.learning.plv import Estimate
 from proxytune.study.settings import as_document
+from proxytune.teaching.agreement import Agreement
 from proxytune.teaching.experiment import Experiment, TeacherResult, teaching_settings
+from proxytune.teaching.observations import observe
+from proxytune.teaching.predictivity import Predictivity
 
 
-def teach_document(experiment: Experiment, prpv: Mapping[str, float | None]) -> dict[str, Any]:
+def teach_document(experiment: Experiment, prpv: Mapping[str, Predictivity | None]) -> dict[str, Any]:
     """A learning experiment as plain JSON; None where a figure is undefined or was not reached."""
+    found = observe(experiment, prpv)
     return {
         "name": experiment.settings.name,
         "best_score": experiment.best_score,
@@ -22,20 +28,41 @@ def teach_document(experiment: Experiment, prpv: Mapping[str, float | None]) -> 
         },
         "without": _curve(experiment.without),
         "proxies": {lesson.name: _lesson(lesson, prpv.get(lesson.name)) for lesson in experiment.teachers},
+        "kendall_tau": {
+            "zero_shot": _agreement(found.zero_shot if found else None),
+            "prpv": _agreement(found.prpv if found else None),
+        },
+        "saves_though_it_predicts_by_chance": list(found.poor_predictors) if found else [],
         "settings": {**as_document(experiment.settings), "teaching": _settings(experiment)},
     }
 
 
-def _lesson(lesson: TeacherResult, prpv: float | None) -> dict[str, Any]:
+def _agreement(found: Agreement | None) -> dict[str, Any] | None:
+    """How far a ranking agrees with that by PLV."""
+    if found is None:
+        return None
+    pairs = [list(pair) for pair in found.reversed]
+    return {"value": found.tau, "interval": [found.low, found.high], "contrary_pairs": pairs}
+
+
+def _lesson(lesson: TeacherResult, prpv: Predictivity | None) -> dict[str, Any]:
     worth = lesson.worth
     figures = ("without", "needed", "plv", "factor", "reduction")
     return {
-        "theta": {name: low if low == high else [low, high] for name, (low, high) in lesson.proxy.bounds.items()},
-        "prpv": prpv,
-        "zero_shot": float(lesson.curve.mean[0]),
+        "theta": theta_of(lesson.proxy),
+        "prpv": prpv.prpv if prpv else None,
+        "prpv_interval": list(prpv.interval) if prpv and prpv.interval else None,
+        "prpv_chance": {"mean": prpv.chance.mean, "p_value": prpv.chance.p_value} if prpv else None,
+        "zero_shot": lesson.zero_shot.value,
+        "zero_shot_interval": [lesson.zero_shot.low, lesson.zero_shot.high],
         **{name: estimate(getattr(worth, name) if worth else None) for name in figures},
         **_curve(lesson.curve),
     }
+
+
+def theta_of(proxy: Distribution) -> dict[str, Any]:
+    """p(θ): a number where a parameter is fixed, else its bounds."""
+    return {name: low if low == high else [low, high] for name, (low, high) in proxy.bounds.items()}
 
 
 def estimate(figure: Estimate | None) -> dict[str, Any] | None:
@@ -45,12 +72,12 @@ def estimate(figure: Estimate | None) -> dict[str, Any] | None:
 
 def _curve(curve: Curve) -> dict[str, Any]:
     scores = [[None if score != score else score for score in row] for row in curve.scores.tolist()]
-    return {"target_samples": list(curve.counts), "scores": scores}
+    return {"target_samples": list(curve.counts), "scores": scores, "examinations": len(curve.examined)}
 
 
 def _settings(experiment: Experiment) -> dict[str, Any]:
     taught = teaching_settings(experiment.settings)
-    names = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance")
+    names = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance", "examinations")
     return {
         "target": str(taught.target),
         "target_samples": list(taught.target_samples),

@@ -1,26 +1,37 @@
 """The figure of a learning experiment: score on the target against the number of target samples."""
 
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.learning.plv import Curve
+from proxytune.learning.curve_model import places
+from proxytune.learning.curves import Array
+from proxytune.learning.plv import Estimate
+from proxytune.learning.settings import NONE
 from proxytune.report.style import BLUE, COLUMN, GREY, dress, legend_below
 from proxytune.teaching.experiment import Experiment, TeacherResult
 
 COLUMNS = 2
-GAP = 1.5
-"""How far the zero-shot score stands from the first number of samples, which are one apart: it is no doubling."""
-RESAMPLES = 1000
-LEVELS = (2.5, 97.5)
+LEVELS = (0.025, 0.975)
+
+
+class _Look(NamedTuple):
+    label: str
+    colour: str
+    style: str
+    mark: str
+
+
+WITHOUT, WITH = _Look("without a proxy", GREY, "--", "x"), _Look("with the proxy", BLUE, "-", "o")
 
 
 def teach_figure(experiment: Experiment) -> Figure:
-    """Draw the mean learning curve with each proxy against that without one, a panel each, with 95 % bands over seeds.
+    """Draw the learning curve with each proxy against that without one, a panel each, with 95 % bands.
 
-    Above the dashed line a learner counts as converged; the point at 0 target samples is the zero-shot score.
+    Above the dotted line a learner counts as converged; the bar on it says how many samples that takes.
     """
     lessons = experiment.teachers
     columns = min(COLUMNS, len(lessons))
@@ -42,31 +53,38 @@ def teach_figure(experiment: Experiment) -> Figure:
 
 
 def _panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> None:
-    _curve(axes, experiment.without, "without a proxy", (GREY, "--", "x"))
-    _curve(axes, lesson.curve, "with the proxy", (BLUE, "-", "o"))
+    for name, look, height in ((NONE, WITHOUT, -1.2), (lesson.name, WITH, 1.2)):
+        _curve(axes, experiment, name, look)
+        if lesson.worth is not None:
+            needed = lesson.worth.without if name == NONE else lesson.worth.needed
+            _bar(axes, experiment, needed, look, height)
     axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
     counts = experiment.without.counts
-    shown = range(len(counts)) if len(counts) <= 4 else sorted({0, 1, (len(counts) + 1) // 2, len(counts) - 1})
-    places = places_of(experiment.without)
-    axes.set_xticks([places[place] for place in shown], [f"{counts[place]:g}" for place in shown])
+    shown = [counts[place] for place in sorted({0, 1, (len(counts) + 1) // 2, len(counts) - 1})]
+    axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
     axes.set_title(lesson.name, fontsize=8)
     dress(axes)
-    # The axis is broken there: 0 is no halving of the first number.
-    axes.text(GAP / 2, 0.0, "//", transform=axes.get_xaxis_transform(), fontsize=7, ha="center", va="center", zorder=5)
 
 
-def places_of(curve: Curve) -> list[float]:
-    """Where each count stands on the axis: side by side, the zero-shot score apart."""
-    return [0.0, *(GAP + place for place in range(len(curve.counts) - 1))]
+def _places(experiment: Experiment, counts: Array) -> Array:
+    """Where counts stand on the axis: as doublings, none at 0."""
+    return places(counts, float(experiment.without.counts[1]))
 
 
-def _curve(axes: Axes, curve: Curve, name: str, look: tuple[str, str, str]) -> None:
-    colour, style, mark = look
-    rows = np.random.default_rng(0).integers(0, len(curve.scores), (RESAMPLES, len(curve.scores)))
-    low, high = np.percentile(curve.scores[rows].mean(axis=1), LEVELS, axis=0)
-    places = np.array(places_of(curve))
-    axes.fill_between(places[1:], low[1:], high[1:], color=colour, alpha=0.18, linewidth=0)
-    axes.plot(places[1:], curve.mean[1:], style, color=colour, marker=mark, markersize=3, linewidth=1.2, label=name)
-    if np.isfinite(curve.mean[0]):
-        axes.vlines(places[0], low[0], high[0], color=colour, alpha=0.35, linewidth=2.5)
-        axes.plot(places[:1], curve.mean[:1], mark, color=colour, markersize=3)
+def _curve(axes: Axes, experiment: Experiment, name: str, look: _Look) -> None:
+    draws, curve = experiment.needs.draws, experiment.needs.curves[name]
+    at, scores = _places(experiment, draws.counts), draws.scores[name]
+    low, high = np.quantile(scores, LEVELS, axis=0)
+    axes.fill_between(at, low, high, color=look.colour, alpha=0.18, linewidth=0)
+    axes.plot(at, scores.mean(axis=0), look.style, color=look.colour, linewidth=1.2, label=look.label)
+    examined = curve.examined
+    places_ = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
+    axes.plot(places_, curve.scores[tuple(examined.T)], look.mark, color=look.colour, markersize=2, alpha=0.35)
+
+
+def _bar(axes: Axes, experiment: Experiment, needed: Estimate, look: _Look, height: float) -> None:
+    """The interval of the samples needed, a little off the line of convergence so that two bars stay apart."""
+    if needed.low is None:
+        return
+    ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
+    axes.hlines(experiment.when.threshold + height, *_places(experiment, ends), color=look.colour, linewidth=2.5)

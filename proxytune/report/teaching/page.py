@@ -3,16 +3,20 @@
 from collections.abc import Mapping, Sequence
 
 from proxytune.report.page import Foot, Page, Picture, Table, Words, terminal_tables
-from proxytune.report.teaching.plv_document import plv_table
+from proxytune.report.teaching.observations import observation_lines
+from proxytune.report.teaching.plv_document import CONFIRMED, plv_table
 from proxytune.report.teaching.table import COLUMNS, PLV_MEANING, convergence_lines, table_rows
 from proxytune.report.teaching.words import plv_answer, plv_next_step, teach_answer, teach_next_step
 from proxytune.teaching.experiment import Experiment
+from proxytune.teaching.observations import observe
+from proxytune.teaching.predictivity import Predictivity
 from proxytune.teaching.search import PlvStudy
 
 CURVES = (
-    "One panel per proxy, against the learner without one (grey). A proxy saves samples where its curve comes to the "
-    "dotted line sooner and stays above it; where the bands (95 %, over seeds) overlap, no difference is shown. The "
-    "point on the left is the score before any target sample."
+    "One panel per proxy, against the learner without one (grey): mean scores with their 95 % bands, from all "
+    "examinations together (dots). A proxy saves samples where its curve comes to the dotted line sooner and stays "
+    "above it; the bar at that line is the 95 % interval of how many it needs. The curve begins at the score before "
+    "any target sample."
 )
 PUBLISHED = (
     *(
@@ -31,14 +35,16 @@ TRIALS = (
 )
 
 
-def teach_page(experiment: Experiment, prpv: Mapping[str, float | None], figure: bytes, foot: Foot) -> Page:
+def teach_page(experiment: Experiment, prpv: Mapping[str, Predictivity | None], figure: bytes, foot: Foot) -> Page:
     """A learning experiment as a page: the paper's table 1 and the curves."""
     lines = (PLV_MEANING, *convergence_lines(experiment))
+    observations = observation_lines(observe(experiment, prpv), experiment)
+    said = [Words("The paper's two observations", observations)] if observations else []
     rows = tuple(table_rows(experiment, prpv))
     picture = Picture("What each proxy saves, curve by curve", figure, CURVES)
     table = Table("PLV of each proxy (the paper's table 1)", COLUMNS, rows, lines)
     name = f"{experiment.settings.name}: proxies as teachers"
-    parts: tuple[Table | Picture, ...] = (table, *_published(experiment, rows), picture)
+    parts: tuple[Table | Picture | Words, ...] = (table, *said, *_published(experiment, rows), picture)
     return Page(name, teach_answer(experiment), teach_next_step(experiment), parts, foot)
 
 
@@ -58,8 +64,11 @@ def _published(experiment: Experiment, rows: Sequence[tuple[str, ...]]) -> tuple
 
 def plv_page(study: PlvStudy, figure: bytes, foot: Foot) -> Page:
     """A search by PLV as a page."""
-    (table,) = terminal_tables(plv_table(study, {}))
+    table, finals = terminal_tables(plv_table(study, {}))
     proxies = Table("Proxies tried, the best first", table.columns, table.rows)
     stopped = Words("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
     picture = Picture("PLV of the proxies tried", figure, TRIALS)
-    return Page(study.settings.name, plv_answer(study), plv_next_step(study), (picture, proxies, stopped), foot)
+    finalists = Table(CONFIRMED.rstrip(":"), finals.columns, finals.rows, (PLV_MEANING,))
+    return Page(
+        study.settings.name, plv_answer(study), plv_next_step(study), (finalists, picture, proxies, stopped), foot
+    )

@@ -7,10 +7,16 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.report.teaching.document import estimate
-from proxytune.report.teaching.table import CONVERGED, PLV_MEANING, UNKNOWN, count
+from proxytune.learning.lessons import describe
+from proxytune.report.teaching.document import estimate, theta_of
+from proxytune.report.teaching.table import CONVERGED, PLV_MEANING, UNKNOWN, count, one_decimal
 from proxytune.study.settings import as_document
+from proxytune.teaching.experiment import Experiment
+from proxytune.teaching.finalists import best_teacher, saves_more
 from proxytune.teaching.search import PlvStudy, PlvTrial
+
+CONFIRMED = "Finalists, taught anew with fresh lessons, learners and examinations:"
+FINALS = ("finalist", "θ", "zero-shot score", "samples needed", "PLV", "the best saves more by")
 
 
 def plv_document(study: PlvStudy) -> dict[str, Any]:
@@ -19,6 +25,7 @@ def plv_document(study: PlvStudy) -> dict[str, Any]:
         "name": study.settings.name,
         "objective": "plv",
         "best": _trial(study.best),
+        "confirmed": _confirmed(study.confirmed),
         "trials": [_trial(trial) for trial in study.trials],
         "searched": {interval.name: [interval.low, interval.high] for interval in study.space.intervals},
         "narrowed_by_prpv": study.narrowed,
@@ -34,7 +41,26 @@ def _trial(trial: PlvTrial) -> dict[str, Any]:
         "theta": dict(trial.theta),
         "plv": estimate(trial.worth.plv),
         "needed": estimate(trial.worth.needed),
-        "zero_shot": float(trial.curve.mean[0]),
+        "zero_shot": trial.zero_shot.value,
+    }
+
+
+def _confirmed(experiment: Experiment) -> dict[str, Any]:
+    """The finalists, taught anew: what each is worth, and how much the best saves more than each."""
+    best = best_teacher(experiment)
+    return {
+        "best": best.name if best else None,
+        "settled": experiment.settled,
+        "finalists": {
+            one.name: {
+                "theta": theta_of(one.proxy),
+                "zero_shot": one.zero_shot.value,
+                "plv": estimate(one.worth.plv if one.worth else None),
+                "needed": estimate(one.worth.needed if one.worth else None),
+                "best_saves_more": estimate(saves_more(experiment, best.name, one.name)) if best else None,
+            }
+            for one in experiment.teachers
+        },
     }
 
 
@@ -47,7 +73,7 @@ def plv_table(study: PlvStudy, files: Mapping[str, Any]) -> RenderableType:
     ordered = sorted(study.trials, key=lambda trial: (trial is not study.best, trial.number))
     for trial in ordered:
         values = [f"{trial.theta[name]:.4g}" for name in names]
-        scores = (f"{trial.curve.mean[0]:.1f}", count(trial.worth.needed), count(trial.worth.plv, UNKNOWN))
+        scores = (one_decimal(trial.zero_shot), count(trial.worth.needed), count(trial.worth.plv, UNKNOWN))
         table.add_row(str(trial.number), *values, *scores)
     head = f"{study.settings.name}: {len(study.trials)} proxies tried, the one of highest PLV first"
     box = ", ".join(f"{interval.name} [{interval.low:.4g}, {interval.high:.4g}]" for interval in study.space.intervals)
@@ -59,4 +85,21 @@ def plv_table(study: PlvStudy, files: Mapping[str, Any]) -> RenderableType:
         CONVERGED.format(f"{study.when.threshold:.1f}"),
         *(f"{what}: {path}" for what, path in files.items()),
     ]
-    return Group(Text(head), table, *(Text(line) for line in lines))
+    finals = Table(box=None, pad_edge=False)
+    for name in FINALS:
+        finals.add_column(name, justify="left" if name in FINALS[:2] else "right", overflow="fold")
+    for row in _final_rows(study):
+        finals.add_row(*row)
+    return Group(Text(head), table, *(Text(line) for line in lines), Text(f"\n{CONFIRMED}"), finals)
+
+
+def _final_rows(study: PlvStudy) -> list[tuple[str, ...]]:
+    """The finalists as texts: their θ, and what they are worth."""
+    experiment, best = study.confirmed, best_teacher(study.confirmed)
+    rows: list[tuple[str, ...]] = []
+    for one in experiment.teachers:
+        plv = count(one.worth.plv, UNKNOWN) if one.worth else UNKNOWN
+        needed = count(one.worth.needed) if one.worth else ""
+        less = count(saves_more(experiment, best.name, one.name), UNKNOWN) if best and best is not one else ""
+        rows.append((one.name, describe(one.proxy), one_decimal(one.zero_shot), needed, plv, less))
+    return rows

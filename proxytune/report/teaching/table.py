@@ -9,7 +9,11 @@ from rich.text import Text
 
 from proxytune.learning.plv import Estimate
 from proxytune.learning.settings import NONE
+from proxytune.report.numbers import fixed, span
+from proxytune.report.teaching.observations import observation_lines
 from proxytune.teaching.experiment import Experiment, TeacherResult
+from proxytune.teaching.observations import observe
+from proxytune.teaching.predictivity import Predictivity
 
 COLUMNS = ("proxy", "PRPV", "zero-shot score", "samples needed", "PLV", "reduction")
 NOT_REACHED, UNKNOWN = "not converged", "unknown"
@@ -17,27 +21,31 @@ CONVERGED = "converged: the mean score is at least {} and stays so"
 PLV_MEANING = "PLV (proxy learning value): target samples saved by learning in the proxy first"
 
 
-def teach_table(experiment: Experiment, prpv: Mapping[str, float | None], files: Mapping[str, Any]) -> RenderableType:
+def teach_table(
+    experiment: Experiment, prpv: Mapping[str, Predictivity | None], files: Mapping[str, Any]
+) -> RenderableType:
     """The result of a learning experiment as `teach` shows it."""
     table = Table(box=None, pad_edge=False)
     for name in COLUMNS:
         table.add_column(name, justify="left" if name == "proxy" else "right", overflow="fold")
     for row in table_rows(experiment, prpv):
         table.add_row(*row)
-    lines = [PLV_MEANING, *convergence_lines(experiment), *(f"{what}: {path}" for what, path in files.items())]
+    observations = observation_lines(observe(experiment, prpv), experiment)
+    lines = [PLV_MEANING, *convergence_lines(experiment), *observations]
+    lines += [f"{what}: {path}" for what, path in files.items()]
     return Group(table, *(Text(line) for line in lines))
 
 
-def table_rows(experiment: Experiment, prpv: Mapping[str, float | None]) -> list[tuple[str, ...]]:
+def table_rows(experiment: Experiment, prpv: Mapping[str, Predictivity | None]) -> list[tuple[str, ...]]:
     """The rows of table 1 as texts: the learner without a proxy, then one per proxy."""
     worth = next((lesson.worth for lesson in experiment.teachers if lesson.worth), None)
     alone = (NONE, "", "", count(worth.without) if worth else NOT_REACHED, "", "")
     return [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in experiment.teachers)]
 
 
-def _row(lesson: TeacherResult, prpv: float | None) -> tuple[str, ...]:
-    worth, zero_shot = lesson.worth, f"{lesson.curve.mean[0]:.1f}"
-    predicts = "" if prpv is None else f"{prpv:g}"
+def _row(lesson: TeacherResult, prpv: Predictivity | None) -> tuple[str, ...]:
+    worth, zero_shot = lesson.worth, one_decimal(lesson.zero_shot)
+    predicts = "" if prpv is None else f"{prpv.prpv:g}" + (f" ({span(prpv.interval, 0)})" if prpv.interval else "")
     if worth is None:
         return (lesson.name, predicts, zero_shot, "", "", "")
     return (lesson.name, predicts, zero_shot, count(worth.needed), count(worth.plv, UNKNOWN), _share(worth.reduction))
@@ -61,22 +69,35 @@ def _say_factor(lesson: TeacherResult) -> list[str]:
     worth = lesson.worth
     if worth is None or worth.factor.value is None:
         return []
-    factor = f"{worth.factor.value:.3g} ({_ends(worth.factor)})"
+    low, high = worth.factor.low, worth.factor.high
+    ends = f"{low or 0.0:.2g} to {high:.2g}" if high is not None else f"{low or 0.0:.2g} or more"
+    factor = f"{worth.factor.value:.2g} ({ends})"
     return [f"{lesson.name}: samples needed without the proxy / with it = {factor}"]
 
 
 def count(figure: Estimate, missing: str = NOT_REACHED) -> str:
     """A number of samples with its interval; without a number, why it is missing."""
-    value = missing if figure.value is None else f"{figure.value:g}"
+    value = missing if figure.value is None else _samples(figure.value)
     ends = _ends(figure)
     return f"{value} ({ends})" if ends else value
 
 
+def one_decimal(figure: Estimate) -> str:
+    """A score, empty where there is none."""
+    return "" if figure.value is None else f"{figure.value:.1f}"
+
+
 def _ends(figure: Estimate) -> str:
-    """The interval; an end that lies beyond the grid is left open."""
+    """The interval of a number of samples; an end that lies beyond the grid is left open."""
     if figure.low is None:
-        return "" if figure.high is None else f"at most {figure.high:.4g}"
-    return f"{figure.low:.4g} or more" if figure.high is None else f"{figure.low:.4g} to {figure.high:.4g}"
+        return "" if figure.high is None else f"at most {_samples(figure.high)}"
+    low = _samples(figure.low)
+    return f"{low} or more" if figure.high is None else f"{low} to {_samples(figure.high)}"
+
+
+def _samples(value: float) -> str:
+    """A number of samples, to the ten where it is large: no more is known of it."""
+    return fixed(value, 0 if abs(value) < 100.0 else -1)
 
 
 def _share(figure: Estimate) -> str:

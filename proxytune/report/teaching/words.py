@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 
+from proxytune.learning.lessons import describe
 from proxytune.learning.plv import Estimate
 from proxytune.report.numbers import listed
 from proxytune.report.teaching.table import UNKNOWN, count
 from proxytune.teaching.experiment import Experiment, TeacherResult
+from proxytune.teaching.finalists import best_teacher, saves_more
 from proxytune.teaching.search import PlvStudy
 
 SEARCH = '`study` with objective = "plv" looks for'
@@ -46,27 +48,45 @@ def teach_next_step(experiment: Experiment) -> str:
         return "raise teaching.target_samples until the learner without a proxy converges."
     saves, _, unknown = sorted_by_worth(experiment.teachers)
     if unknown:
-        seeds = len(experiment.without.scores)
-        more = f"raise teaching.seeds from {seeds} to {2 * seeds}, which narrows the intervals"
+        more = f"{_more_of_it(experiment)}, which narrows the intervals"
         return f"{more}: {listed([one.name for one in unknown])} cannot be judged yet."
     if saves:
         return f"train in a proxy that saves samples, then on target samples; {SEARCH} a better one."
     return f"train without these proxies; {SEARCH} one that saves samples."
 
 
+def _more_of_it(experiment: Experiment) -> str:
+    """What to raise: the examinations that are chosen or, of a whole grid, its repetitions."""
+    taught = experiment.settings.teaching
+    if taught is not None and taught.examinations is not None:
+        return f"raise teaching.examinations from {taught.examinations} to {2 * taught.examinations}"
+    seeds = experiment.without.repetitions
+    return f"raise teaching.seeds from {seeds} to {2 * seeds}"
+
+
 def plv_answer(study: PlvStudy) -> str:
-    """The proxy of highest PLV, and whether it is shown to save anything."""
-    best, plv = study.best, study.best.worth.plv
-    theta = ", ".join(f"{name} {value:.4g}" for name, value in best.theta.items())
-    worth = "it saves target samples" if _above(plv) else "that it saves any is not shown: the interval holds 0"
-    return (
-        f"Of {len(study.trials)} proxies tried, {theta} has the highest PLV (proxy learning value): "
-        f"{count(plv, UNKNOWN)} target samples saved; {worth}."
+    """The finalist of highest PLV, whether it is shown to save anything, and which others may be as good."""
+    experiment, best = study.confirmed, best_teacher(study.confirmed)
+    if best is None or best.worth is None:
+        return f"Of {len(study.trials)} proxies tried, no finalist is known to save target samples."
+    worth = (
+        "it saves target samples" if _above(best.worth.plv) else "that it saves any is not shown: the interval holds 0"
     )
+    others = [one.name for one in experiment.teachers if one is not best]
+    behind = [name for name in others if _above(saves_more(experiment, best.name, name))]
+    alike = [name for name in others if name not in behind]
+    sentences = [
+        f"After {len(study.trials)} proxies tried, {best.name} ({describe(best.proxy)}) has the highest PLV (proxy "
+        f"learning value): {count(best.worth.plv, UNKNOWN)} target samples saved; {worth}.",
+        f"It saves more than {listed(behind)}." if behind else "",
+        f"That it saves more than {listed(alike)} is not shown." if alike else "",
+    ]
+    return " ".join(filter(None, sentences))
 
 
 def plv_next_step(study: PlvStudy) -> str:
     """The step that brings most."""
-    if _above(study.best.worth.plv):
-        return "train in this proxy, then on target samples; proxies whose intervals overlap with its may be as good."
-    return "raise teaching.seeds, which narrows the intervals, or teaching.budget, which tries more proxies."
+    best = best_teacher(study.confirmed)
+    if best is not None and best.worth is not None and _above(best.worth.plv):
+        return f"train in {best.name}: {describe(best.proxy)}, then on target samples."
+    return f"{_more_of_it(study.confirmed)}, which narrows the intervals, or teaching.budget, which tries more proxies."

@@ -1,0 +1,139 @@
+"""Where the next examinations tell most about PLV: a pure function of the scores that are known."""
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.learning.curve_model import places
+from proxytune.learning.curves import Array
+from proxytune.learning.plv import SampleNeeds
+
+BEYOND = 1.5
+"""An η that is not reached is weighed as if it lay at so many times the largest count."""
+APART = 2
+"""Somebody may be examined at every so many places of the drawn curves."""
+FIRST_COUNTS, FIRST_REPETITIONS = 4, 2
+"""What is examined before anything is known."""
+
+
+class Examination(NamedTuple):
+    """One examination: of which learning curve, in which repetition, after how many target samples."""
+
+    curve: str
+    repetition: int
+    samples: int
+
+
+@dataclass(frozen=True)
+class Spending:
+    """How examinations are spent.
+
+    Attributes:
+        none: The name of the learner without a proxy, which knows nothing before its first target sample.
+        counts: The grid of numbers of target samples, rising from 0; any number from its second on may be examined.
+        repetitions: The most repetitions there may be.
+        batch: How many examinations are chosen at once.
+    """
+
+    none: str
+    counts: tuple[int, ...]
+    repetitions: int
+    batch: int
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """Where somebody may be examined: curve by number and name, count, and drawn mean scores (draws, cells)."""
+
+    number: NDArray[np.intp]
+    name: tuple[str, ...]
+    count: NDArray[np.intp]
+    drawn: Array
+
+
+def first_examinations(names: Sequence[str], spending: Spending) -> list[Examination]:
+    """What is examined before anything is known: counts from the first to the last, in two repetitions."""
+    shares = np.linspace(0.0, len(spending.counts) - 1, FIRST_COUNTS)
+    counts = sorted({spending.counts[place] for place in shares.round().astype(int)})
+    return [
+        Examination(name, repetition, count)
+        for repetition in range(min(FIRST_REPETITIONS, spending.repetitions))
+        for name in names
+        for count in counts
+        if count or name != spending.none
+    ]
+
+
+def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spending) -> list[Examination]:
+    """Choose the examinations that are expected to take most from the variance of all proxies' PLV, one by one.
+
+    What a score would tell is taken from how the drawn mean curve there goes with the drawn PLVs, as in linear
+    regression; the next is chosen for what is left of the variance.
+
+    Args:
+        needs: What the scores known so far say.
+        names: The curves that may be examined. PLV is that of the proxies among them; without one, it is how many
+            samples are needed without a proxy that is to be known.
+        spending: How examinations are spent.
+
+    Returns:
+        A batch of them; fewer where every repetition of every count has been examined.
+    """
+    cells, wanted = _cells(needs, names, spending), _finite_plv(needs, names, spending.none)
+    targets = wanted.shape[1]
+    joint = np.cov(np.column_stack((wanted, cells.drawn)), rowvar=False)
+    noise = needs.draws.model.noise_at(cells.number, places(cells.count.astype(float), spending.counts[1]))
+    done = {
+        Examination(name, int(repetition), curve.counts[place])
+        for name, curve in needs.curves.items()
+        for repetition, place in curve.examined
+    }
+    chosen: list[Examination] = []
+    while len(chosen) < spending.batch:
+        free = [
+            _free_repetition(done, cells.name[cell], int(cells.count[cell]), spending) for cell in range(len(noise))
+        ]
+        tells = np.sum(joint[:targets, targets:] ** 2, axis=0) / (np.diag(joint)[targets:] + noise)
+        best = int(np.argmax([gain if there is not None else -1.0 for gain, there in zip(tells, free, strict=True)]))
+        if (repetition := free[best]) is None:
+            break
+        chosen.append(Examination(cells.name[best], repetition, int(cells.count[best])))
+        done.add(chosen[-1])
+        column = joint[:, targets + best]
+        joint = joint - np.outer(column, column) / (column[targets + best] + noise[best])
+    return chosen
+
+
+def _cells(needs: SampleNeeds, names: Collection[str], spending: Spending) -> _Cells:
+    """Every place of the drawn curves at which somebody may be examined."""
+    counts = needs.draws.counts.round().astype(int)
+    open_ = [
+        place for place in range(0, len(counts), APART) if not counts[place] or counts[place] >= spending.counts[1]
+    ]
+    cells = [
+        (number, name, place)
+        for number, name in enumerate(needs.curves)
+        for place in open_
+        if name in names and (counts[place] or name != spending.none)
+    ]
+    drawn = np.column_stack([needs.draws.scores[name][:, place] for _, name, place in cells])
+    at = np.array([place for _, _, place in cells])
+    return _Cells(np.array([number for number, _, _ in cells]), tuple(name for _, name, _ in cells), counts[at], drawn)
+
+
+def _finite_plv(needs: SampleNeeds, names: Sequence[str], none: str) -> Array:
+    """PLV of every proxy in every draw (draws, proxies), what is not reached taken as some way beyond the grid."""
+    needed = {name: np.minimum(samples, BEYOND * needs.last) for name, samples in needs.needed.items()}
+    proxies = [name for name in names if name != none]
+    return np.column_stack([needed[none] - needed[name] for name in proxies] or [needed[none]])
+
+
+def _free_repetition(done: Collection[Examination], name: str, count: int, spending: Spending) -> int | None:
+    """The repetition in which this learner has been examined least, among those in which it has not been here."""
+    often = Counter(one.repetition for one in done if one.curve == name)
+    free = [number for number in range(spending.repetitions) if Examination(name, number, count) not in done]
+    return min(free, key=lambda number: (often[number], number), default=None)

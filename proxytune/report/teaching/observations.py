@@ -47,9 +47,10 @@ def _tau(found: Agreement, figure: str) -> str:
     """Kendall's τ with its interval, and what it says."""
     interval = f"{fixed(found.low, 2)} to {fixed(found.high, 2)}"
     if found.low > 0.0:
-        says = f"{figure} and PLV do rank them alike"
+        says = "more pairs agree than not"
     elif found.high < 0.0:
-        says = f"{figure} and PLV rank them contrarily"
+        says = "fewer pairs agree than not"
     else:
-        says = f"whether {figure} and PLV rank them alike is open"
-    return f"{says}: Kendall's τ over {found.proxies} proxies is {fixed(found.tau, 2)} ({interval})"
+        says = "whether more pairs agree than not is open"
+    figures = f"Kendall's τ between {figure} and PLV is {fixed(found.tau, 2)} ({interval})"
+    return f"{figures}: of {found.proxies} proxies, {says}"

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.published import Published, read_published
@@ -12,8 +13,12 @@ from proxytune.settings import Section
 DEFAULT_LEARNER = "proxytune.learning.cloning:BehaviourCloning"
 KEYS = (
     "target", "learner", "proxy_samples", "target_samples", "seeds", "lesson_s",
-    "level", "tolerance", "budget", "narrow", "width", "proxies", "published", "published_in",
+    "level", "tolerance", "budget", "narrow", "width", "proxies", "published", "published_in", "rehearsal",
 )  # fmt: skip
+LATER = ("rehearsal",)
+"""Keys of what is taught that came later: facts name them only where they are set, so that what was kept stays."""
+MOST_REHEARSAL = 0.99
+"""Beyond it hardly anything of the target would be learnt."""
 NONE = "none"
 """The name of the learner without a proxy, which no proxy may have."""
 
@@ -37,6 +42,7 @@ class TeachingSettings:
         proxies: What `teach` compares, by name: p(θ) of each.
         published: What others published of proxies of these names, or of learning without one.
         published_in: Where, and what was different there.
+        rehearsal: Share of the proxy's samples among those of a fine-tuning, from 0 to below 1.
     """
 
     target: Path
@@ -53,6 +59,13 @@ class TeachingSettings:
     proxies: Mapping[str, Distribution]
     published: Mapping[str, Published] = field(default_factory=dict)
     published_in: str = ""
+    rehearsal: float = 0.0
+
+    @property
+    def later_keys(self) -> Mapping[str, Any]:
+        """What is taught otherwise than before there were keys for it, by key."""
+        values = {name: getattr(self, name) for name in LATER}
+        return {name: value for name, value in values.items() if value != getattr(TeachingSettings, name)}
 
 
 def read_teaching(section: Section) -> TeachingSettings | None:
@@ -83,6 +96,7 @@ def read_teaching(section: Section) -> TeachingSettings | None:
         proxies=proxies,
         published=read_published(section.section("published"), proxies, NONE),
         published_in=section.text("published_in", ""),
+        rehearsal=section.number("rehearsal", 0.0, low=0.0, high=MOST_REHEARSAL),
     )
 
 

@@ -1,7 +1,5 @@
 """The learning experiment: learning curves with and without each proxy, and what each is worth as a teacher."""
 
-import hashlib
-import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +11,11 @@ from proxytune.domain import Classroom
 from proxytune.errors import InputError
 from proxytune.extensions import make
 from proxytune.learning.cache import Cache
+from proxytune.learning.identity import learner_identity
 from proxytune.learning.learner import Learner
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Curve, Teaching, converged_level, settled, teaching
 from proxytune.learning.settings import NONE, TeachingSettings
-from proxytune.meaning import meaning_of
 from proxytune.running.progress import Watcher
 from proxytune.study.family import check_bounds, load_family
 from proxytune.study.settings import StudySettings
@@ -196,6 +194,5 @@ def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
         made = make(name, kind="learner", beside=settings.folder, needs=("train", "act"))
     except InputError as problem:
         raise settings.error("teaching.learner", str(problem)) from None
-    source = Path(inspect.getfile(type(made)))
-    code = meaning_of([source], source.parent)
-    return cast(Learner, made), hashlib.sha256(code.encode() + repr(made).encode()).hexdigest()[:16]
+    learner = cast(Learner, made)
+    return learner, learner_identity(learner)

@@ -14,6 +14,7 @@ from proxytune.errors import EpisodeError, LearnerError
 from proxytune.learning.cache import Arrays, Cache, digest
 from proxytune.learning.learner import Learner, Weights
 from proxytune.learning.lessons import Distribution, collect_samples
+from proxytune.learning.rehearsal import mix_samples
 from proxytune.learning.settings import TeachingSettings
 from proxytune.running.workers import working
 from proxytune.seeds import exam_seed, proxy_lessons_seed, target_lessons_seed
@@ -115,7 +116,13 @@ class TeachingSetup:
             "start": digest(start) if start else None,
             "samples": digest(self._target_facts(point.repetition)),
             "count": point.count,
+            **self._rehearsal_facts(point),
         }
+
+    def _rehearsal_facts(self, point: Point) -> dict[str, Any]:
+        """The share of the proxy's samples, where it rehearses any: which they are, the start's facts say."""
+        share = self.settings.rehearsal
+        return {"rehearsal": share} if share and point.proxy is not None else {}
 
     def _start_facts(self, point: Point) -> dict[str, Any] | None:
         """All that determines the weights that a proxy alone has taught; None without one."""
@@ -168,6 +175,9 @@ class TeachingSetup:
             return self.learner.train(self._proxy_samples(point.proxy, point.repetition), None, point.repetition)
         samples = self._target_samples(point.repetition)
         first = Demonstration(samples.observations[: point.count], samples.commands[: point.count])
+        if point.proxy is not None and self.settings.rehearsal:
+            earlier = self._proxy_samples(point.proxy, point.repetition)
+            first = mix_samples(first, earlier, self.settings.rehearsal)
         start = self._weights(replace(point, count=0))
         return self.learner.train(first, start, point.repetition)
 

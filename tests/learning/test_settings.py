@@ -26,6 +26,12 @@ def test_a_number_is_one_theta_and_a_pair_is_drawn_from(tmp_path):
     assert dict(read_proxies["nominal"].bounds) == {}
 
 
+def test_nothing_is_rehearsed_unless_it_is_asked_for(tmp_path):
+    assert read(tmp_path).rehearsal == 0.0
+    assert read(tmp_path).later_keys == {}
+    assert read(tmp_path, rehearsal=0.5).later_keys == {"rehearsal": 0.5}
+
+
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
@@ -46,6 +52,8 @@ def test_a_number_is_one_theta_and_a_pair_is_drawn_from(tmp_path):
         ({"published": {"other": {}}}, "teaching.published.other: unknown key; known are: none"),
         ({"published": {"none": {"zero_shot": 0}}}, "teaching.published.none.samples: is missing"),
         ({"published": {"none": {"zero_shot": 0, "samples": 9, "reduction": 88}}}, "reduction: must be between"),
+        ({"rehearsal": 1.0}, "teaching.rehearsal: must be between 0 and 0.99"),
+        ({"rehearsal": -0.1}, "teaching.rehearsal: must be between 0 and 0.99"),
         ({"sedes": 3}, "teaching.sedes: unknown key; did you mean 'seeds'?"),
     ],
 )

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from proxytune.errors import InputError
 
 Array = NDArray[np.float64]
+Number = TypeVar("Number", float, Array)
 RESAMPLES = 2000
 LEVELS = (2.5, 97.5)
 
@@ -121,11 +123,11 @@ def plv(*, without: float, with_proxy: float) -> float:
 
 def general_plv(
     *,
-    without: tuple[float, float],
-    with_proxy: tuple[float, float],
+    without: tuple[Number, Number],
+    with_proxy: tuple[Number, Number],
     cost_on: float = 1.0,
     cost_off: float = 1.0,
-) -> float:
+) -> Number:
     """PLV where samples gathered by the learner itself cost otherwise than an expert's (eq. 6, as we read it).
 
     Args:

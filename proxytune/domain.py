@@ -176,3 +176,19 @@ class Classroom(DomainFamily, Protocol):
             EpisodeError: If the policy raises or answers with something that is not a command.
         """
         ...
+
+
+class OnPolicyClassroom(Classroom, Protocol):
+    """A domain family whose expert also tells what it would do where a learner has driven to."""
+
+    def guide(self, episode: Episode, policy: Policy, seconds: float) -> tuple[Demonstration, int]:
+        """Let a policy drive in place of the episode's agent for some time [s], and the expert label what it visits.
+
+        Returns:
+            What was seen, and what the expert would have done, wherever it has an answer worth imitating, in the order
+            of time; and how many samples there would be had it one throughout.
+
+        Raises:
+            EpisodeError: If the domain or the policy fails.
+        """
+        ...

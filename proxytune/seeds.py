@@ -31,6 +31,9 @@ AGAIN = 7
 PROXY_LESSONS, TARGET_LESSONS, EXAM = range(3)
 """What a seed of a learning experiment is for."""
 
+ROUND = 17
+"""Tells the seeds of the rounds in which a learner drives from those of an expert's lessons."""
+
 RESET, COURSE, ACTING = 11, 12, 13
 """Tell what an environment's states, its course and a random agent draw from apart."""
 
@@ -87,6 +90,11 @@ def proxy_lessons_seed(study_seed: int, repetition: int) -> int:
 def target_lessons_seed(study_seed: int, repetition: int) -> int:
     """The seed of the lessons in the target, of a repetition of a learning experiment."""
     return _word(study_seed, TARGET_LESSONS, repetition)
+
+
+def round_seed(lessons_seed: int, number: int) -> int:
+    """The seed of the lessons in a round, counted from 0, of those lessons: the first round's is their own."""
+    return _word(lessons_seed, ROUND, number) if number else lessons_seed
 
 
 def exam_seed(study_seed: int, start: int) -> int:

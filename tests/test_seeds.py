@@ -16,6 +16,7 @@ GOLDEN = {
     "preflight's noise": (seeds.preflight_noise_seed, {(1, 0, 0, 0): 3495925559, (3, 4, 1, 5): 2925825705}),
     "lessons in a proxy": (seeds.proxy_lessons_seed, {(1, 0): 1835504127, (1, 4): 877150602}),
     "lessons in the target": (seeds.target_lessons_seed, {(1, 0): 1189033389, (1, 4): 1984606777}),
+    "round of lessons": (seeds.round_seed, {(1234567, 0): 1234567, (1234567, 1): 3175512135, (1, 7): 3010086231}),
     "examination": (seeds.exam_seed, {(1, 0): 1596810411, (1, 4): 2327607824}),
     "lesson": (
         seeds.lesson_seeds,

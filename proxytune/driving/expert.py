@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.domain import Demonstration, Policy
 from proxytune.driving.agents.agent import Command, Picture
 from proxytune.driving.agents.pilots import duties
 from proxytune.driving.episode import Sight
@@ -34,6 +35,12 @@ class Shown(NamedTuple):
     pictures: tuple[Picture, ...]
     commands: tuple[Command, ...]
     on_road: tuple[bool, ...]
+
+    @property
+    def samples(self) -> Demonstration:
+        """What is worth imitating: steps off the road are not."""
+        kept = np.array(self.on_road)
+        return Demonstration(np.stack(self.pictures)[kept], np.stack(self.commands)[kept])
 
 
 @dataclass(frozen=True)
@@ -84,3 +91,34 @@ class Expert:
         command = duties(self.speed, yaw_rate, full_speed=full_speed, baseline=baseline)
         from_middle = abs(self.road.lane_offset - float(seen.deviation))
         return command, from_middle <= self.road.lane_offset + self.road.lane_width / 2.0
+
+
+@dataclass(frozen=True)
+class Guide:
+    """Lets a policy drive, and tells what the expert would do wherever that leads (Ross et al. 2011, DAgger).
+
+    Attributes:
+        expert: Who tells.
+        policy: Who drives.
+    """
+
+    expert: Expert
+    policy: Policy
+
+    def begin(self, robot: Robot) -> Shown:
+        """Nothing shown yet."""
+        return self.expert.begin(robot)
+
+    def act(self, sight: Sight, memory: Shown) -> tuple[Command, Shown]:
+        """The policy's command, and the expert's in memory."""
+        return self.policy(sight.picture), self.expert.act(sight, memory)[1]
+
+
+def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) -> Expert | Guide:
+    """Who drives in a lesson: the robot's expert, or a policy that it guides.
+
+    Raises:
+        SettingsError: If the robot has no expert.
+    """
+    expert = Expert(road, *robot.expert_figures(), seed=seed)
+    return expert if policy is None else Guide(expert, policy)

@@ -4,16 +4,15 @@ import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxytune.domain import Demonstration, Episode, Policy, Recording
 from proxytune.driving import task
 from proxytune.driving.agents import Picture
 from proxytune.driving.agents.loading import load_agent
-from proxytune.driving.agents.playback import Playback
+from proxytune.driving.agents.playback import Observation, Playback
 from proxytune.driving.agents.pupil import Pupil
 from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.bullet.renderer import BulletCamera
@@ -30,7 +29,7 @@ from proxytune.driving.episode import (
     measured,
     picture_only,
 )
-from proxytune.driving.expert import Expert
+from proxytune.driving.expert import lesson_driver
 from proxytune.driving.identity import earlier_identities, identity_of
 from proxytune.driving.mounting import image_chain, mounted_camera
 from proxytune.driving.picture_size import with_columns
@@ -47,18 +46,6 @@ from proxytune.versions import versions_of
 
 PLANTS = ("bullet", "planar")
 CAMERAS = ("ground_plane", "renderer")
-
-
-class Observation(NamedTuple):
-    """What recorded commands lead to.
-
-    Attributes:
-        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
-        pictures: The picture before every command, (steps, rows, columns, 3).
-    """
-
-    poses: Signal
-    pictures: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -168,12 +155,22 @@ class LaneFollowing:
         Raises:
             SettingsError: If the robot has no expert.
         """
+        return self._lesson(episode, None, seconds)
+
+    def guide(self, episode: Episode, policy: Policy, seconds: float) -> tuple[Demonstration, int]:
+        """Let a policy drive for some time [s], and the robot's expert say what it would do at every step on the road.
+
+        Raises:
+            EpisodeError: If the policy raises or does not answer with two finite duties.
+            SettingsError: If the robot has no expert.
+        """
+        return self._lesson(episode, policy, seconds)
+
+    def _lesson(self, episode: Episode, policy: Policy | None, seconds: float) -> tuple[Demonstration, int]:
         robot = read_robot(self.robot, self.folder)
-        expert = Expert(self.map, *robot.expert_figures(), seed=episode.seed)
-        shown = self._drive(episode, expert, self.course(episode, seconds), Sight).memory
-        kept = np.array(shown.on_road)
-        samples = Demonstration(np.stack(shown.pictures)[kept], np.stack(shown.commands)[kept])
-        return samples, round(seconds * robot.figures["control_rate"])
+        driver = lesson_driver(self.map, robot, episode.seed, policy)
+        shown = self._drive(episode, driver, self.course(episode, seconds), Sight).memory
+        return shown.samples, round(seconds * robot.figures["control_rate"])
 
     def examine(self, episode: Episode, policy: Policy) -> float:
         """The paper's driving score of a policy, from −`seconds` to `seconds`.

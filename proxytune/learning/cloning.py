@@ -1,7 +1,6 @@
 """Behaviour cloning: a small network from a small picture to the expert's command."""
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from proxytune.domain import Demonstration
 from proxytune.errors import LearnerError
 from proxytune.learning.learner import Weights
+from proxytune.learning.pictures import grey_cells
 
 Array = NDArray[np.float64]
 
@@ -82,18 +82,7 @@ class BehaviourCloning:
         Raises:
             LearnerError: If the pictures are no colour pictures or have fewer pixels than there are cells.
         """
-        height, width = pictures.shape[1:3] if pictures.ndim == 4 else (0, 0)
-        first = round(self.top * height)
-        if height - first < self.rows or width < self.columns:
-            raise LearnerError(
-                f"pictures have shape {pictures.shape[1:]}, and {self.rows} × {self.columns} cells below row {first} "
-                "do not fit in; give (rows, columns, 3) with more pixels, or take fewer cells"
-            )
-        seen = pictures[:, first:]
-        # Adding 16-bit channels is exact, and twice as fast as a mean over them
-        grey = (seen[..., 0].astype(np.uint16) + seen[..., 1] + seen[..., 2]) / 3.0
-        means = _cell_means(_cell_means(grey, self.rows, axis=1), self.columns, axis=2)
-        return means.reshape(len(pictures), -1) / 255.0 - 0.5
+        return grey_cells(pictures, top=self.top, rows=self.rows, columns=self.columns)
 
     def _network(self, count: int, seed: int) -> MLPRegressor:
         batch = min(self.batch, count)
@@ -134,11 +123,3 @@ def _scale(commands: Array) -> dict[str, Array]:
 def _layers(network: MLPRegressor) -> dict[str, Array]:
     weights = {f"weight{layer}": values for layer, values in enumerate(network.coefs_)}
     return {**weights, **{f"bias{layer}": values for layer, values in enumerate(network.intercepts_)}}
-
-
-def _cell_means(values: Array, cells: int, axis: int) -> Array:
-    """Means over cells of nearly equal size along an axis."""
-    edges: Sequence[int] = np.linspace(0, values.shape[axis], cells + 1).round().astype(int).tolist()
-    shape = [1] * values.ndim
-    shape[axis] = cells
-    return np.asarray(np.add.reduceat(values, edges[:-1], axis=axis) / np.diff(edges).reshape(shape))

@@ -15,8 +15,8 @@ Weights = Mapping[str, NDArray[Any]]
 class Learner(Protocol):
     """Learns to imitate; bring your own as `module:attribute`, in PyTorch say.
 
-    It is a frozen dataclass or has a `repr` that tells its settings: that and its module's source identify what it
-    has learnt.
+    It is a frozen dataclass or has a `repr` that tells its settings: that and the source of its module, with the
+    modules beside it from which that takes classes or functions, identify what it has learnt.
     """
 
     def train(self, samples: Demonstration, start: Weights | None, seed: int) -> Weights:

@@ -1,11 +1,12 @@
-"""Demonstrations: θ drawn from p(θ) for each lesson, and the expert's samples of many lessons."""
+"""Lessons: θ drawn from p(θ) for each, and the expert's samples of many, whether it drives itself or a learner does."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
-from proxytune.domain import Classroom, Demonstration, Episode, make_episode
+from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
 from proxytune.errors import LearnerError
 from proxytune.seeds import lesson_seeds
 from proxytune.space import Theta
@@ -15,6 +16,9 @@ EXPERT = "expert"
 
 LEAST_SHARE = 0.5
 """An expert that keeps to the road for less than this share of its lessons has nothing to teach."""
+
+LEAST_LABELLED = 0.01
+"""An expert that labels less than this share of a learner's lessons has no label for where it drives."""
 
 TRIED = 10
 """Lessons after which that is judged."""
@@ -48,34 +52,57 @@ class Distribution:
 
 
 def collect_samples(
-    classroom: Classroom, where: Distribution, *, count: int, seed: int, lesson_s: float
+    classroom: Classroom,
+    where: Distribution,
+    *,
+    count: int,
+    seed: int,
+    lesson_s: float,
+    policy: Policy | None = None,
 ) -> Demonstration:
-    """Collect this many samples from the expert, lesson by lesson; more samples begin with the same ones.
+    """Collect this many of the expert's samples, lesson by lesson; more samples begin with the same ones.
 
     Args:
-        classroom: Where the expert drives.
+        classroom: Where the lessons are; with a policy, an `OnPolicyClassroom`.
         where: p(θ), drawn anew for every lesson.
         count: How many samples.
         seed: Of θ, of the starts and of the lessons.
-        lesson_s: How long the expert drives from one start [s].
+        lesson_s: How long a lesson takes [s].
+        policy: Who drives, and has what it visits labelled by the expert; None for the expert itself.
 
     Raises:
-        LearnerError: If the expert cannot drive there.
-        EpisodeError: If the domain fails.
+        LearnerError: If the expert cannot drive there, or has no label where the policy drives.
+        EpisodeError: If the domain or the policy fails.
     """
     observations, commands = [], []
     found = asked = lessons = 0
+    least = LEAST_SHARE if policy is None else LEAST_LABELLED
     while found < count:
-        samples, wanted = classroom.demonstrate(_lesson(classroom, where, seed, lessons), lesson_s)
+        samples, wanted = _teach(classroom, _lesson(classroom, where, seed, lessons), lesson_s, policy)
         observations.append(samples.observations)
         commands.append(samples.commands)
         found, asked, lessons = found + len(samples.commands), asked + wanted, lessons + 1
-        if found < LEAST_SHARE * asked and (lessons >= TRIED or found >= count):
-            raise LearnerError(
-                f"the expert cannot drive here: it kept to the road for {found / asked:.0%} of {lessons} lessons at "
-                f"{describe(where)}; move θ closer to where the robot can be driven"
-            )
+        if found < least * asked and (lessons >= TRIED or found >= count):
+            raise LearnerError(_complaint(policy, found / asked, lessons, describe(where)))
     return Demonstration(np.concatenate(observations)[:count], np.concatenate(commands)[:count])
+
+
+def _teach(classroom: Classroom, episode: Episode, lesson_s: float, policy: Policy | None) -> tuple[Demonstration, int]:
+    if policy is None:
+        return classroom.demonstrate(episode, lesson_s)
+    return cast(OnPolicyClassroom, classroom).guide(episode, policy, lesson_s)
+
+
+def _complaint(policy: Policy | None, share: float, lessons: int, where: str) -> str:
+    if policy is None:
+        return (
+            f"the expert cannot drive here: it kept to the road for {share:.0%} of {lessons} lessons at {where}; "
+            "move θ closer to where the robot can be driven"
+        )
+    return (
+        f"an expert without labels on the learner's states: it labelled {share:.1%} of {lessons} lessons at {where}; "
+        "have it label wherever the learner gets to, or let the expert drive"
+    )
 
 
 def _lesson(classroom: Classroom, where: Distribution, seed: int, number: int) -> Episode:

@@ -91,11 +91,11 @@ def plv(*, without: Samples, with_proxy: Samples) -> Samples:
 
 def general_plv(
     *,
-    without: tuple[float, float],
-    with_proxy: tuple[float, float],
+    without: tuple[Samples, Samples],
+    with_proxy: tuple[Samples, Samples],
     cost_on: float = 1.0,
     cost_off: float = 1.0,
-) -> float:
+) -> Samples:
     """PLV where samples gathered by the learner itself cost otherwise than an expert's (eq. 6, as we read it).
 
     Args:

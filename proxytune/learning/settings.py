@@ -1,10 +1,13 @@
 """What the [teaching] table of a study.toml says, read strictly."""
 
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+from proxytune.learning.costs import Array, Costs, cost_of, cost_saved, read_costs, split_samples
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.published import Published, read_published
 from proxytune.learning.spending import FIRST_COUNTS, FIRST_REPETITIONS
@@ -14,7 +17,14 @@ DEFAULT_LEARNER = "proxytune.learning.cloning:BehaviourCloning"
 KEYS = (
     "target", "learner", "proxy_samples", "target_samples", "seeds", "lesson_s",
     "level", "tolerance", "examinations", "budget", "narrow", "width", "proxies", "published", "published_in",
+    "rehearsal", "proxy_lessons", "target_lessons", "costs",
 )  # fmt: skip
+EXPERT, LEARNER = "expert", "learner"
+"""Who drives in lessons. Where a learner drives the expert tells what it would do."""
+LATER = ("rehearsal", "proxy_lessons", "target_lessons")
+"""Keys of what is taught that came later: facts name them only where they are set, so that what was kept stays."""
+MOST_REHEARSAL = 0.99
+"""Beyond it hardly anything of the target would be learnt."""
 NONE = "none"
 """The name of the learner without a proxy, which no proxy may have."""
 
@@ -40,6 +50,10 @@ class TeachingSettings:
         published_in: Where, and what was different there.
         examinations: How many a learning curve takes, on average over all curves, where those that tell most are
             chosen; None where every number of the grid is examined in every repetition.
+        rehearsal: Share of the proxy's samples among those of a fine-tuning, from 0 to below 1.
+        proxy_lessons: Who drives in the proxy, once something is learnt: EXPERT or LEARNER.
+        target_lessons: The same in the target.
+        costs: What a target sample costs.
     """
 
     target: Path
@@ -57,6 +71,32 @@ class TeachingSettings:
     published: Mapping[str, Published] = field(default_factory=dict)
     published_in: str = ""
     examinations: int | None = None
+    rehearsal: float = 0.0
+    proxy_lessons: str = EXPERT
+    target_lessons: str = EXPERT
+    costs: Costs = field(default_factory=Costs)
+
+    @property
+    def later_keys(self) -> Mapping[str, Any]:
+        """What is taught otherwise than before there were keys for it, by key."""
+        values = {name: getattr(self, name) for name in LATER}
+        return {name: value for name, value in values.items() if value != getattr(TeachingSettings, name)}
+
+    def expert_drives(self, *, with_proxy: bool) -> float:
+        """Number of target samples from which on the learner drives itself; infinite where it never does."""
+        if self.target_lessons == EXPERT:
+            return math.inf
+        return 0.0 if with_proxy else float(self.target_samples[1])
+
+    def target_cost(self, count: Array | float, *, with_proxy: bool) -> Array:
+        """What so many target samples cost; any real number of them, of any shape."""
+        return cost_of(self.costs, count, self.expert_drives(with_proxy=with_proxy))
+
+    def cost_saved(self, *, without: Array | float, needed: Array | float) -> Array:
+        """PLV in cost (eq. 6), from the target samples needed without a proxy and with it, of any shape."""
+        alone = split_samples(without, self.expert_drives(with_proxy=False))
+        helped = split_samples(needed, self.expert_drives(with_proxy=True))
+        return cost_saved(self.costs, without=alone, with_proxy=helped)
 
 
 def read_teaching(section: Section) -> TeachingSettings | None:
@@ -88,6 +128,10 @@ def read_teaching(section: Section) -> TeachingSettings | None:
         proxies=proxies,
         published=read_published(section.section("published"), proxies, NONE),
         published_in=section.text("published_in", ""),
+        rehearsal=section.number("rehearsal", 0.0, low=0.0, high=MOST_REHEARSAL),
+        proxy_lessons=section.text("proxy_lessons", EXPERT, choices=(EXPERT, LEARNER)),
+        target_lessons=section.text("target_lessons", EXPERT, choices=(EXPERT, LEARNER)),
+        costs=read_costs(section.section("costs")),
     )
 
 

@@ -12,7 +12,7 @@ from proxytune.errors import ExtensionError
 from proxytune.extensions import ask
 
 MISSING = object()
-ON_EPISODES = ("run", "record", "drive", "replay", "demonstrate", "examine")
+ON_EPISODES = ("run", "record", "drive", "replay", "demonstrate", "guide", "examine")
 """Methods whose first argument is an episode."""
 
 

@@ -1,7 +1,5 @@
 """The learning experiment: learning curves with and without each proxy, and what each is worth as a teacher."""
 
-import hashlib
-import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +10,11 @@ from proxytune.errors import InputError
 from proxytune.extensions import make
 from proxytune.learning.cache import Cache
 from proxytune.learning.curves import Curve
+from proxytune.learning.identity import learner_identity
 from proxytune.learning.learner import Learner
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Estimate, SampleNeeds, Teaching, mean_score, teaching
-from proxytune.learning.settings import NONE, TeachingSettings
-from proxytune.meaning import meaning_of
+from proxytune.learning.settings import EXPERT, LEARNER, NONE, TeachingSettings
 from proxytune.running.progress import Watcher
 from proxytune.study.family import check_bounds, load_family
 from proxytune.study.settings import StudySettings
@@ -87,8 +85,8 @@ def load_setup(settings: StudySettings) -> TeachingSetup:
     taught = teaching_settings(settings)
     learner, identity = _load_learner(settings, taught.learner)
     return TeachingSetup(
-        proxy=_classroom(settings, settings.proxy),
-        target=_classroom(settings, taught.target),
+        proxy=_classroom(settings, settings.proxy, "proxy_lessons"),
+        target=_classroom(settings, taught.target, "target_lessons"),
         learner=learner,
         learner_identity=identity,
         settings=taught,
@@ -148,11 +146,17 @@ def check_proxies(settings: StudySettings, setup: TeachingSetup, proxies: Mappin
             check_bounds(settings, setup.proxy, key, name, (low, high), given)
 
 
-def _classroom(settings: StudySettings, model: Path | None) -> Classroom:
+def _classroom(settings: StudySettings, model: Path | None, lessons: str) -> Classroom:
+    """The domain family that follows a model, if any, for lessons as their key in [teaching] has them."""
     family = load_family(settings, model)
     lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
     if lacks:
         raise settings.error("family", f"{settings.family} cannot teach: it lacks {', '.join(lacks)}")
+    if getattr(teaching_settings(settings), lessons) == LEARNER and not hasattr(family, "guide"):
+        raise settings.error(
+            f"teaching.{lessons}",
+            f"{settings.family} cannot teach a learner that drives: it lacks guide; add it, or take '{EXPERT}'",
+        )
     return cast(Classroom, family)
 
 
@@ -162,6 +166,5 @@ def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
         made = make(name, kind="learner", beside=settings.folder, needs=("train", "act"))
     except InputError as problem:
         raise settings.error("teaching.learner", str(problem)) from None
-    source = Path(inspect.getfile(type(made)))
-    code = meaning_of([source], source.parent)
-    return cast(Learner, made), hashlib.sha256(code.encode() + repr(made).encode()).hexdigest()[:16]
+    learner = cast(Learner, made)
+    return learner, learner_identity(learner)

@@ -1,7 +1,7 @@
 """The pieces of a learning experiment, each cached by all that determines it: samples, weights, scores."""
 
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,17 +9,21 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from proxytune.domain import Classroom, Demonstration, make_episode
+from proxytune.domain import Classroom, make_episode
 from proxytune.errors import EpisodeError, LearnerError
 from proxytune.learning.cache import Arrays, Cache, digest
-from proxytune.learning.learner import Learner, Weights
-from proxytune.learning.lessons import Distribution, collect_samples
-from proxytune.learning.settings import TeachingSettings
+from proxytune.learning.learner import Learner
+from proxytune.learning.lessons import Distribution
+from proxytune.learning.settings import LEARNER, TeachingSettings
 from proxytune.running.workers import working
 from proxytune.seeds import exam_seed, proxy_lessons_seed, target_lessons_seed
+from proxytune.teaching.stages import Lessons, Stage, Trainee, equal_rounds
 
 PUPIL = "pupil"
 """Who drives in an examination, in place of an agent."""
+
+PROXY_ROUNDS = 4
+"""Rounds in which a proxy teaches where the learner drives in it."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +84,12 @@ class TeachingSetup:
             return float(np.mean(found["scores"]))
 
     def prepare(self, point: Point) -> None:
-        """Make what several points share: the target's samples, or the weights that the proxy alone has taught."""
+        """Make what a point shares with others: what the proxy alone has taught, and the target's samples."""
         with _name_proxy_in_errors(point), threadpool_limits(limits=1):
-            if point.proxy is None:
-                self._target_samples(point.repetition)
-            else:
-                self._weights(replace(point, count=0))
+            stage = self._stage(point)
+            stage.weights(0)
+            for number in stage.lessons.rounds(point.count):
+                stage.collect(number)
 
     def is_cached(self, point: Point) -> bool:
         """Whether the point's scores are in the cache."""
@@ -93,7 +97,7 @@ class TeachingSetup:
 
     def exam_facts(self, point: Point) -> dict[str, Any]:
         """All that determines a point's scores: what is missing here would return stale scores."""
-        weights = self._weights_facts(point)
+        weights = self._stage(point).weights_facts(point.count)
         return {
             "target": self.identities[1],
             "starts": self.starts,
@@ -101,54 +105,25 @@ class TeachingSetup:
             "weights": digest(weights) if weights else None,
         }
 
-    def _weights_facts(self, point: Point) -> dict[str, Any] | None:
-        """All that determines the weights after this many target samples; None where nothing has been learnt.
+    def _stage(self, point: Point) -> Stage:
+        """What a point's learner learns in the target, after its proxy if it has one."""
+        trainee = Trainee(self.learner, self.learner_identity, point.repetition, self.cache)
+        in_proxy = None if point.proxy is None else self._proxy_lessons(point.proxy, point.repetition)
+        before = None if in_proxy is None else Stage(trainee, in_proxy)
+        return Stage(trainee, self._target_lessons(point.repetition), before, self.settings.rehearsal)
 
-        The facts of what comes before enter as their digest, so that each key is short and complete.
-        """
-        start = self._start_facts(point)
-        if not point.count:
-            return start
-        return {
-            "learner": self.learner_identity,
-            "seed": point.repetition,
-            "start": digest(start) if start else None,
-            "samples": digest(self._target_facts(point.repetition)),
-            "count": point.count,
-        }
+    def _proxy_lessons(self, proxy: Distribution, repetition: int) -> Lessons:
+        by, count = self.settings.proxy_lessons, self.settings.proxy_samples
+        seed, ends = proxy_lessons_seed(self.seed, repetition), equal_rounds(count, PROXY_ROUNDS)
+        return Lessons(self.proxy, self.identities[0], proxy, seed, self.settings.lesson_s, ends, by)
 
-    def _start_facts(self, point: Point) -> dict[str, Any] | None:
-        """All that determines the weights that a proxy alone has taught; None without one."""
-        if point.proxy is None:
-            return None
-        return {
-            "learner": self.learner_identity,
-            "seed": point.repetition,
-            "start": None,
-            "samples": digest(self._proxy_facts(point.proxy, point.repetition)),
-            "count": self.settings.proxy_samples,
-        }
-
-    def _proxy_facts(self, proxy: Distribution, repetition: int) -> dict[str, Any]:
-        domain, seed = self.identities[0], proxy_lessons_seed(self.seed, repetition)
-        return self._lessons_facts(domain, proxy.bounds, self.settings.proxy_samples, seed)
-
-    def _target_facts(self, repetition: int) -> dict[str, Any]:
-        domain, seed = self.identities[1], target_lessons_seed(self.seed, repetition)
-        return self._lessons_facts(domain, {}, self.settings.target_samples[-1], seed)
-
-    def _lessons_facts(self, domain: str, bounds: Mapping[str, Any], count: int, seed: int) -> dict[str, Any]:
-        theta = {name: list(pair) for name, pair in bounds.items()}
-        return {
-            "domain": domain,
-            "theta": theta,
-            "count": count,
-            "seed": seed,
-            "lesson_s": self.settings.lesson_s,
-        }
+    def _target_lessons(self, repetition: int) -> Lessons:
+        by, ends = self.settings.target_lessons, self.settings.target_samples[1:]
+        seed, nominal = target_lessons_seed(self.seed, repetition), Distribution({})
+        return Lessons(self.target, self.identities[1], nominal, seed, self.settings.lesson_s, ends, by)
 
     def _examine(self, point: Point) -> Arrays:
-        weights = self._weights(point)
+        weights = self._stage(point).weights(point.count)
         if weights is None:
             return {"scores": np.full(self.starts, np.nan)}
         policy = functools.partial(self.learner.act, weights)
@@ -157,33 +132,6 @@ class TeachingSetup:
             for start in range(self.starts)
         ]
         return {"scores": np.array(scores)}
-
-    def _weights(self, point: Point) -> Weights | None:
-        facts = self._weights_facts(point)
-        return None if facts is None else self.cache.get("weights", facts, lambda: self._train(point))
-
-    def _train(self, point: Point) -> Weights:
-        if not point.count:
-            assert point.proxy is not None
-            return self.learner.train(self._proxy_samples(point.proxy, point.repetition), None, point.repetition)
-        samples = self._target_samples(point.repetition)
-        first = Demonstration(samples.observations[: point.count], samples.commands[: point.count])
-        start = self._weights(replace(point, count=0))
-        return self.learner.train(first, start, point.repetition)
-
-    def _proxy_samples(self, proxy: Distribution, repetition: int) -> Demonstration:
-        facts = self._proxy_facts(proxy, repetition)
-        return self._samples(facts, self.proxy, proxy)
-
-    def _target_samples(self, repetition: int) -> Demonstration:
-        return self._samples(self._target_facts(repetition), self.target, Distribution({}))
-
-    def _samples(self, facts: Mapping[str, Any], room: Classroom, where: Distribution) -> Demonstration:
-        def make() -> Arrays:
-            count, seed = facts["count"], facts["seed"]
-            return collect_samples(room, where, count=count, seed=seed, lesson_s=self.settings.lesson_s)._asdict()
-
-        return Demonstration(**self.cache.get("samples", facts, make))
 
 
 @contextmanager
@@ -197,12 +145,34 @@ def _name_proxy_in_errors(point: Point) -> Iterator[None]:
 
 def prepare_shared(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:
     """Make what several points share before they are scored, so that no two processes make the same."""
-    shared = [Point("the target", None, repetition, 0) for repetition in sorted({p.repetition for p in points})]
+    return working(setup.prepare, _shared(setup.settings, points), jobs)
+
+
+def _shared(settings: TeachingSettings, points: Sequence[Point]) -> list[Point]:
+    """Points whose preparation makes all that these share.
+
+    Where the learner drives in the target, its samples are shared by the points of one learning curve and repetition;
+    where the expert does, by all points of a repetition.
+    """
+    if settings.target_lessons == LEARNER:
+        falling = sorted(points, key=lambda point: -point.count)
+        return _first_of_each(falling, lambda point: replace(point, count=0))
+    last = settings.target_samples[-1]
+    repetitions = sorted({point.repetition for point in points})
+    targets = [Point("the target", None, repetition, last) for repetition in repetitions]
+    taught = [replace(point, count=0) for point in points if point.proxy is not None]
+    return targets + _first_of_each(taught, lambda point: point)
+
+
+def _first_of_each(points: Sequence[Point], kind: Callable[[Point], Point]) -> list[Point]:
+    """The first point of each kind."""
+    kinds: list[Point] = []
+    first = []
     for point in points:
-        before = replace(point, count=0)
-        if point.proxy is not None and before not in shared:
-            shared.append(before)
-    return working(setup.prepare, shared, jobs)
+        if kind(point) not in kinds:
+            kinds.append(kind(point))
+            first.append(point)
+    return first
 
 
 def score_points(

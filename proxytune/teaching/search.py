@@ -147,6 +147,7 @@ class PlvSearch:
             "domains": list(self.setup.identities),
             "learner": self.setup.learner_identity,
             **{name: json.loads(json.dumps(getattr(taught, name))) for name in named},
+            **taught.later_keys,
             **{name: getattr(settings, name) for name in ("starts", "seed", "initial", "batch", "engine")},
             "box": {box.name: [box.low, box.high] for box in self.space.intervals},
         }

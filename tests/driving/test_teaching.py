@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from proxytune.domain import Classroom, DomainFamily, make_episode
+from proxytune.domain import Classroom, DomainFamily, OnPolicyClassroom, make_episode
 from proxytune.driving.agents.pupil import Pupil
 from proxytune.driving.episode import TICK_HZ, Course, Sight, drive
 from proxytune.driving.expert import Expert
@@ -66,8 +66,9 @@ def parameters(method):
 
 def test_lane_following_has_every_member_of_a_classroom():
     members = {name: member for name, member in vars(Classroom).items() if not name.startswith("_")}
+    members |= {name: member for name, member in vars(OnPolicyClassroom).items() if not name.startswith("_")}
     members |= {name: member for name, member in vars(DomainFamily).items() if not name.startswith("_")}
-    assert {"demonstrate", "examine", "best_score", "identity", "run"} <= set(members)
+    assert {"demonstrate", "guide", "examine", "best_score", "identity", "run"} <= set(members)
     for name, wanted in members.items():
         given = getattr(LaneFollowing, name)
         if isinstance(wanted, property):
@@ -128,10 +129,54 @@ def test_steps_off_the_road_are_not_shown_but_counted_among_those_asked_for(thet
     np.testing.assert_array_equal(samples.observations, np.array(driven.memory.pictures)[on_road])
 
 
-def test_a_robot_without_an_expert_is_refused_in_one_line(tmp_path):
+@both_plants
+def test_a_guided_policy_drives_as_it_does_alone_and_sees_what_it_sees_then(plant):
+    room = classroom(plant=plant)
+    samples, asked = room.guide(episode(), lean, 1.0)
+    driven = room._drive(episode(), Pupil(lean), room.course(episode(), 1.0))
+    assert len(driven.commands) == len(samples.commands) == asked == RATE
+    np.testing.assert_array_equal(samples.observations, room.replay(episode(), driven.commands).pictures)
+
+
+def test_a_guided_policys_steps_are_labelled_with_what_the_expert_would_do_there():
+    room = classroom(plant="planar")
+    samples, _ = room.guide(episode(), lean, 1.0)
+    poses = room._drive(episode(), Pupil(lean), room.course(episode(), 1.0)).poses[:: TICK_HZ // RATE]
+    expert = Expert(ROAD, *ROBOT.expert_figures(), seed=0)
+    asked = [expert.act(Sight(None, pose), expert.begin(ROBOT))[1].commands[0] for pose in poses[:RATE]]
+    np.testing.assert_array_equal(samples.commands, asked)
+    assert np.abs(samples.commands - [lean(picture) for picture in samples.observations]).max() > 0.05
+
+
+def test_a_policy_that_drives_as_the_expert_does_visits_what_it_is_shown():
+    room = classroom(plant="planar")
+    shown, commands = lesson(room, episode(), 1.0).memory, iter(lesson(room, episode(), 1.0).commands)
+    samples, _ = room.guide(episode(), lambda picture: next(commands), 1.0)
+    np.testing.assert_array_equal(samples.observations, np.array(shown.pictures))
+    np.testing.assert_array_equal(samples.commands, np.array(shown.commands))
+
+
+def test_where_a_guided_policy_is_off_the_road_nothing_is_labelled():
+    room, straight = classroom(plant="planar"), lambda picture: np.array((0.5, 0.5))
+    samples, asked = room.guide(episode(start=1), straight, 12.0)
+    driven = room._drive(episode(start=1), Pupil(straight), room.course(episode(start=1), 12.0))
+    assert 0 < len(samples.commands) == len(samples.observations) < len(driven.commands) < asked == 12 * RATE
+
+
+def lost(picture):
+    raise ValueError("lost")
+
+
+def test_a_guided_policy_that_fails_is_told_with_the_time_in_one_line():
+    with pytest.raises(EpisodeError, match=r"^raised ValueError at 0\.00 s: lost$"):
+        classroom(plant="planar").guide(episode(), lost, 1.0)
+
+
+@pytest.mark.parametrize("method", ["demonstrate", "guide"])
+def test_a_robot_without_an_expert_is_refused_in_one_line(tmp_path, method):
     room = LaneFollowing("irobot_create", "planar", "ground_plane", ROAD, 2.0, 0.01, 2.0, (), tmp_path)
     with pytest.raises(SettingsError) as caught:
-        room.demonstrate(episode(), 1.0)
+        room.demonstrate(episode(), 1.0) if method == "demonstrate" else room.guide(episode(), lean, 1.0)
     assert str(caught.value) == (
         "robot 'irobot_create' has no expert: its robot.toml states no expert_look_ahead, expert_speed, expert_gain, "
         "expert_disturbance; add them, or teach with a robot that has one"
@@ -164,10 +209,6 @@ def test_the_best_score_is_every_second_of_an_examination(seconds):
 def test_leaving_the_lane_scores_worse_than_staying(plant):
     room = classroom(plant=plant, seconds=3.0, position_noise_m=0.0)
     assert room.examine(episode(start=5), lambda picture: np.array((0.5, 0.2))) < room.best_score - 1.0
-
-
-def lost(picture):
-    raise ValueError("lost")
 
 
 @both_plants

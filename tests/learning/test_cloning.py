@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from leaning import error, pictures
 from sklearn.neural_network import MLPRegressor
 
 from proxytune.domain import Demonstration
@@ -11,21 +12,6 @@ from proxytune.errors import LearnerError
 from proxytune.learning.cloning import BehaviourCloning
 
 SMALL = BehaviourCloning(rows=3, columns=4, hidden=(12,), steps=600, passes=10)
-
-
-def pictures(count, seed, rows=12, columns=16):
-    """Pictures whose brightness leans to one side, and the steering that goes with it."""
-    generator = np.random.default_rng(seed)
-    lean = generator.uniform(-1, 1, count)
-    ramp = 128 + 100 * lean[:, None] * np.linspace(-1, 1, columns)
-    noisy = ramp[:, None, :, None] + generator.normal(0, 8, (count, rows, columns, 3))
-    commands = 0.3 + 0.1 * np.stack((-lean, lean), axis=1)
-    return Demonstration(np.clip(noisy, 0, 255).astype(np.uint8), commands)
-
-
-def error(learner, weights, samples):
-    answered = np.array([learner.act(weights, picture) for picture in samples.observations])
-    return float(np.abs(answered - samples.commands).mean())
 
 
 def test_it_learns_a_planted_steering_far_better_than_a_constant_would():
@@ -74,28 +60,6 @@ def test_training_leaves_the_weights_it_started_from_as_they_were():
     before = {name: values.copy() for name, values in start.items()}
     SMALL.train(pictures(60, 2), start, 1)
     assert all(np.array_equal(start[name], before[name]) for name in before)
-
-
-def test_a_cell_is_the_mean_grey_of_its_pixels_and_the_top_is_not_looked_at():
-    picture = np.zeros((1, 12, 16, 3), dtype=np.uint8)
-    picture[0, :3] = 255
-    picture[0, 3:6, :4] = (255, 0, 0)
-    cells = SMALL.features(picture)[0].reshape(3, 4)
-    assert cells[0, 0] == pytest.approx(1 / 3 - 0.5)
-    assert (np.delete(cells.ravel(), 0) == -0.5).all()
-
-
-def test_cells_may_be_of_unequal_size():
-    learner = BehaviourCloning(top=0.0, rows=2, columns=2)
-    picture = np.zeros((1, 5, 3, 3), dtype=np.uint8)
-    picture[0, :2, :2] = 255
-    assert learner.features(picture)[0] == pytest.approx([0.5, -0.5, -0.5, -0.5])
-
-
-@pytest.mark.parametrize("shape", [(2, 2, 3), (48, 64), (3, 16, 3)])
-def test_pictures_of_the_wrong_size_are_one_line(shape):
-    with pytest.raises(LearnerError, match="pictures have shape .*do not fit in; give"):
-        SMALL.features(np.zeros((1, *shape), dtype=np.uint8))
 
 
 def test_no_sample_is_nothing_to_learn_from():

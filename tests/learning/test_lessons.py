@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from schoolroom import SAMPLES_PER_S, Schoolroom
+from tightrope import Tightrope
 from wobbly import Wobbly
 
 from proxytune.errors import LearnerError
@@ -52,6 +53,37 @@ def test_a_distribution_without_width_is_one_theta():
 def test_an_expert_that_cannot_drive_ends_it_with_where_and_how_badly(blocked):
     with pytest.raises(LearnerError, match=r"cannot drive here: .*% of \d+ lessons at delay in \[0, 0.3\], trim = 0.1"):
         collect_samples(Schoolroom(Wobbly(), blocked=blocked), WIDE, count=1000, seed=1, lesson_s=1.0)
+
+
+def still(observation):
+    return np.zeros(1)
+
+
+def test_a_guided_lesson_shows_what_the_policy_visits_with_the_experts_commands():
+    room = Tightrope(Wobbly())
+    shown, guided = (
+        collect_samples(room, Distribution({}), count=30, seed=1, lesson_s=2.0, policy=policy)
+        for policy in (None, still)
+    )
+    assert len(guided.commands) == 30
+    assert np.array_equal(guided.commands, -1.2 * guided.observations)
+    assert np.abs(guided.observations).max() > 2.0 * np.abs(shown.observations).max()
+
+
+def test_a_learner_that_falls_at_once_is_given_more_lessons():
+    samples = collect_samples(
+        Tightrope(Wobbly()), Distribution({}), count=50, seed=1, lesson_s=2.0, policy=lambda seen: np.ones(1) * 5.0
+    )
+    assert len(samples.commands) == 50
+
+
+def test_an_expert_without_labels_on_the_learners_states_is_one_line():
+    with pytest.raises(
+        LearnerError, match=r"^an expert without labels on the learner's states: it labelled 0.0% of 10"
+    ):
+        collect_samples(
+            Tightrope(Wobbly(), silent=True), Distribution({}), count=50, seed=1, lesson_s=2.0, policy=still
+        )
 
 
 def test_steps_off_the_road_are_made_up_for_by_further_lessons():

@@ -1,8 +1,10 @@
 """The [teaching] table is read strictly."""
 
+import numpy as np
 import pytest
 
 from proxytune.errors import SettingsError
+from proxytune.learning.costs import Costs
 from proxytune.learning.settings import read_teaching
 from proxytune.settings import Section
 
@@ -26,6 +28,40 @@ def test_a_number_is_one_theta_and_a_pair_is_drawn_from(tmp_path):
     assert dict(read_proxies["nominal"].bounds) == {}
 
 
+def test_nothing_is_rehearsed_unless_it_is_asked_for(tmp_path):
+    assert read(tmp_path).rehearsal == 0.0
+    assert read(tmp_path).later_keys == {}
+    assert read(tmp_path, rehearsal=0.5).later_keys == {"rehearsal": 0.5}
+
+
+def test_the_expert_drives_and_a_sample_costs_one_unless_it_is_said_otherwise(tmp_path):
+    plain, other = read(tmp_path), read(tmp_path, proxy_lessons="learner", costs={"label": 2})
+    assert (plain.proxy_lessons, plain.target_lessons, plain.costs) == ("expert", "expert", Costs(1.0, 1.0, 0.0))
+    assert (other.later_keys, other.costs) == ({"proxy_lessons": "learner"}, Costs(1.0, 1.0, 2.0))
+
+
+@pytest.mark.parametrize("with_proxy", [False, True])
+def test_where_the_expert_drives_all_target_samples_are_off_policy(tmp_path, with_proxy):
+    told = read(tmp_path, costs={"off_policy": 2, "on_policy": 5, "label": 1})
+    assert told.target_cost(30, with_proxy=with_proxy) == 90.0
+
+
+def test_where_the_learner_drives_the_first_round_without_a_proxy_is_the_experts(tmp_path):
+    told = read(tmp_path, target_lessons="learner", costs={"off_policy": 2, "on_policy": 5, "label": 1})
+    counts = np.array([0.0, 4.5, 10.0, 11.0, 40.0])
+    assert told.target_cost(counts, with_proxy=False).tolist() == [0.0, 13.5, 30.0, 36.0, 210.0]
+    assert told.target_cost(counts, with_proxy=True).tolist() == [0.0, 27.0, 60.0, 66.0, 240.0]
+
+
+def test_what_a_proxy_saves_in_cost_is_the_difference_of_what_the_samples_cost(tmp_path):
+    told = read(tmp_path, target_lessons="learner", costs={"off_policy": 2, "on_policy": 5, "label": 1})
+    without, needed = np.array([0.0, 7.0, 500.0]), np.array([[0.0], [12.0]])
+    saved = told.target_cost(without, with_proxy=False) - told.target_cost(needed, with_proxy=True)
+    np.testing.assert_allclose(told.cost_saved(without=without, needed=needed), saved)
+    assert saved.shape == (2, 3)
+    assert read(tmp_path).cost_saved(without=400.0, needed=100.0) == 300.0
+
+
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
@@ -46,6 +82,15 @@ def test_a_number_is_one_theta_and_a_pair_is_drawn_from(tmp_path):
         ({"published": {"other": {}}}, "teaching.published.other: unknown key; known are: none"),
         ({"published": {"none": {"zero_shot": 0}}}, "teaching.published.none.samples: is missing"),
         ({"published": {"none": {"zero_shot": 0, "samples": 9, "reduction": 88}}}, "reduction: must be between"),
+        ({"rehearsal": 1.0}, "teaching.rehearsal: must be between 0 and 0.99"),
+        ({"rehearsal": -0.1}, "teaching.rehearsal: must be between 0 and 0.99"),
+        ({"target_lessons": "robot"}, "teaching.target_lessons: unknown value 'robot'; known are: expert, learner"),
+        ({"proxy_lessons": "lerner"}, "teaching.proxy_lessons: unknown value 'lerner'; did you mean 'learner'?"),
+        ({"costs": {"label": -1}}, "teaching.costs.label: must be between 0 and inf, got -1"),
+        ({"costs": {"on_policy": -0.5}}, "teaching.costs.on_policy: must be between 0"),
+        ({"costs": {"off_policy": float("inf")}}, "teaching.costs.off_policy: must be finite"),
+        ({"costs": {"label": "much"}}, "teaching.costs.label: must be a number"),
+        ({"costs": {"labels": 1}}, "teaching.costs.labels: unknown key; did you mean 'label'?"),
         ({"sedes": 3}, "teaching.sedes: unknown key; did you mean 'seeds'?"),
     ],
 )

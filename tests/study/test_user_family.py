@@ -55,6 +55,22 @@ def test_an_alias_drives_as_what_it_stands_for_and_other_agents_behind_it_are_an
     assert len({family.identity, Wobbly().identity, UserFamily(Wobbly(), "sim:make", ALIASES[:1]).identity}) == 3
 
 
+class Agents:
+    """Answers who drives, whatever is asked of an episode."""
+
+    def __getattr__(self, member):
+        if member.startswith("__"):
+            raise AttributeError(member)
+        return lambda episode, *rest: (member, episode.agent, *rest)
+
+
+@pytest.mark.parametrize("member", ["run", "record", "drive", "replay", "demonstrate", "guide", "examine"])
+def test_whatever_is_asked_of_an_episode_is_passed_on_by_the_name_that_the_family_knows(member):
+    family = UserFamily(Agents(), "sim:make", ALIASES)
+    episode = make_episode({}, agent="good", start=0, seed=1)
+    assert getattr(family, member)(episode, 1.5) == (member, "agent0", 1.5)
+
+
 @pytest.fixture
 def aliased(make_study):
     """A study whose target calls its agents a0, a1, …"""

@@ -1,12 +1,12 @@
 """What is cached of a learning experiment is found again only by what would make the very same."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import pytest
 from schoolroom import Matrix, Schoolroom
 from wobbly import Wobbly
 
-from proxytune.learning.cache import Cache
+from proxytune.learning.cache import Cache, digest
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.settings import TeachingSettings
 from proxytune.teaching.points import Point, TeachingSetup
@@ -23,7 +23,7 @@ class Timid(Matrix):
 
 
 def setup(folder, **changes):
-    amounts = {key: changes.pop(key) for key in ("proxy_samples", "lesson_s") if key in changes}
+    amounts = {key: changes.pop(key) for key in ("proxy_samples", "lesson_s", "rehearsal") if key in changes}
     settings = TeachingSettings(
         target=folder / "twin.toml",
         learner="schoolroom:Matrix",
@@ -89,3 +89,53 @@ def test_what_a_proxy_taught_is_shared_by_all_points_after_it(tmp_path):
     assert len(list(tmp_path.glob("samples-*.npz"))) == 2
     assert one.is_cached(Point("renamed", PROXY, 0, 40))
     assert not one.is_cached(Point("near", PROXY, 1, 40))
+
+
+@dataclass(frozen=True)
+class Noting(Matrix):
+    """Notes the samples of each training."""
+
+    trained: list = field(default_factory=list)
+
+    def train(self, samples, start, seed):
+        self.trained.append(samples)
+        return super().train(samples, start, seed)
+
+
+def test_a_fine_tuning_goes_over_the_proxys_samples_again_beside_the_targets(tmp_path):
+    plain, rehearsing = Noting(), Noting()
+    point = Point("near", PROXY, 0, 20)
+    setup(tmp_path / "plain", learner=plain).score(point)
+    setup(tmp_path / "rehearsing", learner=rehearsing, rehearsal=0.6).score(point)
+    taught, target = plain.trained[0].commands.tolist(), plain.trained[1].commands.tolist()
+    mixed = rehearsing.trained[1].commands.tolist()
+    assert rehearsing.trained[0].commands.tolist() == taught
+    assert (len(target), len(mixed)) == (20, 50)
+    assert mixed[:20] == target
+    assert all(sample in taught for sample in mixed[20:])
+
+
+def test_rehearsal_changes_fine_tunings_after_a_proxy_and_nothing_else(tmp_path):
+    plain, rehearsing = setup(tmp_path), setup(tmp_path, rehearsal=0.6)
+    tuned, taught, alone = Point("near", PROXY, 0, 20), Point("near", PROXY, 0, 0), Point("none", None, 0, 20)
+    assert plain.exam_facts(tuned) != rehearsing.exam_facts(tuned)
+    assert plain.exam_facts(tuned) != setup(tmp_path, rehearsal=0.5).exam_facts(tuned)
+    for point in (taught, alone):
+        assert plain.exam_facts(point) == rehearsing.exam_facts(point)
+    before = plain.score(tuned)
+    assert (
+        setup(tmp_path, rehearsal=0.6).score(tuned) == setup(tmp_path / "empty", rehearsal=0.6).score(tuned) != before
+    )
+
+
+# The names that files had then
+KEPT = {
+    "ff67f18fe321ea72a41a": Point("near", PROXY, 0, 20),
+    "454406ad67f24dd8d50c": Point("none", None, 0, 20),
+    "bfde94b57c9b6b4fe41f": Point("near", PROXY, 0, 0),
+}
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_what_was_kept_before_there_was_rehearsal_is_found_again(tmp_path, name):
+    assert digest(setup(tmp_path).exam_facts(KEPT[name])) == name

@@ -8,6 +8,19 @@ from numpy.typing import NDArray
 
 from proxytune.driving.agents.agent import Command, Picture
 from proxytune.driving.robot import Robot
+from proxytune.effects import Signal
+
+
+class Observation(NamedTuple):
+    """What recorded commands lead to.
+
+    Attributes:
+        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
+        pictures: The picture before every command, (steps, rows, columns, 3).
+    """
+
+    poses: Signal
+    pictures: NDArray[np.uint8]
 
 
 class Seen(NamedTuple):

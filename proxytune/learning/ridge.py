@@ -1,0 +1,87 @@
+"""Random features: a linear fit to random waves over a small picture, in closed form."""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.kernel_approximation import RBFSampler
+from sklearn.linear_model import Ridge
+from threadpoolctl import threadpool_limits
+
+from proxytune.domain import Demonstration
+from proxytune.errors import LearnerError
+from proxytune.learning.learner import Weights
+from proxytune.learning.pictures import grey_cells
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RandomFeatures:
+    """Ridge regression on random Fourier features (Rahimi and Recht 2007) of a picture averaged over cells.
+
+    From weights learnt elsewhere it fits what these leave to explain: samples change the answer to pictures like
+    theirs, and leave that to others as it was.
+
+    Attributes:
+        top: Share of the picture's rows, from the top, that is not looked at.
+        rows: Cells above one another in the rest.
+        columns: Cells beside one another.
+        features: Number of random features.
+        reach: How far apart two pictures are that have little to do with each other (root mean square over cells;
+            black and white are 1 apart).
+        penalty: What it costs to move the weights, against squared errors [duty²] summed over samples.
+    """
+
+    top: float = 0.25
+    rows: int = 12
+    columns: int = 16
+    features: int = 1000
+    reach: float = 0.15
+    penalty: float = 0.2
+
+    def train(self, samples: Demonstration, start: Weights | None, seed: int) -> Weights:
+        """Fit to the samples from scratch, or to what weights learnt elsewhere leave of them.
+
+        Raises:
+            LearnerError: If there is no sample, or the weights are of other pictures or other features.
+        """
+        if not len(samples.commands):
+            raise LearnerError("there is no sample to learn from; collect some, or do not train")
+        before = start or self._nothing(samples, seed)
+        seen = self._waves(before, samples.observations)
+        if before["slopes"].shape != (seen.shape[1], samples.commands.shape[1]):
+            raise LearnerError(
+                f"the weights to start from do not fit: slopes is {before['slopes'].shape} where these samples need "
+                f"{(seen.shape[1], samples.commands.shape[1])}; train the start with as many features and commands"
+            )
+        left = samples.commands - before["centre"] - seen @ before["slopes"]
+        with threadpool_limits(limits=1):
+            fitted = Ridge(alpha=self.penalty, fit_intercept=False, solver="cholesky").fit(seen, left)
+        return {**before, "slopes": before["slopes"] + fitted.coef_.T}
+
+    def act(self, weights: Weights, observation: NDArray[np.uint8]) -> Array:
+        """The command for one picture, within [−1, 1]."""
+        command: Array = weights["centre"] + self._waves(weights, observation[None])[0] @ weights["slopes"]
+        return np.clip(command, -1.0, 1.0)
+
+    def _nothing(self, samples: Demonstration, seed: int) -> Weights:
+        """Weights that answer every picture with the mean command."""
+        slopes = np.zeros((self.features, samples.commands.shape[1]))
+        return {"seed": np.array(seed), "centre": samples.commands.mean(axis=0), "slopes": slopes}
+
+    def _waves(self, weights: Weights, pictures: NDArray[np.uint8]) -> Array:
+        """Random features (n, features) of pictures, always the same for the same weights."""
+        cells = grey_cells(pictures, top=self.top, rows=self.rows, columns=self.columns)
+        gamma = 0.5 / (cells.shape[1] * self.reach**2)
+        directions, phases = _draw_waves(cells.shape[1], self.features, gamma, int(weights["seed"]))
+        waves: Array = np.sqrt(2.0 / self.features) * np.cos(cells @ directions + phases)
+        return waves
+
+
+@functools.lru_cache(maxsize=8)
+def _draw_waves(cells: int, features: int, gamma: float, seed: int) -> tuple[Array, Array]:
+    """Directions (cells, features) and phases (features,) of the waves that approximate a Gaussian kernel."""
+    sampler = RBFSampler(gamma=gamma, n_components=features, random_state=seed).fit(np.zeros((1, cells)))
+    return sampler.random_weights_, sampler.random_offset_

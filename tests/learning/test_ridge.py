@@ -1,0 +1,87 @@
+"""Random features learn what pictures show, the same under the same seed, and go on from other weights."""
+
+import numpy as np
+import pytest
+from leaning import error, pictures
+
+from proxytune.domain import Demonstration
+from proxytune.errors import LearnerError
+from proxytune.learning.pictures import grey_cells
+from proxytune.learning.ridge import RandomFeatures
+
+SMALL = RandomFeatures(rows=3, columns=4, features=200)
+
+
+def mirrored(samples):
+    """The same pictures, with the steering the other way round."""
+    return samples._replace(commands=samples.commands[:, ::-1].copy())
+
+
+def test_it_learns_a_planted_steering_far_better_than_a_constant_would():
+    weights = SMALL.train(pictures(400, 1), None, 1)
+    fresh = pictures(100, 2)
+    assert error(SMALL, weights, fresh) < 0.1 * np.abs(fresh.commands - 0.3).mean()
+
+
+def test_the_same_seed_gives_the_same_weights_to_the_last_bit_and_another_does_not():
+    one, again, other = (SMALL.train(pictures(60, 1), None, seed) for seed in (1, 1, 2))
+    assert all(np.array_equal(one[name], again[name]) for name in one)
+    assert not np.array_equal(one["slopes"], other["slopes"])
+
+
+def test_its_weights_are_the_least_of_squared_errors_and_penalty():
+    samples = pictures(80, 1)
+    weights = SMALL.train(samples, None, 1)
+    waves = SMALL._waves(weights, samples.observations)
+    left = samples.commands - weights["centre"] - waves @ weights["slopes"]
+    np.testing.assert_allclose(waves.T @ left, SMALL.penalty * weights["slopes"], atol=1e-10)
+
+
+def test_its_features_are_those_of_a_gaussian_kernel():
+    many = RandomFeatures(rows=3, columns=4, features=20_000, reach=0.2)
+    seen = pictures(2, 1).observations
+    first, second = many._waves({"seed": np.array(3)}, seen)
+    apart = np.diff(grey_cells(seen, top=0.25, rows=3, columns=4), axis=0)
+    assert first @ second == pytest.approx(np.exp(-0.5 * np.mean(apart**2) / 0.2**2), abs=0.02)
+    assert 0.1 < first @ second < 0.9
+
+
+def test_starting_from_weights_few_samples_leave_the_answer_to_other_pictures_as_it_was():
+    start = SMALL.train(pictures(400, 1), None, 1)
+    fresh = pictures(200, 2)
+    right, left = (np.flatnonzero(side)[:20] for side in (fresh.commands[:, 1] > 0.37, fresh.commands[:, 1] < 0.23))
+    few = mirrored(Demonstration(fresh.observations[right], fresh.commands[right]))
+    others = Demonstration(fresh.observations[left], fresh.commands[left])
+    tuned = SMALL.train(few, start, 1)
+    assert error(SMALL, tuned, few) < 0.1 * error(SMALL, start, few)
+    assert error(SMALL, tuned, others) < 0.1 * error(SMALL, start, few)
+
+
+def test_starting_from_weights_it_follows_samples_that_say_otherwise():
+    start = SMALL.train(pictures(400, 1), None, 1)
+    turned = mirrored(pictures(400, 4))
+    assert error(SMALL, SMALL.train(turned, start, 1), turned) < 0.1 * error(SMALL, start, turned)
+
+
+def test_it_goes_on_with_the_features_of_the_weights_it_starts_from_whatever_the_seed():
+    start = SMALL.train(pictures(60, 1), None, 1)
+    before = {name: values.copy() for name, values in start.items()}
+    one, other = (SMALL.train(pictures(60, 2), start, seed) for seed in (1, 2))
+    assert all(np.array_equal(one[name], other[name]) for name in one)
+    assert all(np.array_equal(start[name], before[name]) for name in before)
+
+
+def test_its_answers_are_within_what_a_command_can_be():
+    weights = {**SMALL.train(pictures(60, 1), None, 1), "centre": np.array((5.0, -5.0))}
+    assert SMALL.act(weights, pictures(1, 2).observations[0]).tolist() == [1.0, -1.0]
+
+
+def test_no_sample_is_nothing_to_learn_from():
+    with pytest.raises(LearnerError, match="no sample"):
+        SMALL.train(Demonstration(np.zeros((0, 12, 16, 3), np.uint8), np.zeros((0, 2))), None, 1)
+
+
+def test_weights_of_other_features_are_refused_with_both_shapes():
+    other = RandomFeatures(rows=3, columns=4, features=50).train(pictures(30, 1), None, 1)
+    with pytest.raises(LearnerError, match=r"slopes is \(50, 2\) where these samples need \(200, 2\)"):
+        SMALL.train(pictures(30, 1), other, 1)

@@ -1,21 +1,19 @@
 """The lane-following domain family: a robot on a map, its plant, camera and effects."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxytune.domain import Demonstration, Episode, Policy, Recording
 from proxytune.driving import task
 from proxytune.driving.agents import Picture
 from proxytune.driving.agents.loading import load_agent
-from proxytune.driving.agents.playback import Playback
+from proxytune.driving.agents.playback import Observation, Playback
 from proxytune.driving.agents.pupil import Pupil
-from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.bullet.renderer import BulletCamera
 from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
@@ -32,33 +30,22 @@ from proxytune.driving.episode import (
 )
 from proxytune.driving.expert import Expert
 from proxytune.driving.identity import earlier_identities, identity_of
+from proxytune.driving.lockstep import drive_together, groups_of
 from proxytune.driving.mounting import image_chain, mounted_camera
 from proxytune.driving.picture_size import with_columns
-from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
+from proxytune.driving.plants import fleet_at, plant_at
 from proxytune.driving.road.lane import off_map
 from proxytune.driving.road.maps import Road
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import Robot, read_robot, robot_home
 from proxytune.effects import Catalogue, Effect, Signal, Stage, effects_from, stage_chain
+from proxytune.errors import EpisodeError
 from proxytune.space import Parameter, Theta
 from proxytune.versions import versions_of
 
-PLANTS = ("bullet", "planar")
 CAMERAS = ("ground_plane", "renderer")
-
-
-class Observation(NamedTuple):
-    """What recorded commands lead to.
-
-    Attributes:
-        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
-        pictures: The picture before every command, (steps, rows, columns, 3).
-    """
-
-    poses: Signal
-    pictures: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -182,15 +169,33 @@ class LaneFollowing:
             EpisodeError: If the policy raises or does not answer with two finite duties.
             SettingsError: If the robot does not state the distance between its wheels.
         """
-        wheel_distance = read_robot(self.robot, self.folder).wheel_distance()
-        driven = self._drive(episode, Pupil(policy), self.course(episode, self.seconds))
-        return task.driving_score(
-            self.map,
-            driven.poses,
-            wheel_distance=wheel_distance,
-            tick_s=1.0 / TICK_HZ,
-            seconds=self.seconds,
-        )
+        score = self._driving_score()
+        return score(self._drive(episode, Pupil(policy), self.course(episode, self.seconds)).poses)
+
+    def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> list[float]:
+        """What `examine` says of each of several episodes, to the bit: those of one θ are driven side by side.
+
+        Raises:
+            EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
+        """
+        score = self._driving_score()
+        try:
+            return [score(poses) for group in groups_of(episodes) for poses in self._drive_together(group, policy)]
+        except EpisodeError:
+            # Side by side another episode may fail first
+            return [self.examine(episode, policy) for episode in episodes]
+
+    def _drive_together(self, episodes: Sequence[Episode], policy: Policy) -> list[Signal]:
+        instance = self.instance(dict(episodes[0].theta))
+        courses = [self.course(episode, self.seconds) for episode in episodes]
+        with fleet_at(self.plant, instance.robot, np.stack([course.start for course in courses])) as fleet:
+            return drive_together(instance, fleet, policy, courses)
+
+    def _driving_score(self) -> Callable[[Signal], float]:
+        """The paper's driving score of poses."""
+        wheels = read_robot(self.robot, self.folder).wheel_distance()
+        timed = functools.partial(task.driving_score, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        return functools.partial(timed, self.map, wheel_distance=wheels)
 
     def measured(self, episode: Episode, driven: Drive) -> Signal:
         """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
@@ -227,7 +232,7 @@ class LaneFollowing:
 
     def plant_at(self, robot: Robot, start: Signal) -> Plant:
         """The plant with the robot at a starting pose."""
-        return BulletPlant(robot, start, 1.0 / TICK_HZ) if self.plant == "bullet" else PlanarPlant(start, 1.0 / TICK_HZ)
+        return plant_at(self.plant, robot, start)
 
 
 @functools.lru_cache(maxsize=4)

@@ -18,6 +18,7 @@ SAME_CODE = (
     "560c6fcf838d5a1f165a4c832f91ef66c052dc5e6a018d86e8821c82f8ce09ba",
     "ee96ad59ba57936cdcf90478c33d5866ddf0b6bf557f67d25d93075eeea66c2e",
     "e7afcd8bcf722c7c3dc69d1b72e8843321624c2cb35ad3d9e6fe148b13f82818",
+    "37062a448ecdf7614af74a7eb297aa4956d8c1265c832598f8d92d17f848c632",
 )
 """What code means that drives the same episodes, the oldest first: that one names them all."""
 

@@ -1,7 +1,7 @@
 """Behaviour cloning: a small network from a small picture to the expert's command."""
 
+import functools
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,12 +69,18 @@ class BehaviourCloning:
 
     def act(self, weights: Weights, observation: NDArray[np.uint8]) -> Array:
         """The command for one picture, within [−1, 1]."""
-        signal = self.features(observation[None])[0]
+        command: Array = self.act_many(weights, observation[None])[0]
+        return command
+
+    def act_many(self, weights: Weights, observations: NDArray[np.uint8]) -> Array:
+        """The commands (n, 2) for pictures (n, rows, columns, 3), each as `act` has it, to the bit."""
+        # A product for each row: one over all rows rounds by how many there are
+        signal = self.features(observations)[:, None]
         for layer in range(len(self.hidden)):
             signal = np.maximum(0.0, signal @ weights[f"weight{layer}"] + weights[f"bias{layer}"])
         signal = signal @ weights[f"weight{len(self.hidden)}"] + weights[f"bias{len(self.hidden)}"]
-        command: Array = np.clip(weights["centre"] + weights["spread"] * signal, -1.0, 1.0)
-        return command
+        commands: Array = np.clip(weights["centre"] + weights["spread"] * signal[:, 0], -1.0, 1.0)
+        return commands
 
     def features(self, pictures: NDArray[np.uint8]) -> Array:
         """Grey cells (n, rows · columns) of pictures (n, rows, columns, 3), from −0.5 to 0.5.
@@ -138,7 +144,14 @@ def _layers(network: MLPRegressor) -> dict[str, Array]:
 
 def _cell_means(values: Array, cells: int, axis: int) -> Array:
     """Means over cells of nearly equal size along an axis."""
-    edges: Sequence[int] = np.linspace(0, values.shape[axis], cells + 1).round().astype(int).tolist()
+    firsts, sizes = _cells(values.shape[axis], cells)
     shape = [1] * values.ndim
     shape[axis] = cells
-    return np.asarray(np.add.reduceat(values, edges[:-1], axis=axis) / np.diff(edges).reshape(shape))
+    return np.asarray(np.add.reduceat(values, firsts, axis=axis) / sizes.reshape(shape))
+
+
+@functools.lru_cache
+def _cells(length: int, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each cell begins along an axis, and how many pixels it has."""
+    edges = np.linspace(0, length, cells + 1).round().astype(int)
+    return edges[:-1], np.diff(edges)

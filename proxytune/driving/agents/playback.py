@@ -17,6 +17,18 @@ class Seen(NamedTuple):
     pictures: tuple[Picture, ...]
 
 
+class Observation(NamedTuple):
+    """What recorded commands lead to.
+
+    Attributes:
+        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
+        pictures: The picture before every command, (steps, rows, columns, 3).
+    """
+
+    poses: NDArray[np.float64]
+    pictures: NDArray[np.uint8]
+
+
 @dataclass(frozen=True)
 class Playback:
     """Plays commands (steps, 2) one per control step, then the last one for ever."""

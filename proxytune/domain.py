@@ -1,6 +1,6 @@
 """What a study needs of a domain family, and nothing about how it simulates."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -145,7 +145,19 @@ class Demonstration(NamedTuple):
 
 
 Policy = Callable[[NDArray[Any]], NDArray[np.float64]]
-"""What has been learnt: from one observation to one command."""
+"""What has been learnt: from one observation to one command, whatever was asked before."""
+
+
+class BatchPolicy(Protocol):
+    """A policy that can also answer many observations at once, each as it answers that one, to the bit."""
+
+    def __call__(self, observation: NDArray[Any], /) -> NDArray[np.float64]:
+        """The command for one observation."""
+        ...
+
+    def act_many(self, observations: NDArray[Any], /) -> NDArray[np.float64]:
+        """The commands (n, channels) for observations (n, …)."""
+        ...
 
 
 class Classroom(DomainFamily, Protocol):
@@ -190,5 +202,17 @@ class OnPolicyClassroom(Classroom, Protocol):
 
         Raises:
             EpisodeError: If the domain or the policy fails.
+        """
+        ...
+
+
+class BatchClassroom(Classroom, Protocol):
+    """A classroom that can examine a policy in several episodes at once, faster than one after the other."""
+
+    def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> Sequence[float]:
+        """The score of a policy in each episode, what `examine` gives for it.
+
+        Raises:
+            EpisodeError: As in `examine`.
         """
         ...

@@ -105,7 +105,7 @@ class Course:
     ended: Callable[[float, float], bool]
 
 
-class _View:
+class View:
     """The camera with its image effects: the newest picture at the camera's rate."""
 
     def __init__(self, instance: Instance, start: Signal, seed: int) -> None:
@@ -113,18 +113,17 @@ class _View:
         self._every = round(TICK_HZ / instance.robot.figures["camera_rate"])
         first = self._camera.render(start[None])
         self._shape = first.shape[1:]
-        setting = Setting(TICK_HZ, first.reshape(-1), instance.robot.figures, seed)
-        self._memory = self._chain.begin(setting)
+        self._memory = self._chain.begin(Setting(TICK_HZ, first.reshape(-1), instance.robot.figures, seed))
+        self._wanted = self._chain.looked_at(self._every, self._memory)
         self._waiting = np.empty((0, 3))
         self.picture: Picture = self._develop(first)
 
     def pass_by(self, poses: Signal) -> None:
         """Let the shutter see the poses of the next ticks."""
         self._waiting = np.concatenate((self._waiting, poses))
-        wanted = self._every if self._chain.effects else 1  # without effects only the last sub-frame is seen
         while len(self._waiting) >= self._every:
             seen, self._waiting = self._waiting[: self._every], self._waiting[self._every :]
-            self.picture = self._develop(self._camera.render(seen[-wanted:]))
+            self.picture = self._develop(self._camera.render(seen[-self._wanted :]))
 
     def _develop(self, pictures: NDArray[np.uint8]) -> Picture:
         signal = pictures.reshape(len(pictures), -1)
@@ -148,7 +147,7 @@ class Rollout:
         self._drivetrain, self._plant, self._course = instance.drivetrain, plant, course
         self._hold = round(TICK_HZ / figures["control_rate"])
         self._memory = instance.drivetrain.begin(_setting(figures, course))
-        self._view = _View(instance, course.start, course.seed)
+        self._view = View(instance, course.start, course.seed)
         self.steps = round(course.seconds * figures["control_rate"])
         self.poses: Signal = course.start[None]
         self.crashed = False
@@ -199,7 +198,7 @@ def drive(
     poses, commands = [rollout.poses], []
     for step in range(rollout.steps):
         seen = sees(rollout.picture, rollout.poses[-1])
-        command, remembered = _ask(driver, seen, remembered, step / control_hz)
+        command, remembered = ask(driver, seen, remembered, step / control_hz)
         rollout.step(command)
         poses.append(rollout.poses)
         commands.append(command)
@@ -226,7 +225,8 @@ def _begin(driver: Driver, robot: Robot) -> Any:
         raise EpisodeError(f"raised {type(problem).__name__} before the first picture: {problem}") from problem
 
 
-def _ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command, Any]:
+def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command, Any]:
+    """A driver's next command and memory; an error tells the time [s]."""
     try:
         answer, memory = driver.act(seen, memory)
         command = np.asarray(answer, dtype=float)

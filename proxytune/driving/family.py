@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from proxytune.driving.body import check_body
-from proxytune.driving.lane_following import CAMERAS, PLANTS, LaneFollowing
+from proxytune.driving.lane_following import LaneFollowing
+from proxytune.driving.plants import PLANTS
+from proxytune.driving.renderers import CAMERAS
 from proxytune.driving.road.reading import chosen_map
 from proxytune.driving.robot import Robot, read_robot, robot_names
 from proxytune.effects import Catalogue, read_effects, read_model

@@ -1,8 +1,8 @@
 """The lane-following domain family: a robot on a map, its plant, camera and effects."""
 
 import functools
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,6 @@ from proxytune.driving.agents import Picture
 from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.agents.playback import Observation, Playback
 from proxytune.driving.agents.pupil import Pupil
-from proxytune.driving.bullet.plant import BulletPlant
-from proxytune.driving.bullet.renderer import BulletCamera
-from proxytune.driving.cameras import Camera, GroundPlaneCamera
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import (
     TICK_HZ,
@@ -31,21 +28,21 @@ from proxytune.driving.episode import (
 )
 from proxytune.driving.expert import lesson_driver
 from proxytune.driving.identity import earlier_identities, identity_of
+from proxytune.driving.lockstep import drive_together, groups_of
 from proxytune.driving.mounting import image_chain, mounted_camera
 from proxytune.driving.picture_size import with_columns
-from proxytune.driving.planar import PlanarPlant
 from proxytune.driving.plant import Plant
+from proxytune.driving.plants import fleet_at, plant_at
+from proxytune.driving.renderers import camera_over
 from proxytune.driving.road.lane import off_map
 from proxytune.driving.road.maps import Road
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import Robot, read_robot, robot_home
-from proxytune.effects import Catalogue, Effect, Signal, Stage, effects_from, stage_chain
+from proxytune.effects import Catalogue, Signal, Stage, effects_from, stage_chain
+from proxytune.errors import EpisodeError
 from proxytune.space import Parameter, Theta
 from proxytune.versions import versions_of
-
-PLANTS = ("bullet", "planar")
-CAMERAS = ("ground_plane", "renderer")
 
 
 @dataclass(frozen=True)
@@ -179,15 +176,33 @@ class LaneFollowing:
             EpisodeError: If the policy raises or does not answer with two finite duties.
             SettingsError: If the robot does not state the distance between its wheels.
         """
-        wheel_distance = read_robot(self.robot, self.folder).wheel_distance()
-        driven = self._drive(episode, Pupil(policy), self.course(episode, self.seconds))
-        return task.driving_score(
-            self.map,
-            driven.poses,
-            wheel_distance=wheel_distance,
-            tick_s=1.0 / TICK_HZ,
-            seconds=self.seconds,
-        )
+        score = self._driving_score()
+        return score(self._drive(episode, Pupil(policy), self.course(episode, self.seconds)).poses)
+
+    def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> list[float]:
+        """What `examine` says of each of several episodes, to the bit: those of one θ are driven side by side.
+
+        Raises:
+            EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
+        """
+        score = self._driving_score()
+        try:
+            return [score(poses) for group in groups_of(episodes) for poses in self._drive_together(group, policy)]
+        except EpisodeError:
+            # Side by side another episode may fail first
+            return [self.examine(episode, policy) for episode in episodes]
+
+    def _drive_together(self, episodes: Sequence[Episode], policy: Policy) -> list[Signal]:
+        instance = self.instance(dict(episodes[0].theta))
+        courses = [self.course(episode, self.seconds) for episode in episodes]
+        with fleet_at(self.plant, instance.robot, np.stack([course.start for course in courses])) as fleet:
+            return drive_together(instance, fleet, policy, courses)
+
+    def _driving_score(self) -> Callable[[Signal], float]:
+        """The paper's driving score of poses."""
+        wheels = read_robot(self.robot, self.folder).wheel_distance()
+        timed = functools.partial(task.driving_score, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        return functools.partial(timed, self.map, wheel_distance=wheels)
 
     def measured(self, episode: Episode, driven: Drive) -> Signal:
         """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
@@ -199,17 +214,15 @@ class LaneFollowing:
         It goes on wherever it leads, so that two domains can be compared step by step.
         """
         seconds = len(commands) / read_robot(self.robot, self.folder).figures["control_rate"]
-        course = Course(self._start(episode), seconds, episode.seed, lambda x, y: False)
-        driven = self._drive(episode, Playback(commands), course)
+        endless = replace(self.course(episode, seconds), ended=lambda x, y: False)
+        driven = self._drive(episode, Playback(commands), endless)
         return Observation(driven.poses, np.stack(driven.memory.pictures))
-
-    def _start(self, episode: Episode) -> Signal:
-        noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
-        return np.asarray(task.start_pose(self.map, episode.start, seed=episode.seed, **noise))
 
     def course(self, episode: Episode, seconds: float) -> Course:
         """Where an episode starts, and its end: after some time [s], or off the map."""
-        return Course(self._start(episode), seconds, episode.seed, functools.partial(off_map, self.map))
+        noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
+        start = np.asarray(task.start_pose(self.map, episode.start, seed=episode.seed, **noise))
+        return Course(start, seconds, episode.seed, functools.partial(off_map, self.map))
 
     def _drive(
         self, episode: Episode, driver: Driver, course: Course, sees: Callable[[Picture, Signal], Any] = picture_only
@@ -224,7 +237,7 @@ class LaneFollowing:
 
     def plant_at(self, robot: Robot, start: Signal) -> Plant:
         """The plant with the robot at a starting pose."""
-        return BulletPlant(robot, start, 1.0 / TICK_HZ) if self.plant == "bullet" else PlanarPlant(start, 1.0 / TICK_HZ)
+        return plant_at(self.plant, robot, start)
 
 
 @functools.lru_cache(maxsize=4)
@@ -232,11 +245,6 @@ def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...], colum
     named = read_robot(family.robot, family.folder)
     robot = with_columns(named, columns) if columns else named
     effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
-    camera = _camera(family, robot, effects)
+    camera = camera_over(draw_floor(family.map), mounted_camera(robot, effects), family.camera)
     image, measurement = image_chain(effects, robot.figures), stage_chain(effects, Stage.MEASUREMENT)
     return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
-
-
-def _camera(family: LaneFollowing, robot: Robot, effects: tuple[Effect, ...]) -> Camera:
-    mounted, floor = mounted_camera(robot, effects), draw_floor(family.map)
-    return GroundPlaneCamera(mounted, floor) if family.camera == "ground_plane" else BulletCamera(mounted, floor)

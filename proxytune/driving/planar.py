@@ -1,5 +1,6 @@
 """The planar plant: kinematics over whole arrays of time, exact for twists that hold over a tick."""
 
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -54,3 +55,17 @@ class PlanarPlant:
         self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
     ) -> None:
         return None
+
+
+class PlanarFleet:
+    """Robots side by side, each as a PlanarPlant."""
+
+    def __init__(self, starts: Signal, tick_s: float) -> None:
+        self._poses = np.array(starts, dtype=float)
+        self._tick_s = tick_s
+
+    def move(self, twists: Signal, robots: Sequence[int]) -> tuple[Signal, Sequence[bool]]:
+        """Follow twists, each for one tick."""
+        poses = integrate(self._poses[robots], twists[robots], self._tick_s)
+        self._poses[robots] = poses[:, -1]
+        return poses, [False] * len(robots)

@@ -1,8 +1,9 @@
 """Effects in a row: what one stage of a domain instance does to its signal."""
 
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from proxytune.effects.effect import Effect, Memory, Recalling, Setting, Signal, Stage
 
@@ -52,12 +53,22 @@ class Chain:
 
         An effect that makes it for less than the whole chunk has a method `newest` of its own.
         """
-        newest = getattr(self.effects[0], "newest", None) if len(self.effects) == 1 else None
+        newest = self._own("newest")
         if newest:
             sample, memory = newest(signal, memories[0])
             return sample, (memory,)
         filtered, memories = self.apply(signal, memories)
         return filtered[..., -1, :], memories
+
+    def looked_at(self, chunk: int, memories: tuple[Memory, ...]) -> int:
+        """How many samples, at the end of each chunk of so many, `newest` looks at if no other method is called."""
+        looked_at = self._own("looked_at")
+        if not self.effects:
+            return 1
+        return min(chunk, looked_at(memories[0])) if looked_at else chunk
+
+    def _own(self, method: str) -> Callable[..., Any] | None:
+        return getattr(self.effects[0], method, None) if len(self.effects) == 1 else None
 
 
 def stage_chain(effects: Iterable[Effect], stage: Stage) -> Chain:

@@ -69,12 +69,18 @@ class BehaviourCloning:
 
     def act(self, weights: Weights, observation: NDArray[np.uint8]) -> Array:
         """The command for one picture, within [−1, 1]."""
-        signal = self.features(observation[None])[0]
+        command: Array = self.act_many(weights, observation[None])[0]
+        return command
+
+    def act_many(self, weights: Weights, observations: NDArray[np.uint8]) -> Array:
+        """The commands (n, 2) for pictures (n, rows, columns, 3), each as `act` has it, to the bit."""
+        # A product for each row: one over all rows rounds by how many there are
+        signal = self.features(observations)[:, None]
         for layer in range(len(self.hidden)):
             signal = np.maximum(0.0, signal @ weights[f"weight{layer}"] + weights[f"bias{layer}"])
         signal = signal @ weights[f"weight{len(self.hidden)}"] + weights[f"bias{len(self.hidden)}"]
-        command: Array = np.clip(weights["centre"] + weights["spread"] * signal, -1.0, 1.0)
-        return command
+        commands: Array = np.clip(weights["centre"] + weights["spread"] * signal[:, 0], -1.0, 1.0)
+        return commands
 
     def features(self, pictures: NDArray[np.uint8]) -> Array:
         """Grey cells (n, rows · columns) of pictures (n, rows, columns, 3), from −0.5 to 0.5.

@@ -1,6 +1,6 @@
 """What learners see of a camera's picture: its grey values, averaged over cells."""
 
-from collections.abc import Sequence
+import functools
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,14 @@ def grey_cells(pictures: NDArray[np.uint8], *, top: float, rows: int, columns: i
 
 def _cell_means(values: Array, cells: int, axis: int) -> Array:
     """Means over cells of nearly equal size along an axis."""
-    edges: Sequence[int] = np.linspace(0, values.shape[axis], cells + 1).round().astype(int).tolist()
+    firsts, sizes = _cells(values.shape[axis], cells)
     shape = [1] * values.ndim
     shape[axis] = cells
-    return np.asarray(np.add.reduceat(values, edges[:-1], axis=axis) / np.diff(edges).reshape(shape))
+    return np.asarray(np.add.reduceat(values, firsts, axis=axis) / sizes.reshape(shape))
+
+
+@functools.lru_cache
+def _cells(length: int, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each cell begins along an axis, and how many pixels it has."""
+    edges = np.linspace(0, length, cells + 1).round().astype(int)
+    return edges[:-1], np.diff(edges)

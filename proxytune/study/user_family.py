@@ -3,7 +3,7 @@
 import functools
 import hashlib
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,8 @@ from proxytune.extensions import ask
 MISSING = object()
 ON_EPISODES = ("run", "record", "drive", "replay", "demonstrate", "guide", "examine")
 """Methods whose first argument is an episode."""
+ON_SEVERAL = ("examine_together",)
+"""Methods whose first argument is a list of them."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,9 @@ class UserFamily:
         value = ask(f"{member} of {self.name}", functools.partial(self._member, member))
         if value is MISSING:
             raise AttributeError(f"{self.name} has no '{member}'")
-        return functools.partial(self._on_episode, value) if member in ON_EPISODES and self.aliases else value
+        if self.aliases and member in ON_EPISODES:
+            return functools.partial(self._on_episode, value)
+        return functools.partial(self._on_several, value) if self.aliases and member in ON_SEVERAL else value
 
     @property
     def identity(self) -> str:
@@ -84,7 +88,13 @@ class UserFamily:
         return hashlib.sha256(text).hexdigest()[:16] if self.aliases else identity
 
     def _on_episode(self, method: Callable[..., Any], episode: Episode, *rest: Any, **named: Any) -> Any:
-        return method(replace(episode, agent=self._loaded(episode.agent)), *rest, **named)
+        return method(self._loaded_in(episode), *rest, **named)
+
+    def _on_several(self, method: Callable[..., Any], episodes: Sequence[Episode], *rest: Any, **named: Any) -> Any:
+        return method([self._loaded_in(episode) for episode in episodes], *rest, **named)
+
+    def _loaded_in(self, episode: Episode) -> Episode:
+        return replace(episode, agent=self._loaded(episode.agent))
 
 
 def has_member(family: Any, member: str) -> bool:

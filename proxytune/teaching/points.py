@@ -12,7 +12,8 @@ from threadpoolctl import threadpool_limits
 from proxytune.domain import Classroom, make_episode
 from proxytune.errors import EpisodeError, LearnerError
 from proxytune.learning.cache import Arrays, Cache, digest
-from proxytune.learning.learner import Learner
+from proxytune.learning.examination import examine
+from proxytune.learning.learner import Learner, policy_of
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.settings import LEARNER, TeachingSettings
 from proxytune.running.workers import working
@@ -126,12 +127,9 @@ class TeachingSetup:
         weights = self._stage(point).weights(point.count)
         if weights is None:
             return {"scores": np.full(self.starts, np.nan)}
-        policy = functools.partial(self.learner.act, weights)
-        scores = [
-            self.target.examine(make_episode({}, agent=PUPIL, start=start, seed=exam_seed(self.seed, start)), policy)
-            for start in range(self.starts)
-        ]
-        return {"scores": np.array(scores)}
+        seeds = [exam_seed(self.seed, start) for start in range(self.starts)]
+        episodes = [make_episode({}, agent=PUPIL, start=start, seed=seed) for start, seed in enumerate(seeds)]
+        return {"scores": np.array(examine(self.target, episodes, policy_of(self.learner, weights)))}
 
 
 @contextmanager

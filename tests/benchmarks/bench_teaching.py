@@ -20,13 +20,14 @@ from proxytune.driving.agents.pupil import Pupil
 from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.drivetrain import Drivetrain
-from proxytune.driving.episode import _View, drive
+from proxytune.driving.episode import View, drive
 from proxytune.driving.expert import Expert
 from proxytune.driving.family import lane_following
 from proxytune.driving.lane_following import LaneFollowing
-from proxytune.driving.planar import PlanarPlant
+from proxytune.driving.planar import PlanarFleet, PlanarPlant
 from proxytune.learning.cache import Cache
 from proxytune.learning.cloning import BehaviourCloning
+from proxytune.learning.learner import policy_of
 from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.settings import Section
 from proxytune.study.settings import read_study_settings
@@ -90,7 +91,7 @@ def test_lessons(capsys, plant, model):
         capsys,
         f"{plant}{' twin' if model else ''}: {seconds / len(what):.3f} s per lesson of {LESSON_S:g} s, "
         f"{kept / seconds:.0f} samples/s, {kept / len(what):.0f} samples kept per lesson",
-        f"  of a lesson: picture {share(stats, _View.pass_by, drive)}, expert {share(stats, Expert.act, drive)}, "
+        f"  of a lesson: picture {share(stats, View.pass_by, drive)}, expert {share(stats, Expert.act, drive)}, "
         f"drivetrain effects {share(stats, Drivetrain.apply, drive)}, plant {share(stats, moves(plant), drive)}",
     )
 
@@ -129,11 +130,29 @@ def test_examination(capsys, plant, model):
     tell(
         capsys,
         f"{plant}{' twin' if model else ''}: {seconds:.2f} s per examination of {domain.seconds:g} s",
-        f"  picture {share(stats, _View.pass_by, drive)} "
+        f"  picture {share(stats, View.pass_by, drive)} "
         f"(rendering {share(stats, GroundPlaneCamera.render, drive)}, "
-        f"image effects {share(stats, _View._develop, drive)}), "
+        f"image effects {share(stats, View._develop, drive)}), "
         f"answer {share(stats, Pupil.act, drive)} (features {share(stats, BehaviourCloning.features, drive)}), "
         f"drivetrain effects {share(stats, Drivetrain.apply, drive)}, plant {share(stats, moves(plant), drive)}",
+    )
+
+
+@pytest.mark.parametrize(("plant", "model"), [("bullet", TWIN), ("planar", TWIN)])
+def test_examination_of_ten_starts(capsys, plant, model):
+    """One after the other, and side by side."""
+    policy = policy_of(LEARNER, LEARNER.train(samples(plant, 1000), None, 0))
+    domain = family(plant, model)
+    what = [make_episode({}, agent="pupil", start=start, seed=start) for start in range(domain.starts)]
+    alone = timed(lambda: [domain.examine(one, policy) for one in what])
+    together = min(timed(lambda: domain.examine_together(what, policy)) for _ in range(3))
+    stats = profiled(lambda: domain.examine_together(what, policy))
+    tell(
+        capsys,
+        f"{plant} twin: {alone:.2f} s for {len(what)} starts one after the other, {together:.2f} s side by side",
+        f"  pictures {share(stats, View.pass_by)} (rendering {share(stats, GroundPlaneCamera.render)}), "
+        f"answers {share(stats, BehaviourCloning.act_many)}, drivetrain effects {share(stats, Drivetrain.apply)}, "
+        f"plant {share(stats, BulletPlant.move if plant == 'bullet' else PlanarFleet.move)}",
     )
 
 
@@ -148,5 +167,5 @@ def test_learning_curve(tmp_path, capsys):
         capsys,
         f"learning curve of {len(counts)} counts × {setup.starts} starts: {stats.total_tt:.1f} s, profiled",
         f"  demonstrate {share(stats, LaneFollowing.demonstrate)}, train {share(stats, BehaviourCloning.train)}, "
-        f"examine {share(stats, LaneFollowing.examine)}, all of it {share(stats, TeachingSetup.score)}",
+        f"examine {share(stats, LaneFollowing.examine_together)}, all of it {share(stats, TeachingSetup.score)}",
     )

@@ -77,11 +77,20 @@ def test_a_scene_that_stands_still_hides_the_shutter(effect):
 def test_the_newest_blurred_picture_alone_is_that_of_the_whole_chunk_to_the_last_bit(blur, chunks):
     pictures = np.random.default_rng(0).integers(0, 256, (sum(chunks), 12)).astype(np.float32)
     chain = Chain((Blur(blur),))
-    whole = alone = chain.begin(Setting(RATE_HZ, pictures[0], NOMINAL))
+    whole = alone = cut = chain.begin(Setting(RATE_HZ, pictures[0], NOMINAL))
     for chunk in np.split(pictures, np.cumsum(chunks)[:-1]):
         developed, whole = chain.apply(chunk, whole)
         newest, alone = chain.newest(chunk, alone)
         np.testing.assert_array_equal(newest, developed[-1])
+        newest, cut = chain.newest(chunk[-chain.looked_at(len(chunk), cut) :], cut)
+        np.testing.assert_array_equal(newest, developed[-1])
+
+
+def test_only_blur_alone_makes_do_with_less_than_a_chunk():
+    setting = Setting(RATE_HZ, np.zeros(ROWS * COLUMNS * 3), NOMINAL)
+    for effects, expected in (((Blur(0.1),), 3), ((Blur(0.9),), 4), ((CameraLatency(0.1),), 4), ((Blur(0.1),) * 2, 4)):
+        chain = Chain(effects)
+        assert chain.looked_at(4, chain.begin(setting)) == expected
 
 
 def test_blur_behind_another_effect_is_of_the_whole_chunk():

@@ -76,3 +76,13 @@ def test_weights_of_another_network_are_refused_with_both_shapes():
 def test_one_sample_can_be_learnt_from():
     weights = SMALL.train(pictures(1, 1), None, 1)
     assert np.isfinite(SMALL.act(weights, pictures(1, 1).observations[0])).all()
+
+
+@pytest.mark.parametrize("learner", [SMALL, replace(SMALL, hidden=(7, 5)), replace(SMALL, rows=5, columns=7)])
+def test_many_pictures_are_answered_to_the_bit_as_each_by_itself(learner):
+    samples = pictures(33, 4)
+    weights = learner.train(samples, None, 1)
+    alone = np.array([learner.act(weights, picture) for picture in samples.observations])
+    for count in (1, 2, 10, 33):
+        answered = learner.act_many(weights, samples.observations[:count])
+        np.testing.assert_array_equal(answered, alone[:count])

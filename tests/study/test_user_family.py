@@ -71,6 +71,18 @@ def test_whatever_is_asked_of_an_episode_is_passed_on_by_the_name_that_the_famil
     assert getattr(family, member)(episode, 1.5) == (member, "agent0", 1.5)
 
 
+class Examiner(Wobbly):
+    def examine_together(self, episodes, policy):
+        return [(episode.agent, policy) for episode in episodes]
+
+
+def test_several_episodes_are_examined_under_the_names_that_the_family_loads():
+    episodes = [make_episode({}, agent=agent, start=0, seed=1) for agent in ("good", "pupil")]
+    assert UserFamily(Examiner(), "sim:make", ALIASES).examine_together(episodes, 3) == [("agent0", 3), ("pupil", 3)]
+    assert UserFamily(Examiner(), "sim:make").examine_together(episodes, 3) == [("good", 3), ("pupil", 3)]
+    assert not hasattr(UserFamily(Wobbly(), "sim:make", ALIASES), "examine_together")
+
+
 @pytest.fixture
 def aliased(make_study):
     """A study whose target calls its agents a0, a1, …"""

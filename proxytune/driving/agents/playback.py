@@ -8,7 +8,13 @@ from numpy.typing import NDArray
 
 from proxytune.driving.agents.agent import Command, Picture
 from proxytune.driving.robot import Robot
-from proxytune.effects import Signal
+
+
+class Seen(NamedTuple):
+    """How many commands have been played, and the picture before each."""
+
+    played: int
+    pictures: tuple[Picture, ...]
 
 
 class Observation(NamedTuple):
@@ -19,15 +25,8 @@ class Observation(NamedTuple):
         pictures: The picture before every command, (steps, rows, columns, 3).
     """
 
-    poses: Signal
+    poses: NDArray[np.float64]
     pictures: NDArray[np.uint8]
-
-
-class Seen(NamedTuple):
-    """How many commands have been played, and the picture before each."""
-
-    played: int
-    pictures: tuple[Picture, ...]
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,10 @@ class Blur:
         joined = np.concatenate((memory.pictures[..., new.shape[-2] - 1 :, :], new), axis=-2)
         return memory.weights @ joined, Exposed(joined[..., 1:, :], memory.weights)
 
+    def looked_at(self, memory: Exposed) -> int:
+        """How many pictures `newest` averages."""
+        return memory.weights.size
+
 
 @dataclass(frozen=True)
 class RollingShutter:

@@ -51,10 +51,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     """
     metrics = [Metric.parse(text) for text in arguments.metric]
     settings = read_study_settings(arguments.path)
-    with Store.read(settings.folder) as store:
+    with Store.read(settings.home) as store:
         study = open_to_look(settings, store)
         result, curves = _read(stored_run(study, store), metrics)
-    folder = _folder(settings.folder, metrics)
+    folder = _folder(settings.home, metrics)
     figures = draw_curves(curves, folder / "figures", study.truth)
     shown = result.study.settings if result else settings
     pages = [str(page) for page in _pages(shown, curves, folder / "figures", typed(arguments))]

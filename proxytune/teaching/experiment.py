@@ -81,7 +81,7 @@ def load_setup(settings: StudySettings) -> TeachingSetup:
         settings=taught,
         seed=settings.seed,
         starts=settings.starts,
-        cache=Cache(settings.folder / CACHE),
+        cache=Cache(settings.home / CACHE),
     )
 
 

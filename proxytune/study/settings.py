@@ -11,7 +11,8 @@ from proxytune.scores import Metric
 from proxytune.search.engines.registry import DEFAULT_ENGINE, SCORE_ENGINE
 from proxytune.settings import Section, nearest, read_settings
 from proxytune.space import Interval, Space
-from proxytune.study.families.reading import FAMILIES, family_tables, study_around
+from proxytune.storage.own_files import FAMILIES
+from proxytune.study.families.reading import family_tables, study_around
 from proxytune.study.sides import agents_of, aliases_of, metrics_of, targets_of, texts_of
 from proxytune.study.stop_rules import StopRules, positive, read_stop_rules
 
@@ -129,7 +130,7 @@ class StudySettings:
         """
         if self.families:
             one = self.home / FAMILIES / next(iter(self.families))
-            raise self.error(FAMILIES, f"are a study each, and this is of one; give one of them: {one}")
+            raise self.error(FAMILIES, f"each of these is a study of its own, and one is needed; give one, as {one}")
 
 
 def read_study_settings(path: Path) -> StudySettings:

@@ -74,8 +74,8 @@ def load_setup(settings: StudySettings) -> TeachingSetup:
     taught = teaching_settings(settings)
     learner, identity = _load_learner(settings, taught.learner)
     return TeachingSetup(
-        proxy=_classroom(settings, settings.proxy),
-        target=_classroom(settings, taught.target),
+        proxy=classroom(settings, settings.proxy),
+        target=classroom(settings, taught.target),
         learner=learner,
         learner_identity=identity,
         settings=taught,
@@ -182,7 +182,12 @@ def check_proxies(settings: StudySettings, setup: TeachingSetup, proxies: Mappin
             check_bounds(settings, setup.proxy, key, name, (low, high), given)
 
 
-def _classroom(settings: StudySettings, model: Path | None) -> Classroom:
+def classroom(settings: StudySettings, model: Path | None) -> Classroom:
+    """The domain family that a study names, with a model; it can teach.
+
+    Raises:
+        SettingsError: If it cannot.
+    """
     family = load_family(settings, model)
     lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
     if lacks:

@@ -1,0 +1,119 @@
+"""Several families for people: what each predicts, teaches and costs, and the θ of each."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from proxytune.report.families.words import (
+    difference_text,
+    differences,
+    families_sentence,
+    more_text,
+    prpv_text,
+    seconds_text,
+)
+from proxytune.report.numbers import short, span
+from proxytune.report.study.finding import known_parameters
+from proxytune.report.study.theta_table import short4
+from proxytune.report.teaching.table import UNKNOWN, count
+from proxytune.study.families.compared import ComparedFamilies, TunedFamily
+
+Row = tuple[str, ...]
+USES, THETA = "Which simulator, and for what (95 % intervals)", "Best θ of each"
+
+
+def families_table(compared: ComparedFamilies, files: Mapping[str, Any]) -> RenderableType:
+    """Several families as `study` shows them."""
+    shown = [
+        part
+        for title, columns, rows in (
+            (USES, use_columns(compared), use_rows(compared)),
+            (THETA, theta_columns(compared), theta_rows(compared)),
+        )
+        for part in (Text(f"\n{title}", style="bold"), _table(columns, rows))
+    ]
+    notes = [Text(f"note: {note}") for note in use_notes(compared)]
+    return Group(
+        Text(families_sentence(compared)), *shown, *notes, *(Text(f"{name}: {path}") for name, path in files.items())
+    )
+
+
+def use_columns(compared: ComparedFamilies) -> Row:
+    """The heads of the first table; PLV has columns only where it was asked for."""
+    taught = ("PLV", "more than highest") if compared.settings.teaching else ()
+    return ("family", "fresh PRPV", "more than lowest", *taught, "s per episode", "tuned for", "trials")
+
+
+def use_rows(compared: ComparedFamilies) -> list[Row]:
+    """A row per family, in the order of study.toml."""
+    costs, more = compared.seconds_per_episode(), differences(compared)
+    return [
+        (
+            one.name,
+            prpv_text(one.fresh) if one.fresh else "not known",
+            difference_text(more[one.name]) if one.name in more else "",
+            *_taught(compared, one.name),
+            seconds_text(*costs[one.name]),
+            f"{short(one.seconds)} s",
+            str(len(one.result.trials)),
+        )
+        for one in compared.families
+    ]
+
+
+def _taught(compared: ComparedFamilies, name: str) -> Row:
+    if not compared.settings.teaching:
+        return ()
+    lesson = compared.lessons.get(name)
+    if lesson is None or lesson.plv is None:
+        return (UNKNOWN if lesson is None or not lesson.failure else more_text(lesson), "")
+    return (count(lesson.plv, UNKNOWN), more_text(lesson))
+
+
+def use_notes(compared: ComparedFamilies) -> list[str]:
+    """What the numbers are, and what a family's own study had to say of it."""
+    lines = ["PRPV is of fresh episodes at the best θ, from the same starts and under the same seeds in every family"]
+    lines += [f"{one.name}: {line}" for one in compared.families for line in _said(one)]
+    lines += [f"{name}: {one.failure}" for name, one in compared.lessons.items() if one.failure]
+    return lines
+
+
+def _said(one: TunedFamily) -> list[str]:
+    """What a family's own study has to say: a misfit, a perfect one, and a time that was not spent."""
+    result, time = one.result, one.result.study.settings.stop.wall_time_s or 0.0
+    lines = ["no θ explains the target's scores: it lacks something"] if result.knowledge.misfit.fits is False else []
+    lines += ["no difference from the target can be seen"] if result.perfect else []
+    early = f"{short(one.seconds)} of {time:g} s were spent: {result.stopped or 'its trials have not ended'}"
+    return lines + ([early] if one.seconds < time else [])
+
+
+def theta_columns(compared: ComparedFamilies) -> Row:
+    """The heads of the table of θ."""
+    return ("parameter", *(one.name for one in compared.families))
+
+
+def theta_rows(compared: ComparedFamilies) -> list[Row]:
+    """A row per parameter of any family: the best value with its 95 % interval."""
+    known = [{p.name: p for p in known_parameters(one.result)} for one in compared.families]
+    names = dict.fromkeys(name for one in known for name in one)
+    return [(name, *(_value(one.get(name)) for one in known)) for name in names]
+
+
+def _value(parameter: Any) -> str:
+    if parameter is None:
+        return ""
+    interval = span(parameter.interval) if parameter.identified else "unidentified"
+    return f"{short4(parameter.best)} {parameter.unit}".strip() + f" ({interval})"
+
+
+def _table(columns: Row, rows: list[Row]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in columns:
+        table.add_column(name, overflow="fold")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table

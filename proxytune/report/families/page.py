@@ -3,9 +3,8 @@
 from proxytune.report.families.table import (
     THETA,
     USES,
-    theta_columns,
+    columns_of,
     theta_rows,
-    use_columns,
     use_notes,
     use_rows,
 )
@@ -29,8 +28,8 @@ def families_page(compared: ComparedFamilies, figure: bytes) -> Page:
         figure: The PNG.
     """
     settings = compared.settings
-    uses = Table(USES, use_columns(compared), tuple(use_rows(compared)), tuple(use_notes(compared)))
-    theta = Table(THETA, theta_columns(compared), tuple(theta_rows(compared)))
+    uses = Table(USES, columns_of(compared), tuple(use_rows(compared)), tuple(use_notes(compared)))
+    theta = Table(THETA, columns_of(compared), tuple(theta_rows(compared)))
     pages = [f"{one.name}: {one.result.study.settings.home / 'report.html'}" for one in compared.families]
     parts = (
         Picture("What each family predicts, teaches and costs", figure, CAPTION),

@@ -20,7 +20,7 @@ from proxytune.report.numbers import short, span
 from proxytune.report.study.finding import known_parameters
 from proxytune.report.study.theta_table import short4
 from proxytune.report.teaching.table import UNKNOWN, count
-from proxytune.study.families.compared import ComparedFamilies, TunedFamily
+from proxytune.study.families.compared import ComparedFamilies, Lesson, TunedFamily
 
 Row = tuple[str, ...]
 USES, THETA = "Which simulator, and for what (95 % intervals)", "Best θ of each"
@@ -30,11 +30,11 @@ def families_table(compared: ComparedFamilies, files: Mapping[str, Any]) -> Rend
     """Several families as `study` shows them."""
     shown = [
         part
-        for title, columns, rows in (
-            (USES, use_columns(compared), use_rows(compared)),
-            (THETA, theta_columns(compared), theta_rows(compared)),
+        for title, rows in (
+            (USES, use_rows(compared)),
+            (THETA, theta_rows(compared)),
         )
-        for part in (Text(f"\n{title}", style="bold"), _table(columns, rows))
+        for part in (Text(f"\n{title}", style="bold"), _table(columns_of(compared), rows))
     ]
     notes = [Text(f"note: {note}") for note in use_notes(compared)]
     return Group(
@@ -42,36 +42,34 @@ def families_table(compared: ComparedFamilies, files: Mapping[str, Any]) -> Rend
     )
 
 
-def use_columns(compared: ComparedFamilies) -> Row:
-    """The heads of the first table; PLV has columns only where it was asked for."""
-    taught = ("PLV", "more than highest") if compared.settings.teaching else ()
-    return ("family", "fresh PRPV", "more than lowest", *taught, "s per episode", "tuned for", "trials")
+def columns_of(compared: ComparedFamilies) -> Row:
+    """The heads of both tables: the families in the order of study.toml."""
+    return ("", *(one.name for one in compared.families))
 
 
 def use_rows(compared: ComparedFamilies) -> list[Row]:
-    """A row per family, in the order of study.toml."""
-    costs, more = compared.seconds_per_episode(), differences(compared)
+    """What each family predicts, teaches (where that was asked for) and costs, a fact a row."""
+    more, families = differences(compared), compared.families
+    costs = compared.seconds_per_episode()
+    taught = [("PLV", _plv), ("  more than highest", _more)] if compared.settings.teaching else []
     return [
-        (
-            one.name,
-            prpv_text(one.fresh) if one.fresh else "not known",
-            difference_text(more[one.name]) if one.name in more else "",
-            *_taught(compared, one.name),
-            seconds_text(*costs[one.name]),
-            f"{short(one.seconds)} s",
-            str(len(one.result.trials)),
-        )
-        for one in compared.families
+        ("fresh PRPV", *(prpv_text(one.fresh) if one.fresh else UNKNOWN for one in families)),
+        ("  more than lowest", *(difference_text(more[one.name]) if one.name in more else "" for one in families)),
+        *((title, *(said(compared.lessons.get(one.name)) for one in families)) for title, said in taught),
+        ("seconds per episode", *(seconds_text(*costs[one.name]) for one in families)),
+        ("seconds of tuning", *(short(one.seconds) for one in families)),
+        ("trials", *(str(len(one.result.trials)) for one in families)),
     ]
 
 
-def _taught(compared: ComparedFamilies, name: str) -> Row:
-    if not compared.settings.teaching:
-        return ()
-    lesson = compared.lessons.get(name)
+def _plv(lesson: Lesson | None) -> str:
     if lesson is None or lesson.plv is None:
-        return (UNKNOWN if lesson is None or not lesson.failure else more_text(lesson), "")
-    return (count(lesson.plv, UNKNOWN), more_text(lesson))
+        return more_text(lesson) if lesson and lesson.failure else UNKNOWN
+    return count(lesson.plv, UNKNOWN)
+
+
+def _more(lesson: Lesson | None) -> str:
+    return "" if lesson is None or lesson.failure else more_text(lesson)
 
 
 def use_notes(compared: ComparedFamilies) -> list[str]:
@@ -89,11 +87,6 @@ def _said(one: TunedFamily) -> list[str]:
     lines += ["no difference from the target can be seen"] if result.perfect else []
     early = f"{short(one.seconds)} of {time:g} s were spent: {result.stopped or 'its trials have not ended'}"
     return lines + ([early] if one.seconds < time else [])
-
-
-def theta_columns(compared: ComparedFamilies) -> Row:
-    """The heads of the table of θ."""
-    return ("parameter", *(one.name for one in compared.families))
 
 
 def theta_rows(compared: ComparedFamilies) -> list[Row]:

@@ -89,10 +89,11 @@ def _say_predicting(compared: ComparedFamilies) -> str:
 def _say_teaching(compared: ComparedFamilies) -> str:
     choice, lessons = compared.teaches, compared.lessons
     if choice.best is None:
-        return "not known: PLV (proxy learning value) is of none"
+        why = "nothing was taught yet" if not lessons else "learners have not converged; raise teaching.target_samples"
+        return f"PLV (proxy learning value) is not known, {why}"
     worth = f"PLV (proxy learning value) {_plv(lessons[choice.best].plv)} target samples saved"
     if not _saves(lessons[choice.best].plv):
-        return f"that any saves target samples is not shown; highest is {choice.best}, {worth}"
+        return f"none is shown to save target samples; highest is {choice.best}, {worth}"
     others = [name for name in lessons if name not in (choice.best, *choice.alike)]
     alike = [f"{name}, {more_text(lessons[name])} more samples" for name in choice.alike]
     worse = [f"{name}, {_behind(lessons[name])}" for name in others]

@@ -6,6 +6,7 @@ from contextlib import nullcontext
 import pytest
 from several import make_several
 from stopping import Stopping
+from taught import TEACHING
 
 from proxytune.api.families import Quiet, Spending, read_families, run_families, run_opened_families
 from proxytune.cli.main import main
@@ -242,3 +243,54 @@ def test_from_python_one_asks_the_same(finished):
     assert report.studies["right"].theta == report.document()["families"]["right"]["theta"]
     with pytest.raises(InputError, match="families: is missing; name two at least"):
         run_families(finished / "families" / "right")
+
+
+@pytest.fixture
+def taught(make_study):
+    """A study of two schoolrooms, of which the second cannot come near the target."""
+
+    def make(families="[families.right]\n[families.far.parameters]\ntrim = [-0.3, -0.29]\n"):
+        table = TEACHING.format(grid=[0, 20, 40, 80, 160, 320], more="").split("[teaching.proxies.right]")[0]
+        folder = make_several(
+            make_study, families=table + families, family='"schoolroom:schoolroom"', proxy='"right.toml"'
+        )
+        (folder / "twin.toml").write_text("trim = 0.1\ndelay = 0.12\n")
+        return folder
+
+    return make
+
+
+@pytest.mark.slow
+def test_where_there_is_teaching_each_teaches_at_its_best_theta(taught, capsys):
+    folder = taught()
+    document = document_of(["study", str(folder)], capsys)
+    right, far = document["families"]["right"], document["families"]["far"]
+    assert right["plv"] > far["plv"]
+    assert right["plv_interval"][0] <= right["plv"] <= right["plv_interval"][1]
+    assert far["more"]["value"] == right["plv"] - far["plv"]
+    assert document["best"]["teach"]["family"] == "right"
+    assert "To teach: " in document["sentence"]
+    assert document_of(["plot", str(folder)], capsys) == without_this_run(document)
+
+
+@pytest.mark.slow
+def test_lessons_of_another_theta_or_that_are_none_are_not_shown(taught, capsys):
+    folder = taught()
+    run_families(folder)
+    lessons = folder / "families" / "lessons.json"
+    known = json.loads(lessons.read_text())
+    known["far"]["theta"]["trim"] = 0.0
+    lessons.write_text(json.dumps(known))
+    drawn = document_of(["plot", str(folder)], capsys)["families"]
+    assert drawn["right"]["plv"] is not None
+    assert drawn["far"]["plv"] is None
+    lessons.write_text("{]")
+    assert main(["plot", str(folder)]) == 1
+    assert "lessons.json: is not as proxytune writes it; delete it" in capsys.readouterr().err
+
+
+def test_a_family_that_cannot_teach_is_refused_before_the_first_is_tuned(taught, capsys):
+    folder = taught('[families.right]\n[families.mute]\nfamily = "wobbly:wobbly"\n')
+    assert main(["study", str(folder)]) == 2
+    assert "study.toml: families.mute: family: wobbly:wobbly cannot teach: it lacks" in capsys.readouterr().err
+    assert not (folder / "families").exists()

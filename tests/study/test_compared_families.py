@@ -1,40 +1,9 @@
 """Which of several families is best at what, and which cannot be told from it."""
 
-from types import SimpleNamespace
-
 import pytest
+from several_tuned import compared, family, lesson
 
-from proxytune.learning.plv import Estimate
-from proxytune.scores import Metric, ScoreTable
-from proxytune.study.families.compared import Choice, ComparedFamilies, Lesson
-from proxytune.usefulness import assess
-
-METRICS = (Metric("distance"),)
-AGENTS = [f"agent{number}" for number in range(8)]
-
-
-def table(shift, noise=0.0):
-    """Eight agents from six starts; a shift swaps the order of so many neighbours."""
-    order = list(range(8))
-    for place in range(0, 2 * shift, 2):
-        order[place], order[place + 1] = order[place + 1], order[place]
-    scores = {
-        (agent, str(start)): {"distance": 10.0 * order[row] + noise * ((row * 7 + start * 3) % 5)}
-        for row, agent in enumerate(AGENTS)
-        for start in range(6)
-    }
-    return ScoreTable.from_episodes(scores)
-
-
-def family(name, shift=0, seconds=(1.0, 1.1, 0.9, 1.0), noise=0.1, fresh=True):
-    target = table(0, 0.1)
-    assessment = assess(proxy=table(shift, noise), target=target, metrics=METRICS) if fresh else None
-    result = SimpleNamespace(study=SimpleNamespace(target=target))
-    return SimpleNamespace(name=name, fresh=assessment, episode_seconds=seconds, result=result)
-
-
-def compared(*families, lessons=None):
-    return ComparedFamilies(SimpleNamespace(metrics=METRICS), families, lessons or {})
+from proxytune.study.families.compared import Choice, Lesson
 
 
 def test_the_lowest_fresh_prpv_predicts_best_and_a_higher_one_beyond_noise_is_worse():
@@ -67,10 +36,6 @@ def test_the_cheapest_is_told_apart_episode_by_episode():
     assert other < high
     assert found.times_cheapest("single")["double"] == pytest.approx((2.0, 2.0, 2.0))
     assert low < 4.025 < high
-
-
-def lesson(plv, more=None, needed=(100.0, 80.0, 120.0)):
-    return Lesson({}, 1.0, Estimate(*needed), Estimate(plv, plv - 10.0, plv + 10.0), more and Estimate(*more))
 
 
 def test_the_highest_plv_teaches_best_and_more_samples_beyond_noise_are_worse():

@@ -108,6 +108,9 @@ def test_a_time_once_spent_stays_spent_and_a_longer_one_goes_on(make_study, caps
     assert slow["seconds"] >= 0.3
     assert "wall_time_s is 0.3" in slow["stopped"]
     assert document_of(["study", str(folder)], capsys)["families"] == first["families"]
+    assert main(["plot", str(folder)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "slow: 1 of the 5 trials of the design were run in its time: its θ is hardly tuned" in said
     path = folder / "study.toml"
     path.write_text(path.read_text().replace("wall_time_s = 0.3", "wall_time_s = 0.6"))
     more = document_of(["study", str(folder)], capsys)["families"]["slow"]

@@ -37,6 +37,11 @@ def test_where_they_cost_alike_too_what_would_tell_them_apart_is_said():
     assert "cannot be told from it: b 1 (1 to 1)." in families_answer(found)
 
 
+def test_a_ratio_of_hundreds_is_written_out():
+    found = compared(family("a", 0, CHEAP), family("b", 1, tuple(131.0 * one for one in CHEAP)))
+    assert "times as long: b 130 (130 to 130)." in families_answer(found)
+
+
 def test_no_better_than_chance_is_said():
     found = compared(family("a", 4, noise=0.1), family("b", 4, noise=0.1))
     for one in found.families:

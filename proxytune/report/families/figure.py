@@ -26,11 +26,13 @@ class Panel(NamedTuple):
         title: What its axis says.
         values: Of each family the value and the ends of its interval; None where an end or all of it is not known.
         choice: Which is best.
+        ratios: Whether ratios count, not differences.
     """
 
     title: str
     values: Mapping[str, tuple[float, float | None, float | None] | None]
     choice: Choice
+    ratios: bool = False
 
 
 def families_figure(compared: ComparedFamilies) -> Figure:
@@ -42,6 +44,10 @@ def families_figure(compared: ComparedFamilies) -> Figure:
         _draw(axes, panel, names)
     drawn[0].set_yticks(range(len(names)), [_short(name) for name in names])
     drawn[0].set_ylim(len(names) - 0.5, -0.5)
+    shown = {_standing(panel, name) for panel in panels for name in names if panel.values.get(name)}
+    for label, (marker, edge, face) in LOOKS.items():
+        if label in shown:
+            drawn[0].plot([], [], marker, color=edge, markerfacecolor=face, markersize=4.5, label=label)
     legend_below(figure, *drawn)
     return figure
 
@@ -50,7 +56,7 @@ def _panels(compared: ComparedFamilies) -> list[Panel]:
     prpv = {one.name: _of_assessment(one.fresh) for one in compared.families}
     plv = {name: _of_estimate(one.plv) for name, one in compared.lessons.items()}
     taught = [Panel("PLV\n[samples saved]", plv, compared.teaches)] if compared.lessons else []
-    costs = Panel("time per\nepisode [s]", dict(compared.seconds_per_episode()), compared.cheapest)
+    costs = Panel("time per\nepisode [s]", dict(compared.seconds_per_episode()), compared.cheapest, ratios=True)
     return [Panel("fresh PRPV\n[ordered pairs]", prpv, compared.predicts), *taught, costs]
 
 
@@ -64,16 +70,24 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
             )  # fmt: skip
             continue
         middle, low, high = value
-        label = BEST if name == panel.choice.best else ALIKE if name in panel.choice.alike else WORSE
-        marker, edge, face = LOOKS[label]
+        marker, edge, face = LOOKS[_standing(panel, name)]
         if low is not None and high is not None:
             axes.plot([low, high], [place, place], color=edge, linewidth=1.2)
-        axes.plot([middle], [place], marker, color=edge, markerfacecolor=face, markersize=4.5, label=label)
+        axes.plot([middle], [place], marker, color=edge, markerfacecolor=face, markersize=4.5)
     axes.set_xlabel(panel.title, fontsize=8)
-    axes.xaxis.set_major_locator(MaxNLocator(3))
     dress(axes)
     axes.margins(x=0.15)
-    axes.set_xlim(left=min(0.0, axes.get_xlim()[0] if any(_below(one) for one in panel.values.values()) else 0.0))
+    if panel.ratios:
+        axes.set_xscale("log")
+        return
+    axes.xaxis.set_major_locator(MaxNLocator(3))
+    if not any(_below(one) for one in panel.values.values()):
+        axes.set_xlim(left=0.0)
+
+
+def _standing(panel: Panel, name: str) -> str:
+    """How a family stands in a panel."""
+    return BEST if name == panel.choice.best else ALIKE if name in panel.choice.alike else WORSE
 
 
 def _short(name: str) -> str:

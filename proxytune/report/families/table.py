@@ -81,10 +81,13 @@ def use_notes(compared: ComparedFamilies) -> list[str]:
 
 
 def _said(one: TunedFamily) -> list[str]:
-    """What a family's own study has to say: a misfit, a perfect one, and a time that was not spent."""
-    result, time = one.result, one.result.study.settings.stop.wall_time_s or 0.0
+    """What a family's own study has to say: a misfit, a perfect one, too few trials, and a time that was not spent."""
+    result, settings = one.result, one.result.study.settings
+    time, trials = settings.stop.wall_time_s or 0.0, len(result.trials)
     lines = ["no θ explains the target's scores: it lacks something"] if result.knowledge.misfit.fits is False else []
     lines += ["no difference from the target can be seen"] if result.perfect else []
+    few = f"{trials} of the {settings.initial} trials of the design were run in its time: its θ is hardly tuned"
+    lines += [few] if trials < settings.initial else []
     early = f"{short(one.seconds)} of {time:g} s were spent: {result.stopped or 'its trials have not ended'}"
     return lines + ([early] if one.seconds < time else [])
 

@@ -53,7 +53,12 @@ def difference_text(one: Difference) -> str:
 
 def seconds_text(value: float, low: float, high: float) -> str:
     """Seconds, or a ratio, with its interval."""
-    return f"{value:.2g} ({low:.2g} to {high:.2g})"
+    return f"{_rounded(value)} ({_rounded(low)} to {_rounded(high)})"
+
+
+def _rounded(value: float) -> str:
+    """Two significant figures."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def more_text(lesson: Lesson) -> str:
@@ -126,7 +131,7 @@ def _say_cost(compared: ComparedFamilies) -> str:
         f"times as long: {'; '.join(worse)}" if worse else "",
         f"{NOT_APART}: {'; '.join(alike)}" if alike else "",
     ]
-    seconds = f"{value:.2g} s per episode ({ends[0]:.2g} to {ends[1]:.2g})"
+    seconds = f"{_rounded(value)} s per episode ({_rounded(ends[0])} to {_rounded(ends[1])})"
     return "; ".join(filter(None, [f"{choice.best}, {seconds}", *clauses]))
 
 

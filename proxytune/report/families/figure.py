@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from proxytune.learning.plv import Estimate
 from proxytune.report.style import BLUE, COLUMN, VERMILLION, dress, legend_below
@@ -79,6 +79,9 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
     axes.margins(x=0.15)
     if panel.ratios:
         axes.set_xscale("log")
+        # Exponents would be smaller than can be read.
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
         return
     axes.xaxis.set_major_locator(MaxNLocator(3))
     if not any(_below(one) for one in panel.values.values()):

@@ -1,6 +1,7 @@
 """Find out how useful a robot simulator is, tune it to the robot, and learn what it still lacks.
 
     study        run_study, read_study, StudyReport
+    simulators   run_families, read_families, FamiliesReport: several tuned in the same time
     scores       score, Assessment, Metric, ScoreTable, read_scores
     search       SearchBox: ask for a θ, tell its score
     logs         diagnose, DiagnosisReport, read_log, log_of, Log
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from proxytune.api.asking import SearchBox
     from proxytune.api.diagnosing import DiagnosisReport, diagnose
     from proxytune.api.driving import DrivenEpisode, drive
+    from proxytune.api.families import FamiliesReport, read_families, run_families
     from proxytune.api.logs import log_of
     from proxytune.api.studies import StudyReport, read_study, run_study
     from proxytune.api.tables import score
@@ -43,6 +45,7 @@ __all__ = [
     "Effect",
     "Engine",
     "Episode",
+    "FamiliesReport",
     "InputError",
     "Learner",
     "Log",
@@ -59,9 +62,11 @@ __all__ = [
     "diagnose",
     "drive",
     "log_of",
+    "read_families",
     "read_log",
     "read_scores",
     "read_study",
+    "run_families",
     "run_study",
     "score",
 ]
@@ -75,6 +80,7 @@ _HOMES = {
     "Effect": "effects",
     "Engine": "search.engines.engine",
     "Episode": "domain",
+    "FamiliesReport": "api.families",
     "InputError": "errors",
     "Learner": "learning.learner",
     "Log": "logs",
@@ -90,9 +96,11 @@ _HOMES = {
     "diagnose": "api.diagnosing",
     "drive": "api.driving",
     "log_of": "api.logs",
+    "read_families": "api.families",
     "read_log": "logs",
     "read_scores": "scores",
     "read_study": "api.studies",
+    "run_families": "api.families",
     "run_study": "api.studies",
     "score": "api.tables",
 }

@@ -27,6 +27,7 @@ MADE_FROM = {
     "closing_the_camera_loop": "twin.toml",
     "teacher": "twin.toml",
     "truths": "truth.toml",
+    "which_simulator": "truth.toml",
     "gymnasium_pendulum": "truth.toml",
 }
 NEEDS = {"gymnasium_pendulum": "gymnasium"}

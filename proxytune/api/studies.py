@@ -127,7 +127,7 @@ class StudyReport:
         Raises:
             RunError: If a file cannot be written.
         """
-        home = self.result.study.settings.folder if folder is None else Path(folder)
+        home = self.result.study.settings.home if folder is None else Path(folder)
         paths = [home / "figures" / f"{name}.png" for name in FIGURES]
         for path, figure in zip(paths, self.figures().values(), strict=True):
             save(figure, path)
@@ -163,7 +163,7 @@ def run_study(
     """
     study = with_spending(open_study(Path(path)), budget=budget, jobs=jobs)
     if study.settings.objective == LEARNING:
-        remedy = f"run it with: python -m proxytune study {study.settings.folder}"
+        remedy = f"run it with: python -m proxytune study {study.settings.home}"
         raise study.settings.error("objective", f"run_study has no search for '{LEARNING}'; {remedy}")
     watching = Bars(most_episodes(study.settings)) if progress else nullcontext(Silent())
     return run_opened(study, watching, lambda line: warnings.warn(line, stacklevel=5), retry_failed)
@@ -184,7 +184,7 @@ def run_opened(
         retry_failed: Whether to drive every failed episode again, not only those whose code has changed.
     """
     settings = study.settings
-    with locked(settings.folder), Store.open(settings.folder) as store:
+    with locked(settings.home), Store.open(settings.home) as store:
         if retry_failed:
             store.forget_failures()
         with watching as watcher:
@@ -207,7 +207,8 @@ def read_study(path: str | Path) -> StudyReport:
         RunError: If no trial has a score yet.
     """
     settings = read_study_settings(Path(path))
-    with Store.read(settings.folder) as store:
+    settings.check_single()
+    with Store.read(settings.home) as store:
         return StudyReport(result_of(stored_run(open_to_look(settings, store), store)), Spent())
 
 

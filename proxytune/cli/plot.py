@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from proxytune.api.studies import StudyReport
+from proxytune.cli.families import redraw_families
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.typed import typed
 from proxytune.report.study.document import study_document
@@ -51,10 +52,13 @@ def run(arguments: argparse.Namespace) -> Answer:
     """
     metrics = [Metric.parse(text) for text in arguments.metric]
     settings = read_study_settings(arguments.path)
-    with Store.read(settings.folder) as store:
+    if settings.families and not metrics:
+        return redraw_families(settings)
+    settings.check_single()
+    with Store.read(settings.home) as store:
         study = open_to_look(settings, store)
         result, curves = _read(stored_run(study, store), metrics)
-    folder = _folder(settings.folder, metrics)
+    folder = _folder(settings.home, metrics)
     figures = draw_curves(curves, folder / "figures", study.truth)
     shown = result.study.settings if result else settings
     pages = [str(page) for page in _pages(shown, curves, folder / "figures", typed(arguments))]

@@ -41,17 +41,18 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Answer:
     """Put what is whole in the place of study.db; what is not is set aside, and nothing of it is deleted."""
     settings = read_study_settings(arguments.path)
+    settings.check_single()
     search = PRPV.name if settings.objective == LEARNING else settings.objective
-    with locked(settings.folder):
-        found = salvage(settings.folder)
-        with Store.read(settings.folder) as store:
+    with locked(settings.home):
+        found = salvage(settings.home)
+        with Store.read(settings.home) as store:
             had = len(store.trials(search))
             scores = _compared(settings, store) if had else Scores()
         kept = min([had, *(number - 1 for number, _ in scores.problems)])
         if kept < had:
-            with Store.open(settings.folder) as store:
+            with Store.open(settings.home) as store:
                 store.drop_trials(search, kept + 1)
-    return _answer(settings.folder, found, scores, kept)
+    return _answer(settings.home, found, scores, kept)
 
 
 def _compared(settings: StudySettings, store: Store) -> Scores:

@@ -6,7 +6,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+from proxytune.api.families import Spending
 from proxytune.api.studies import StudyReport, most_episodes, run_opened
+from proxytune.cli.families import compare_families
 from proxytune.cli.learning_value import search_by_plv
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
@@ -16,9 +18,9 @@ from proxytune.report.study.table import study_table
 from proxytune.running.progress import Bars
 from proxytune.study.evaluation import Spent
 from proxytune.study.result import StudyResult
-from proxytune.study.settings import LEARNING
+from proxytune.study.settings import LEARNING, read_study_settings
 from proxytune.study.spending import with_spending
-from proxytune.study.study import Study, open_study
+from proxytune.study.study import Study, open_settings
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -44,8 +46,10 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Run what is left of a study; a finished one is summed up again without simulating."""
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
-    study = with_spending(open_study(folder), budget=arguments.budget, jobs=arguments.jobs)
-    again = arguments.retry_failed
+    settings, again = read_study_settings(folder), arguments.retry_failed
+    if settings.families:
+        return compare_families(settings, Spending(arguments.budget, arguments.jobs, again))
+    study = with_spending(open_settings(settings), budget=arguments.budget, jobs=arguments.jobs)
     if study.settings.objective == LEARNING:
         return search_by_plv(study, folder, lambda: _search(study, again).result)
     report = _search(study, again)

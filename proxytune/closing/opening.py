@@ -62,6 +62,8 @@ def open_loop(study: Path, twin: Path | None = None, log: Path | None = None) ->
         StoreError: If the loop's folder cannot be written.
     """
     settings = read_study_settings(study)
+    if settings.families or settings.family_name:
+        raise settings.error("families", "`loop` is of one family; give it a study without this table")
     if settings.objective == LEARNING:
         raise settings.error("objective", "`loop` tunes by scores; give it a study with another objective than 'plv'")
     family = load_family(settings, settings.proxy)

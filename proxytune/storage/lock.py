@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from proxytune.errors import BusyError, StoreError
-from proxytune.storage.own_files import open_own, refuse_links
+from proxytune.storage.own_files import is_of_family, open_own, refuse_links
 
 FILE_NAME = "study.lock"
 
@@ -16,11 +16,15 @@ FILE_NAME = "study.lock"
 def locked(folder: Path) -> Iterator[None]:
     """Hold the study in this folder. The kernel lets go of it when the process ends, however it ends.
 
+    The folder of one of several families is made where there is none.
+
     Raises:
         BusyError: If another process holds it, with that process's id.
         StoreError: If the folder cannot be written, or has links where a study writes.
     """
     refuse_links(folder)
+    if is_of_family(folder):
+        _make(folder)
     path = folder / FILE_NAME
     descriptor = _acquire(path)
     try:
@@ -28,6 +32,13 @@ def locked(folder: Path) -> Iterator[None]:
     finally:
         path.unlink(missing_ok=True)
         os.close(descriptor)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise StoreError(f"{folder}: cannot be created ({problem.strerror}); copy the study elsewhere") from None
 
 
 def _acquire(path: Path) -> int:

@@ -6,22 +6,35 @@ from pathlib import Path
 
 from proxytune.errors import StoreError
 
-NAMES = ("study.lock", "study.db", "figures", "loop", "rescored", "teaching")
+FAMILIES = "families"
+"""The folder in which each family of a study has its own."""
+NAMES = ("study.lock", "study.db", FAMILIES, "figures", "loop", "rescored", "teaching")
 """What running a study writes to or into; what else it writes replaces whatever has the name."""
 
 
 def refuse_links(folder: Path) -> None:
     """Refuse a study in which a symbolic link is in the place of something that running it writes to or into.
 
+    Of a family's folder, that and the one of all families are such places too.
+
     Raises:
         StoreError: If there is one.
     """
+    if is_of_family(folder):
+        for own in (folder, folder.parent):
+            if own.is_symlink():
+                raise _link(own)
     for name in NAMES:
         if (folder / name).is_symlink():
             raise _link(folder / name)
         for here, folders, _ in os.walk(folder / name):
             for link in (Path(here, one) for one in folders if Path(here, one).is_symlink()):
                 raise _link(link)
+
+
+def is_of_family(folder: Path) -> bool:
+    """Whether this is the folder of one of several families of a study."""
+    return folder.parent.name == FAMILIES and not (folder / "study.toml").exists()
 
 
 def open_own(path: Path) -> int:

@@ -18,7 +18,7 @@ def check_scores(run: StudyRun) -> None:
         StoreError: With the first such trial.
     """
     for number, problem in unfounded(run):
-        remedy = f"run: python -m proxytune repair {run.settings.folder}"
+        remedy = f"run: python -m proxytune repair {run.settings.home}"
         raise StoreError(f"{run.store.path}: was damaged or edited: trial {number} {problem}; {remedy}")
 
 

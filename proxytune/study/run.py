@@ -184,9 +184,12 @@ def _facts_before(study: Study, store: Store) -> dict[str, Any]:
 
 
 def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsError:
+    settings = study.settings
+    where = f"{settings.path}: {settings.family_name and f'families.{settings.family_name}: '}"
+    database = store.path if settings.family_name else store.path.name
     return SettingsError(
-        f"{study.settings.path}: changed since the first trial: {', '.join(changes(before, facts(study)))}; "
-        f"put it back, or move {store.path.name} away to start again"
+        f"{where}changed since the first trial: {', '.join(changes(before, facts(study)))}; "
+        f"put it back, or move {database} away to start again"
     )
 
 

@@ -1,7 +1,7 @@
 """What study.toml says, read strictly."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +9,11 @@ from proxytune.errors import InputError
 from proxytune.learning.settings import TeachingSettings, read_teaching
 from proxytune.scores import Metric
 from proxytune.search.engines.registry import DEFAULT_ENGINE, SCORE_ENGINE
-from proxytune.settings import Section, read_settings
+from proxytune.settings import Section, nearest, read_settings
 from proxytune.space import Interval, Space
+from proxytune.storage.own_files import FAMILIES
+from proxytune.study.families.reading import family_tables, study_around
+from proxytune.study.sides import agents_of, aliases_of, metrics_of, targets_of, texts_of
 from proxytune.study.stop_rules import StopRules, positive, read_stop_rules
 
 DEFAULT_FAMILY = "proxytune.driving.family:lane_following"
@@ -22,6 +25,7 @@ KEYS = (
     "format", "name", "family", "proxy", "target", "target_columns", "truth", "objective", "metrics", "agents",
     "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight", "confirm",
     "cut_off", "stop", "parameters", "domain", "teaching", "held_out", "episode_timeout_s",
+    FAMILIES,
 )  # fmt: skip
 
 
@@ -58,6 +62,8 @@ class StudySettings:
         more_targets: The other files of the target's score table.
         target_columns: What columns are called in the target's files where that is another name.
         episode_timeout_s: How long an episode may take before it counts as failed [s], if that is limited.
+        families: The same study of each of several domain families, by their names; empty of a study of one.
+        family_name: Which of several it is of; empty if there is but one.
     """
 
     path: Path
@@ -88,6 +94,8 @@ class StudySettings:
     more_targets: tuple[Path, ...] = ()
     target_columns: Mapping[str, str] = field(default_factory=dict)
     episode_timeout_s: float | None = None
+    families: Mapping[str, "StudySettings"] = field(default_factory=dict)
+    family_name: str = ""
 
     @property
     def targets(self) -> tuple[Path, ...]:
@@ -101,22 +109,62 @@ class StudySettings:
 
     @property
     def folder(self) -> Path:
-        """The folder of the study."""
+        """The folder of study.toml, where the user's modules lie."""
         return self.path.parent
+
+    @property
+    def home(self) -> Path:
+        """The folder of what running it makes: of one of several families a folder of its own."""
+        return self.folder / FAMILIES / self.family_name if self.family_name else self.folder
 
     def error(self, key: str, problem: str) -> InputError:
         """The one-line complaint about a key that only the domain family could check."""
-        return Section(self.path, "", {}).error(key, problem)
+        where = f"{FAMILIES}.{self.family_name}: " if self.family_name else ""
+        return Section(self.path, where, {}).error(key, problem)
+
+    def check_single(self) -> None:
+        """Refuse a study of several families where one is needed.
+
+        Raises:
+            SettingsError: That says how to name one of them.
+        """
+        if self.families:
+            one = self.home / FAMILIES / next(iter(self.families))
+            raise self.error(FAMILIES, f"each of these is a study of its own, and one is needed; give one, as {one}")
 
 
 def read_study_settings(path: Path) -> StudySettings:
-    """Read a study.toml, given as the file or as its folder.
+    """Read a study.toml, given as the file or as its folder; of a folder families/NAME, as that family has it.
 
     Raises:
         SettingsError: With file, key and remedy.
     """
-    path = path / FILE_NAME if path.is_dir() else path
-    read = read_settings(path)
+    around = study_around(path, FILE_NAME)
+    if around is not None:
+        study, name = read_study_settings(around), path.absolute().name
+        if name not in study.families:
+            raise study.error(FAMILIES, f"has no '{name}', as {path} is called; {nearest(name, study.families)}")
+        return study.families[name]
+    read = read_settings(path / FILE_NAME if path.is_dir() else path)
+    study = _settings(read)
+    tables = family_tables(read, study.family, study.name)
+    if tables:
+        _check_comparable(study)
+    return replace(study, families={name: replace(_settings(one), family_name=name) for name, one in tables.items()})
+
+
+def _check_comparable(study: StudySettings) -> None:
+    """Refuse a study whose families could not be compared."""
+    if study.objective == LEARNING:
+        raise study.error("objective", f"'{LEARNING}' is not for {FAMILIES}: they are tuned by scores, and teach after")
+    if study.stop.wall_time_s is None:
+        raise study.error("stop.wall_time_s", f"is missing; it is the time that each of {FAMILIES} is tuned in [s]")
+    if not study.confirm:
+        raise study.error("confirm", f"is 0, and {FAMILIES} are compared by fresh episodes; make it 1 or more")
+
+
+def _settings(read: Section) -> StudySettings:
+    path = read.path
     read.only(KEYS)
     if read.whole("format", low=1) > FORMAT:
         raise read.error("format", f"this proxytune reads up to {FORMAT}; install a newer one")
@@ -125,11 +173,11 @@ def read_study_settings(path: Path) -> StudySettings:
         name=read.text("name", path.absolute().parent.name),
         family=read.text("family", DEFAULT_FAMILY),
         proxy=path.parent / read.text("proxy") if "proxy" in read.values else None,
-        target=path.parent / _targets(read)[0],
+        target=path.parent / targets_of(read)[0],
         truth=path.parent / read.text("truth") if "truth" in read.values else None,
         objective=read.text("objective", "prpv"),
-        metrics=_metrics(read),
-        agents=_agents(read),
+        metrics=metrics_of(read),
+        agents=agents_of(read),
         starts=read.whole("starts", low=1),
         budget=read.whole("budget", low=1, high=100_000),
         initial=read.whole("initial", 8, low=1, high=100_000),
@@ -145,9 +193,9 @@ def read_study_settings(path: Path) -> StudySettings:
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
-        aliases=_aliases(read),
-        more_targets=tuple(path.parent / name for name in _targets(read)[1:]),
-        target_columns=_texts(read.section("target_columns")),
+        aliases=aliases_of(read),
+        more_targets=tuple(path.parent / name for name in targets_of(read)[1:]),
+        target_columns=texts_of(read.section("target_columns")),
         episode_timeout_s=positive(read, "episode_timeout_s"),
     )
 
@@ -155,42 +203,6 @@ def read_study_settings(path: Path) -> StudySettings:
 def _default_engine(read: Section) -> str:
     """Of learning value nothing is known but the score."""
     return SCORE_ENGINE if read.text("objective", "prpv") == LEARNING else DEFAULT_ENGINE
-
-
-def _metrics(read: Section) -> tuple[Metric, ...]:
-    try:
-        metrics = tuple(Metric.parse(text) for text in read.texts("metrics"))
-    except InputError as problem:
-        raise read.error("metrics", str(problem)) from None
-    names = [metric.name for metric in metrics]
-    if not names:
-        raise read.error("metrics", 'is empty; give at least one, as in ["distance:max"]')
-    if len(set(names)) < len(names):
-        raise read.error("metrics", f"names a metric twice: {', '.join(names)}")
-    return metrics
-
-
-def _agents(read: Section) -> tuple[str, ...]:
-    agents = tuple(_aliases(read)) or read.texts("agents")
-    if len(agents) < 2:
-        raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
-    return agents
-
-
-def _targets(read: Section) -> tuple[str, ...]:
-    """The file of the target's scores, or several."""
-    if not isinstance(read.values.get("target"), list):
-        return (read.text("target"),)
-    return read.texts("target") or (read.text("target"),)
-
-
-def _aliases(read: Section) -> dict[str, str]:
-    """The table [agents], where it is one: name in tables to what is loaded."""
-    return _texts(read.section("agents")) if isinstance(read.values.get("agents"), dict) else {}
-
-
-def _texts(table: Section) -> dict[str, str]:
-    return {name: table.text(name) for name in table.values}
 
 
 def _space(parameters: Section) -> Space:

@@ -62,7 +62,16 @@ def open_study(path: Path) -> Study:
     Raises:
         InputError: If anything in it cannot be used, with file, key and remedy.
     """
-    settings = read_study_settings(path)
+    return open_settings(read_study_settings(path))
+
+
+def open_settings(settings: StudySettings) -> Study:
+    """Load the family that a study.toml names and the target's scores.
+
+    Raises:
+        InputError: As open_study, and if they are of several families.
+    """
+    settings.check_single()
     family = load_family(settings, settings.proxy)
     known, left_out = with_scores(settings)
     target, unused = read_target(known, family)

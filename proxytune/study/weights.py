@@ -19,7 +19,7 @@ SUFFIXES = (
     ".safetensors",
     ".tflite",
 )
-MADE = ("figures", "loop", "rescored", "teaching")
+MADE = ("families", "figures", "loop", "rescored", "teaching")
 """Folders that running a study makes."""
 NAMED = 3
 """So many files are named at most."""

@@ -14,7 +14,7 @@ from proxytune.space import Parameter
 from proxytune.storage.store import Store
 from proxytune.study.objective import objective_of
 from proxytune.study.settings import StudySettings
-from proxytune.study.study import Study, open_study
+from proxytune.study.study import Study, open_settings
 from proxytune.study.target import read_target, with_scores
 
 DESCRIBED = "described"
@@ -58,7 +58,7 @@ def open_to_look(settings: StudySettings, store: Store) -> Study:
     """
     described = store.facts().get(DESCRIBED)
     if described is None or ":" in settings.objective or not names_own_code(settings):
-        return open_study(settings.path)
+        return open_settings(settings)
     try:
         family, engine, truth = _described(settings, store, described)
     except (TypeError, ValueError, KeyError, AttributeError) as problem:

@@ -12,9 +12,9 @@ from proxytune.study.study import Study
 
 def has_answer(study: Study) -> bool:
     """Whether a trial of the study's search by predictivity is finished; a search for PLV has its answer elsewhere."""
-    if study.settings.objective == LEARNING or not is_begun(study.settings.folder / FILE_NAME):
+    if study.settings.objective == LEARNING or not is_begun(study.settings.home / FILE_NAME):
         return False
-    with Store.read(study.settings.folder) as store:
+    with Store.read(study.settings.home) as store:
         return any(trial.state == "finished" for trial in store.trials(study.objective.name))
 
 
@@ -25,9 +25,9 @@ def best_theta(study: Study, option: str = "--at") -> Theta:
         InputError: If no trial is finished, or the study was changed since.
     """
     if not has_answer(study):
-        folder = study.settings.folder
+        folder = study.settings.home
         raise InputError(f"{folder}: has no finished trial; run it first (python -m proxytune study {folder})")
-    with Store.read(study.settings.folder) as store:
+    with Store.read(study.settings.home) as store:
         try:
             run = stored_run(study, store)
         except SettingsError as problem:

@@ -85,14 +85,14 @@ def load_setup(settings: StudySettings) -> TeachingSetup:
     taught = teaching_settings(settings)
     learner, identity = _load_learner(settings, taught.learner)
     return TeachingSetup(
-        proxy=_classroom(settings, settings.proxy, "proxy_lessons"),
-        target=_classroom(settings, taught.target, "target_lessons"),
+        proxy=classroom(settings, settings.proxy, "proxy_lessons"),
+        target=classroom(settings, taught.target, "target_lessons"),
         learner=learner,
         learner_identity=identity,
         settings=taught,
         seed=settings.seed,
         starts=settings.starts,
-        cache=Cache(settings.folder / CACHE),
+        cache=Cache(settings.home / CACHE),
     )
 
 
@@ -146,8 +146,12 @@ def check_proxies(settings: StudySettings, setup: TeachingSetup, proxies: Mappin
             check_bounds(settings, setup.proxy, key, name, (low, high), given)
 
 
-def _classroom(settings: StudySettings, model: Path | None, lessons: str) -> Classroom:
-    """The domain family that follows a model, if any, for lessons as their key in [teaching] has them."""
+def classroom(settings: StudySettings, model: Path | None, lessons: str) -> Classroom:
+    """The domain family that a study names, with a model: one that can teach, for lessons as their key has them.
+
+    Raises:
+        SettingsError: If it cannot.
+    """
     family = load_family(settings, model)
     lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
     if lacks:

@@ -19,7 +19,7 @@ class LivePage:
 
     def __init__(self, settings: StudySettings, objective: str, watcher: Watcher) -> None:
         self._settings, self._objective, self._watcher = settings, objective, watcher
-        self._path = settings.folder / "report.html"
+        self._path = settings.home / "report.html"
         self._doing, self._due = "", 0.0
         self.written = False
 
@@ -47,7 +47,7 @@ class LivePage:
         """Write the page, and say at the first time where it is."""
         # The run is worth more than its page, and the page of the end says what is wrong with the place.
         with suppress(ProxytuneError):
-            with Store.read(self._settings.folder) as store:
+            with Store.read(self._settings.home) as store:
                 trials = [one for one in store.trials(self._objective) if one.state != "open"]
             write_text(self._path, html_of(live_page(self._settings, self._objective, trials, doing)))
             if not self.written:

@@ -10,6 +10,7 @@ from proxytune.cli.terminal.trusting import remember
 from proxytune.errors import InputError, ProxytuneError, StoreError
 from proxytune.settings import nearest
 from proxytune.shipped import shipped
+from proxytune.study.families.reading import study_around
 from proxytune.study.settings import FILE_NAME
 from proxytune.study.weights import MADE
 
@@ -18,7 +19,7 @@ NOT_COPIED = (*MADE, "study.db*", "study.lock", "report.html", "__pycache__")
 
 
 def study_folder(path: Path) -> Path:
-    """The study's folder, given as itself or as its study.toml.
+    """The study's folder, given as itself or as its study.toml; one of several families has its own in it.
 
     Where there is none and its last part names a study that comes with the package, that study is copied there.
 
@@ -27,6 +28,8 @@ def study_folder(path: Path) -> Path:
         StoreError: If the copy cannot be written.
     """
     folder = path.parent if path.name == FILE_NAME else path
+    if study_around(folder, FILE_NAME) is not None:
+        return folder
     if folder.exists():
         if not (folder / FILE_NAME).is_file():
             raise InputError(f"{folder}: has no {FILE_NAME}; give the folder of a study")

@@ -10,7 +10,7 @@ from proxytune.space import Theta
 from proxytune.storage.store import FILE_NAME
 from proxytune.study.settings import StudySettings
 from proxytune.study.side_by_side import check_robot
-from proxytune.study.study import open_study
+from proxytune.study.study import open_settings
 from proxytune.sweep.answer import best_theta, has_answer
 
 
@@ -33,8 +33,8 @@ def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily
     Raises:
         InputError: If the text is no θ, the model is of another robot, or the study has no best θ.
     """
-    if text == "best" or (text is None and (settings.folder / FILE_NAME).is_file()):
-        study = open_study(settings.path)
+    if text == "best" or (text is None and (settings.home / FILE_NAME).is_file()):
+        study = open_settings(settings)
         if text == "best" or has_answer(study):
             return ChosenTheta(best_theta(study, option), "best")
     if text is not None and text.endswith(".toml"):

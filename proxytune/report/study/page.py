@@ -32,7 +32,7 @@ def study_page(result: StudyResult, figures: Mapping[str, bytes], command: str =
 
 def study_command(settings: StudySettings) -> str:
     """The command that runs a study."""
-    return f"python -m proxytune study {shlex.quote(str(settings.folder))}"
+    return f"python -m proxytune study {shlex.quote(str(settings.home))}"
 
 
 def study_settings(settings: StudySettings) -> list[tuple[str, str]]:

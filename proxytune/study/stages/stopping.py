@@ -31,6 +31,13 @@ def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
     return _out_of_time(run, done) or _nothing_to_gain(run, done)
 
 
+def seconds_of(run: StudyRun, done: Sequence[TrialRecord]) -> float:
+    """How long the episodes of finished trials have taken, all runs together, divided by the processes [s]."""
+    settings = run.settings
+    seeds = {episode.seed for episode in plan(settings, {}, settings.seed)}
+    return run.store.seconds_of_trials(run.study.objective.name, len(done), seeds) / settings.jobs
+
+
 def out_of_time(seconds: float, rules: StopRules) -> str:
     """What to say where so many seconds are more than the rules allow; empty where they are not."""
     if rules.wall_time_s is None or seconds < rules.wall_time_s:
@@ -50,12 +57,8 @@ def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: Stop
 
 
 def _out_of_time(run: StudyRun, done: Sequence[TrialRecord]) -> str:
-    settings = run.settings
-    if settings.stop.wall_time_s is None:
-        return ""
-    seeds = {episode.seed for episode in plan(settings, {}, settings.seed)}
-    seconds = run.store.seconds_of_trials(run.study.objective.name, len(done), seeds)
-    return out_of_time(seconds / settings.jobs, settings.stop)
+    rules = run.settings.stop
+    return "" if rules.wall_time_s is None else out_of_time(seconds_of(run, done), rules)
 
 
 def _nothing_to_gain(run: StudyRun, done: Sequence[TrialRecord]) -> str:

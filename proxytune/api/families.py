@@ -1,0 +1,218 @@
+"""Several domain families from Python: each tuned in the same time, taught if that is asked for, and compared."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from matplotlib.figure import Figure
+
+from proxytune.api.studies import StudyReport, most_episodes, read_study, run_opened
+from proxytune.errors import RunError
+from proxytune.report.families.document import families_document
+from proxytune.report.families.figure import families_figure
+from proxytune.report.families.page import families_page
+from proxytune.report.families.words import families_sentence
+from proxytune.report.page import html_of
+from proxytune.report.writing import save, write_text
+from proxytune.running.progress import Bars, Silent, Watcher
+from proxytune.storage.lock import locked
+from proxytune.storage.store import Store
+from proxytune.study.evaluation import Spent
+from proxytune.study.families.compared import ComparedFamilies, Lesson, TunedFamily, tuned
+from proxytune.study.families.lessons import read_lessons, save_lessons
+from proxytune.study.settings import StudySettings, read_study_settings
+from proxytune.study.spending import with_spending
+from proxytune.study.study import Study, open_settings
+from proxytune.study.study_run import StudyRun
+from proxytune.teaching.families import classrooms, teach_families
+
+
+class Teller(Protocol):
+    """Hears how several families are tuned and taught."""
+
+    def say(self, line: str) -> None:
+        """One line."""
+        ...
+
+    def tuning(self, study: Study) -> AbstractContextManager[Watcher]:
+        """Gives what hears of every episode of a family."""
+        ...
+
+    def teaching(self, points: int) -> AbstractContextManager[Watcher]:
+        """Gives what hears of so many points of learning curves."""
+        ...
+
+
+class Quiet:
+    """Tells nothing, or shows a bar with the time left."""
+
+    def __init__(self, progress: bool = False) -> None:
+        self._progress = progress
+
+    def say(self, line: str) -> None:
+        """Say nothing."""
+
+    def tuning(self, study: Study) -> AbstractContextManager[Watcher]:
+        """A bar of episodes."""
+        return Bars(most_episodes(study.settings)) if self._progress else nullcontext(Silent())
+
+    def teaching(self, points: int) -> AbstractContextManager[Watcher]:
+        """A bar of points."""
+        return Bars(points, "points of learning curves") if self._progress else nullcontext(Silent())
+
+
+class Spending(NamedTuple):
+    """What a call spends otherwise than study.toml says.
+
+    Attributes:
+        budget: How many trials a family has at most.
+        jobs: How many processes run episodes.
+        retry_failed: Whether every failed episode is driven again.
+    """
+
+    budget: int | None = None
+    jobs: int | None = None
+    retry_failed: bool = False
+
+
+@dataclass(frozen=True, repr=False)
+class FamiliesReport:
+    """Which of several domain families should be used, and for what.
+
+    Attributes:
+        compared: The tuned families beside one another.
+        spent: What this call has simulated.
+    """
+
+    compared: ComparedFamilies
+    spent: Spent
+
+    def __repr__(self) -> str:
+        return f"FamiliesReport of '{self.compared.settings.name}': {self.sentence}"
+
+    @property
+    def sentence(self) -> str:
+        """Which family predicts best, which teaches best, and which is the cheapest."""
+        return families_sentence(self.compared)
+
+    @property
+    def studies(self) -> dict[str, StudyReport]:
+        """What the study of each family has found, by name."""
+        return {one.name: StudyReport(one.result, Spent()) for one in self.compared.families}
+
+    def document(self) -> dict[str, Any]:
+        """What `study --json` prints of it."""
+        return families_document(self.compared)
+
+    def figure(self) -> Figure:
+        """Fresh PRPV, PLV and cost of each family."""
+        return families_figure(self.compared)
+
+    def write(self) -> tuple[Path, Path]:
+        """Write the figure and the page into the study's folder; their paths.
+
+        Raises:
+            RunError: If one cannot be written.
+        """
+        home = self.compared.settings.home
+        figure, page = home / "figures" / "families.png", home / "report.html"
+        save(self.figure(), figure)
+        write_text(page, html_of(families_page(self.compared, figure.read_bytes())))
+        return figure, page
+
+
+def run_families(path: str | Path, *, progress: bool = False, jobs: int | None = None) -> FamiliesReport:
+    """Tune every family of a study in the same time, from wherever an earlier call was left, and compare them.
+
+    Args:
+        path: The study's folder, or its study.toml.
+        progress: Whether to show a bar with the time left.
+        jobs: How many processes run episodes, instead of what study.toml says.
+
+    Raises:
+        InputError: If anything in the study cannot be used, or it is of one family.
+        RunError: If no trial of a family works, or the machine fails; all that was finished is kept.
+    """
+    return run_opened_families(_several(read_study_settings(Path(path))), Quiet(progress), Spending(jobs=jobs))
+
+
+def read_families(path: str | Path) -> FamiliesReport:
+    """Look at several families as far as they have been tuned; nothing is simulated, and no code of theirs is run.
+
+    Args:
+        path: The study's folder, or its study.toml.
+
+    Raises:
+        InputError: If one of them has not been run, or was changed since.
+        RunError: If no trial of one has a score yet.
+    """
+    settings = _several(read_study_settings(Path(path)))
+    families = tuple(_tuned(read_study(one.home)) for one in settings.families.values())
+    thetas = {one.name: dict(one.theta) for one in families}
+    lessons = read_lessons(settings) if settings.teaching else {}
+    still_so = {name: one for name, one in lessons.items() if dict(one.theta) == thetas.get(name)}
+    return FamiliesReport(ComparedFamilies(settings, families, still_so), Spent())
+
+
+def run_opened_families(settings: StudySettings, teller: Teller, spending: Spending) -> FamiliesReport:
+    """Tune the families one after the other, teach by them where the study has [teaching], and compare them.
+
+    All of them are opened before the first is tuned, so that a mistake is told at once.
+
+    Args:
+        settings: Of the study of all families.
+        teller: Hears how it goes.
+        spending: What is spent otherwise than study.toml says.
+    """
+    studies = {name: _open(one, spending) for name, one in settings.families.items()}
+    classrooms(settings)
+    reports: dict[str, StudyReport] = {}
+    with locked(settings.home):
+        for number, (name, study) in enumerate(studies.items(), start=1):
+            teller.say(f"family {number} of {len(studies)}: {name}")
+            reports[name] = _tune(name, study, teller, spending.retry_failed)
+        families = tuple(_tuned(report) for report in reports.values())
+        lessons = _teach(settings, families, teller, spending)
+    spent = sum((report.spent for report in reports.values()), Spent())
+    return FamiliesReport(ComparedFamilies(settings, families, lessons), spent)
+
+
+def _several(settings: StudySettings) -> StudySettings:
+    if not settings.families:
+        raise settings.error("families", "is missing; name two at least, as in [families.planar], or use run_study")
+    return settings
+
+
+def _open(settings: StudySettings, spending: Spending) -> Study:
+    return with_spending(open_settings(settings), budget=spending.budget, jobs=spending.jobs)
+
+
+def _tune(name: str, study: Study, teller: Teller, retry_failed: bool) -> StudyReport:
+    """Run what is left of a family's study, and write its page."""
+    warn: Callable[[str], None] = lambda line: teller.say(f"{name}: {line}")  # noqa: E731
+    try:
+        report = run_opened(study, teller.tuning(study), warn, retry_failed)
+    except RunError as problem:
+        raise type(problem)(f"families.{name}: {problem}") from problem
+    report.write()
+    return report
+
+
+def _tuned(report: StudyReport) -> TunedFamily:
+    study = report.result.study
+    with Store.read(study.settings.home) as store:
+        return tuned(StudyRun(study, store), report.result)
+
+
+def _teach(
+    settings: StudySettings, families: tuple[TunedFamily, ...], teller: Teller, spending: Spending
+) -> dict[str, Lesson]:
+    if settings.teaching is None:
+        return {}
+    teller.say("teaching by each at its best θ")
+    own = replace(settings, jobs=spending.jobs or settings.jobs)
+    lessons = teach_families(own, {one.name: one.theta for one in families}, teller.teaching)
+    save_lessons(settings, lessons)
+    return lessons

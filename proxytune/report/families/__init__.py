@@ -1,0 +1,1 @@
+"""Several domain families compared: JSON, tables, the figure and the page."""

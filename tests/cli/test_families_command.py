@@ -1,0 +1,299 @@
+"""`study` of several families: which simulator, and for what? `plot` draws that again."""
+
+import json
+from contextlib import nullcontext
+
+import pytest
+from several import make_several
+from stopping import Stopping
+from taught import TEACHING
+
+from proxytune.api.families import Quiet, Spending, read_families, run_families, run_opened_families
+from proxytune.cli.main import main
+from proxytune.errors import InputError
+from proxytune.study.settings import read_study_settings
+
+FAST = "[families.fast]\n[families.slow.domain]\nsleep = 0.02\n"
+THIS_RUN = ("episodes", "seconds")
+"""What differs when a study is run again."""
+
+
+def document_of(words, capsys):
+    assert main([*words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def without_this_run(document):
+    return {key: value for key, value in document.items() if key not in THIS_RUN}
+
+
+def without_costs(document):
+    """What does not depend on how long anything took."""
+    for one in document["families"].values():
+        for key in ("seconds", "seconds_per_episode", "seconds_per_episode_interval"):
+            del one[key]
+    timed = ("sentence", "best", *THIS_RUN)
+    return {key: value for key, value in document.items() if key not in timed}
+
+
+@pytest.fixture(scope="module")
+def finished(make_studies):
+    """A finished study of two families."""
+    folder = make_several(make_studies)
+    run_families(folder)
+    return folder
+
+
+def test_the_family_that_the_target_is_an_instance_of_predicts_best(finished, capsys):
+    document = document_of(["study", str(finished)], capsys)
+    assert document["best"]["predict"] == {"family": "right", "cannot_be_told_from": []}
+    right, wrong = document["families"]["right"], document["families"]["wrong"]
+    (difference,) = document["differences"]
+    assert difference["difference"] == wrong["fresh"]["prpv"] - right["fresh"]["prpv"] > 0
+    assert difference["interval"][0] > 0
+    assert difference["beyond_noise"] is True
+    assert document["sentence"].startswith("To predict: right, fresh PRPV (proxy relative predictivity value) ")
+    assert "worse: wrong +" in document["sentence"]
+
+
+def test_the_document_has_the_promised_keys(finished, capsys):
+    document = document_of(["study", str(finished)], capsys)
+    assert {"sentence", "best", "families", "differences", "seconds_per_family", "settings"} <= set(document)
+    keys = {"theta", "prpv", "fresh", "plv", "seconds_per_episode", "trials", "seconds", "folder"}
+    assert all(keys <= set(one) for one in document["families"].values())
+    assert {"prpv", "prpv_interval"} <= set(document["families"]["right"]["fresh"])
+    assert document["best"]["teach"] is None
+    assert document["report"] == str(finished / "report.html")
+    assert document["figures"] == [str(finished / "figures" / "families.png")]
+    page = (finished / "report.html").read_text()
+    assert "To predict: right" in page
+    assert "refresh" not in page
+
+
+@pytest.mark.slow
+def test_a_family_is_what_its_study_alone_would_be(finished, make_study, capsys):
+    document = document_of(["study", str(finished)], capsys)
+    alone = make_study("alone", parameters={"trim": "[-0.3, 0.3]"}, confirm="1", proxy='"held.toml"')
+    (alone / "held.toml").write_text("delay = 0.3\n")
+    own = document_of(["study", str(alone)], capsys)
+    wrong = document["families"]["wrong"]
+    assert wrong["theta"] == own["best"]["theta"]
+    assert wrong["fresh"]["prpv"] == own["best"]["fresh"]["prpv"]
+    assert wrong["fresh"]["prpv_interval"] == own["best"]["fresh"]["prpv_interval"]
+    assert wrong["trials"] == len(own["trials"])
+
+
+@pytest.mark.slow
+def test_a_finished_one_is_summed_up_again_without_simulating(make_study, tmp_path, capsys):
+    folder = make_several(make_study, domain={"journal": f'"{tmp_path / "journal"}"'})
+    first = document_of(["study", str(folder)], capsys)
+    driven = (tmp_path / "journal").read_text()
+    second = document_of(["study", str(folder)], capsys)
+    assert (tmp_path / "journal").read_text() == driven
+    assert second["episodes"] == {"run": 0}
+    assert {k: v for k, v in first.items() if k not in THIS_RUN} == {
+        k: v for k, v in second.items() if k not in THIS_RUN
+    }
+
+
+@pytest.mark.slow
+def test_a_time_once_spent_stays_spent_and_a_longer_one_goes_on(make_study, capsys):
+    folder = make_several(
+        make_study, families=FAST, seconds=0.3, parameters={"trim": "[-0.3, 0.3]", "delay": "[0.0, 0.3]"}
+    )
+    first = document_of(["study", str(folder)], capsys)
+    fast, slow = first["families"]["fast"], first["families"]["slow"]
+    # One trial of 18 episodes takes the slow one 0.36 s.
+    assert slow["trials"] == 1 < fast["trials"]
+    assert slow["seconds"] >= 0.3
+    assert "wall_time_s is 0.3" in slow["stopped"]
+    assert document_of(["study", str(folder)], capsys)["families"] == first["families"]
+    assert main(["plot", str(folder)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "slow: 1 of the 5 trials of the design were run in its time: its θ is hardly tuned" in said
+    path = folder / "study.toml"
+    path.write_text(path.read_text().replace("wall_time_s = 0.3", "wall_time_s = 0.6"))
+    more = document_of(["study", str(folder)], capsys)["families"]["slow"]
+    assert more["trials"] == 2
+    assert more["seconds"] > slow["seconds"]
+
+
+class Interrupted(Quiet):
+    """Presses Ctrl-C after so many episodes of a family."""
+
+    def __init__(self, family, episodes):
+        super().__init__()
+        self.family, self.episodes = family, episodes
+
+    def tuning(self, study):
+        interrupts = study.settings.family_name == self.family
+        return nullcontext(Stopping(self.episodes)) if interrupts else super().tuning(study)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("family", "episodes"), [("right", 1), ("right", 130), ("wrong", 40), ("wrong", 144)])
+def test_stopped_at_any_moment_it_goes_on_to_the_same_document(finished, make_study, family, episodes, capsys):
+    folder = make_several(make_study)
+    with pytest.raises(KeyboardInterrupt):
+        run_opened_families(read_study_settings(folder), Interrupted(family, episodes), Spending())
+    there, here = (without_costs(document_of(["study", str(one)], capsys)) for one in (finished, folder))
+    text = json.dumps(there).replace(str(finished), str(folder))
+    assert json.loads(text) == here
+
+
+def test_plot_draws_it_again_and_runs_no_code(make_study, capsys, monkeypatch, tmp_path):
+    folder = make_several(make_study)
+    ran = document_of(["study", str(folder)], capsys)
+    for path in (folder / "report.html", folder / "figures" / "families.png"):
+        path.unlink()
+    monkeypatch.delenv("PROXYTUNE_TRUST")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "trusts nothing"))
+    drawn = document_of(["plot", str(folder)], capsys)
+    assert without_this_run(ran) == drawn
+    assert (folder / "report.html").exists()
+    assert (folder / "figures" / "families.png").stat().st_size > 1000
+
+
+def test_plot_before_a_family_is_tuned_says_what_to_run(make_study, capsys):
+    folder = make_several(make_study)
+    assert main(["plot", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert f"run the study first: python -m proxytune study {folder / 'families' / 'right'}" in said
+
+
+def test_the_code_of_every_family_is_asked_for(make_study, capsys, monkeypatch, tmp_path):
+    monkeypatch.delenv("PROXYTUNE_TRUST")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "trusts nothing"))
+    shipped = {"family": '"proxytune.environments.family:gymnasium_family"', "domain": {"environment": '"Pendulum-v1"'}}
+    folder = make_several(
+        make_study, families='[families.own]\n[families.theirs]\nfamily = "theirs:family"\n', **shipped
+    )
+    (folder / "theirs.py").write_text("raise SystemExit('ran')")
+    assert main(["study", str(folder / "families" / "theirs")]) == 2
+    said = capsys.readouterr().err
+    assert "families.theirs: family: this runs code that has not been run here before: module 'theirs'" in said
+    assert not (folder / "families").exists()
+
+
+@pytest.mark.parametrize(
+    "words", ["sweep {} --parameter trim", "teach {}", "repair {}", "compare {}", "export {} --to skopt --output x"]
+)
+def test_a_command_of_one_study_says_which_to_give(make_study, words, capsys):
+    folder = make_several(make_study)
+    assert main(words.format(folder).split()) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"one is needed; give one, as {folder / 'families' / 'right'}" in said
+
+
+@pytest.mark.parametrize("place", ["", "families/right"])
+def test_loop_is_of_a_study_without_families(make_study, place, capsys):
+    assert main(["loop", str(make_several(make_study) / place)]) == 2
+    assert "families: `loop` is of one family; give it a study without this table" in capsys.readouterr().err
+
+
+def test_every_command_takes_the_folder_of_one_family(finished, capsys):
+    one = str(finished / "families" / "wrong")
+    assert main(["plot", one]) == main(["repair", one]) == main(["study", one]) == 0
+    assert main(["sweep", one, "--parameter", "trim", "--points", "2"]) == 0
+    assert (finished / "families" / "wrong" / "figures" / "sweep_trim.png").exists()
+    assert not (finished / "study.db").exists()
+
+
+@pytest.mark.parametrize("link", ["families", "families/right"])
+def test_a_link_in_the_place_of_a_familys_folder_is_refused(make_study, tmp_path, link, capsys):
+    folder, elsewhere = make_several(make_study), tmp_path / "elsewhere"
+    (elsewhere / "right").mkdir(parents=True)
+    (folder / link).parent.mkdir(exist_ok=True)
+    (folder / link).symlink_to(elsewhere)
+    for path in (folder, folder / "families" / "right"):
+        assert main(["study", str(path)]) == 1
+        assert f"{link}: is a symbolic link" in capsys.readouterr().err
+    assert not list(elsewhere.glob("**/*.db"))
+
+
+def test_a_mistake_in_the_last_family_is_told_before_the_first_is_tuned(make_study, capsys):
+    folder = make_several(make_study, families="[families.a]\n[families.b.domain]\nslep = 1\n")
+    assert main(["study", str(folder)]) == 2
+    assert "study.toml: families.b: domain.slep: unknown key; did you mean 'sleep'?" in capsys.readouterr().err
+    assert not (folder / "families").exists()
+
+
+def test_a_family_in_which_nothing_works_is_named(make_study, capsys):
+    faults = ", ".join(f'"agent{number}:*:raises"' for number in range(6))
+    folder = make_several(make_study, families=f"[families.a]\n[families.b.domain]\nfaults = [{faults}]\n")
+    assert main(["study", str(folder)]) == 1
+    assert "proxytune study: families.b: " in capsys.readouterr().err
+    assert (folder / "families" / "a" / "study.db").exists()
+
+
+def test_what_changed_since_is_told_with_the_family_and_its_database(make_study, capsys):
+    folder = make_several(make_study)
+    run_families(folder)
+    path = folder / "study.toml"
+    path.write_text(f"{path.read_text()}[families.wrong.domain]\nversion = '2'\n")
+    assert main(["study", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert "study.toml: families.wrong: changed since the first trial: domain.version" in said
+    assert str(folder / "families" / "wrong" / "study.db") in said
+
+
+def test_from_python_one_asks_the_same(finished):
+    report = read_families(finished)
+    assert report.spent.episodes == 0
+    assert report.sentence == report.document()["sentence"]
+    assert set(report.studies) == {"right", "wrong"}
+    assert report.studies["right"].theta == report.document()["families"]["right"]["theta"]
+    with pytest.raises(InputError, match="families: is missing; name two at least"):
+        run_families(finished / "families" / "right")
+
+
+@pytest.fixture
+def taught(make_study):
+    """A study of two schoolrooms, of which the second cannot come near the target."""
+
+    def make(families="[families.right]\n[families.far.parameters]\ntrim = [-0.3, -0.29]\n"):
+        table = TEACHING.format(grid=[0, 20, 40, 80, 160, 320], more="").split("[teaching.proxies.right]")[0]
+        folder = make_several(
+            make_study, families=table + families, family='"schoolroom:schoolroom"', proxy='"right.toml"'
+        )
+        (folder / "twin.toml").write_text("trim = 0.1\ndelay = 0.12\n")
+        return folder
+
+    return make
+
+
+@pytest.mark.slow
+def test_where_there_is_teaching_each_teaches_at_its_best_theta(taught, capsys):
+    folder = taught()
+    document = document_of(["study", str(folder)], capsys)
+    right, far = document["families"]["right"], document["families"]["far"]
+    assert right["plv"] > far["plv"]
+    assert right["plv_interval"][0] <= right["plv"] <= right["plv_interval"][1]
+    assert far["more"]["value"] == right["plv"] - far["plv"]
+    assert document["best"]["teach"]["family"] == "right"
+    assert "To teach: " in document["sentence"]
+    assert document_of(["plot", str(folder)], capsys) == without_this_run(document)
+
+
+@pytest.mark.slow
+def test_lessons_of_another_theta_or_that_are_none_are_not_shown(taught, capsys):
+    folder = taught()
+    run_families(folder)
+    lessons = folder / "families" / "lessons.json"
+    known = json.loads(lessons.read_text())
+    known["far"]["theta"]["trim"] = 0.0
+    lessons.write_text(json.dumps(known))
+    drawn = document_of(["plot", str(folder)], capsys)["families"]
+    assert drawn["right"]["plv"] is not None
+    assert drawn["far"]["plv"] is None
+    lessons.write_text("{]")
+    assert main(["plot", str(folder)]) == 1
+    assert "lessons.json: is not as proxytune writes it; delete it" in capsys.readouterr().err
+
+
+def test_a_family_that_cannot_teach_is_refused_before_the_first_is_tuned(taught, capsys):
+    folder = taught('[families.right]\n[families.mute]\nfamily = "wobbly:wobbly"\n')
+    assert main(["study", str(folder)]) == 2
+    assert "study.toml: families.mute: family: wobbly:wobbly cannot teach: it lacks" in capsys.readouterr().err
+    assert not (folder / "families").exists()

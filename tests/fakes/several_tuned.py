@@ -1,0 +1,45 @@
+"""Several tuned families, made up of tables, seconds and learning values."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+from proxytune.learning.plv import Estimate
+from proxytune.scores import Metric, ScoreTable
+from proxytune.study.families.compared import ComparedFamilies, Lesson
+from proxytune.usefulness import assess
+
+METRICS = (Metric("distance"),)
+AGENTS = [f"agent{number}" for number in range(8)]
+
+
+def table(shift, noise=0.0):
+    """Eight agents from six starts; a shift swaps the order of so many neighbours."""
+    order = list(range(8))
+    for place in range(0, 2 * shift, 2):
+        order[place], order[place + 1] = order[place + 1], order[place]
+    scores = {
+        (agent, str(start)): {"distance": 10.0 * order[row] + noise * ((row * 7 + start * 3) % 5)}
+        for row, agent in enumerate(AGENTS)
+        for start in range(6)
+    }
+    return ScoreTable.from_episodes(scores)
+
+
+def family(name, shift=0, seconds=(1.0, 1.1, 0.9, 1.0), noise=0.1, fresh=True):
+    """A tuned family whose agents are in the target's order but for so many pairs of neighbours."""
+    target = table(0, 0.1)
+    assessment = assess(proxy=table(shift, noise), target=target, metrics=METRICS) if fresh else None
+    study = SimpleNamespace(target=target, settings=SimpleNamespace(home=Path("study") / "families" / name))
+    return SimpleNamespace(name=name, fresh=assessment, episode_seconds=seconds, result=SimpleNamespace(study=study))
+
+
+def compared(*families, lessons=None):
+    """These families of one study; lessons are of a study with [teaching]."""
+    stop = SimpleNamespace(wall_time_s=60.0)
+    settings = SimpleNamespace(metrics=METRICS, teaching=lessons is not None, stop=stop)
+    return ComparedFamilies(settings, families, lessons or {})
+
+
+def lesson(plv, more=None, needed=(100.0, 80.0, 120.0)):
+    """What a family is worth as a teacher, known to 10 samples."""
+    return Lesson({}, 1.0, Estimate(*needed), Estimate(plv, plv - 10.0, plv + 10.0), more and Estimate(*more))

@@ -57,15 +57,18 @@ class _Cells:
 
 def first_examinations(names: Sequence[str], spending: Spending) -> list[Examination]:
     """What is examined before anything is known: counts from the first to the last, in two repetitions."""
-    shares = np.linspace(0.0, len(spending.counts) - 1, FIRST_COUNTS)
-    counts = sorted({spending.counts[place] for place in shares.round().astype(int)})
     return [
         Examination(name, repetition, count)
         for repetition in range(min(FIRST_REPETITIONS, spending.repetitions))
         for name in names
-        for count in counts
-        if count or name != spending.none
+        for count in _spread_counts(spending.counts, first=int(name == spending.none))
     ]
+
+
+def _spread_counts(counts: tuple[int, ...], first: int) -> list[int]:
+    """Counts spread over the grid from the place of the first one to the last."""
+    places_ = np.linspace(first, len(counts) - 1, FIRST_COUNTS).round().astype(int)
+    return [counts[place] for place in sorted(set(places_.tolist()))]
 
 
 def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spending) -> list[Examination]:

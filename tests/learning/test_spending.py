@@ -34,7 +34,8 @@ def test_the_first_examinations_span_the_grid_in_two_repetitions_and_none_is_of_
     assert {one.samples for one in first if one.curve == "proxy"} == {0, 200, 400, 1600}
     assert {one.repetition for one in first} == {0, 1}
     assert not any(one.curve == "none" and one.samples == 0 for one in first)
-    assert len(first) == len(set(first)) == 2 * (4 + 3)
+    assert [one.samples for one in first if one.curve == "none"] == [100, 200, 800, 1600] * 2
+    assert len(first) == len(set(first)) == 2 * (4 + 4)
 
 
 def test_a_proxy_whose_crossing_is_sure_is_examined_less_than_one_whose_is_open():

@@ -12,7 +12,7 @@ from proxytune.learning.curves import Array
 from proxytune.learning.plv import Estimate
 from proxytune.learning.settings import NONE
 from proxytune.report.style import BLUE, COLUMN, GREY, dress, legend_below
-from proxytune.teaching.experiment import Experiment, TeacherResult
+from proxytune.teaching.experiment import Experiment, TeacherResult, teaching_settings
 
 COLUMNS = 2
 LEVELS = (0.025, 0.975)
@@ -59,8 +59,8 @@ def _panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> None:
             needed = lesson.worth.without if name == NONE else lesson.worth.needed
             _bar(axes, experiment, needed, look, height)
     axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
-    counts = experiment.without.counts
-    shown = [counts[place] for place in sorted({0, 1, (len(counts) + 1) // 2, len(counts) - 1})]
+    grid = teaching_settings(experiment.settings).target_samples
+    shown = [grid[place] for place in sorted({0, 1, (len(grid) + 1) // 2, len(grid) - 1})]
     axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
     axes.set_title(lesson.name, fontsize=8)
     dress(axes)

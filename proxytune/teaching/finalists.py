@@ -26,6 +26,8 @@ from proxytune.teaching.points import TeachingSetup
 
 BEST, SINGLE, BOX, BY_PRPV = "best p(θ)", "best single θ", "all of the box", "lowest PRPV"
 CLOUD = 4096
+CLOSER = 2
+"""A finalist gets so many times the examinations of a trial, where these are chosen."""
 
 
 def finalists(
@@ -59,7 +61,10 @@ def confirm(
     settings: StudySettings, setup: TeachingSetup, named: Mapping[str, Distribution], watcher: Watcher
 ) -> Experiment:
     """Teach the finalists and the learner without a proxy under fresh seeds."""
-    fresh = replace(setup, seed=fresh_seed(setup.seed, 1), settings=replace(setup.settings, proxies=named))
+    taught = replace(setup.settings, proxies=named)
+    if taught.examinations is not None:
+        taught = replace(taught, examinations=CLOSER * taught.examinations)
+    fresh = replace(setup, seed=fresh_seed(setup.seed, 1), settings=taught)
     scores = examine_curves(fresh, {NONE: None, **named}, settings.jobs, watcher)
     return judge_curves(settings, fresh, curves_of(fresh.settings, scores))
 

@@ -26,6 +26,7 @@ from proxytune.study.outputs import score_trials
 from proxytune.study.settings import StudySettings
 from proxytune.study.stages.stopping import nothing_to_gain, out_of_time
 from proxytune.teaching.box import distribution
+from proxytune.teaching.convergence import why_unknown
 from proxytune.teaching.examining import Scores, curves_of, examine_curves, needs_of
 from proxytune.teaching.experiment import Experiment, teaching_settings
 from proxytune.teaching.finalists import confirm, finalists
@@ -120,17 +121,14 @@ class PlvSearch:
             by_prpv: The θ of lowest PRPV, where that is known: it is taught beside the finalists.
 
         Raises:
-            RunError: If the learner does not converge without a proxy, so that no PLV is known.
+            RunError: If the learner does not converge without a proxy, so that PLV is not known.
             LearnerError: If an expert cannot drive somewhere in the box.
         """
         settings, taught = self.settings, self.setup.settings
         alone = examine_curves(self.setup, {NONE: None}, settings.jobs, self.watcher)
         needs = needs_of(self.setup, curves_of(taught, alone))
-        if not needs.settled:
-            raise RunError(
-                f"{settings.path}: without a proxy the score still rises by more than {taught.tolerance:g} up to "
-                f"{taught.target_samples[-1]} target samples, so PLV is not known; raise teaching.target_samples"
-            )
+        if unknown := why_unknown(needs):
+            raise RunError(f"{settings.path}: {unknown.reason}, so PLV is not known; {unknown.remedy}")
         self._check_facts()
         tried = ProxyTrials(self, alone)
         Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)

@@ -141,5 +141,10 @@ def test_a_width_without_its_parameter_is_one_line(make_study):
 
 
 def test_where_the_target_alone_is_not_learnt_there_is_no_plv_to_search_for(make_study):
-    with pytest.raises(RunError, match=r"has not|PLV is not known; raise teaching\.target_samples"):
+    with pytest.raises(RunError, match=r"still rises by more than 6 .* PLV is not known; raise teaching\.target"):
         run(make_taught(make_study, parameters=BOX, grid=[0, 3, 6]))
+
+
+def test_a_level_that_is_not_reached_without_a_proxy_is_told_before_any_proxy_is_tried(make_study):
+    with pytest.raises(RunError, match=r"does not come to 64 within 640 samples, .* lower teaching\.level"):
+        run(make_taught(make_study, parameters=BOX, more="level = 70.0"))

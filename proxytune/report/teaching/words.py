@@ -6,6 +6,7 @@ from proxytune.learning.lessons import describe
 from proxytune.learning.plv import Estimate
 from proxytune.report.numbers import listed
 from proxytune.report.teaching.table import UNKNOWN, count
+from proxytune.teaching.convergence import why_unknown
 from proxytune.teaching.experiment import Experiment, TeacherResult
 from proxytune.teaching.finalists import best_teacher, saves_more
 from proxytune.teaching.search import PlvStudy
@@ -15,14 +16,14 @@ SEARCH = '`study` with objective = "plv" looks for'
 
 def teach_answer(experiment: Experiment) -> str:
     """Which proxies save target samples, which save none, and of which that is open."""
-    if not experiment.settled:
-        last = experiment.without.counts[-1]
-        return f"PLV (proxy learning value) is unknown: without a proxy {last} samples are too few to converge."
-    saves, none, unknown = sorted_by_worth(experiment.teachers)
+    unknown = why_unknown(experiment.needs)
+    if unknown and not experiment.settled:
+        return f"PLV (proxy learning value) is unknown: {unknown.reason}."
+    saves, none, both = sorted_by_worth(experiment.teachers)
     sentences = [
         f"Target samples saved (PLV, proxy learning value, with 95 % interval): {_said(saves) or 'none is shown'}.",
         f"None saved: {_said(none)}." if none else "",
-        f"Open, since the interval reaches to both sides of 0: {_said(unknown)}." if unknown else "",
+        f"Open, since the interval reaches to both sides of 0: {_said(both)}." if both else "",
     ]
     return " ".join(filter(None, sentences))
 
@@ -35,7 +36,8 @@ def sorted_by_worth(teachers: Sequence[TeacherResult]) -> tuple[list[TeacherResu
 
 
 def _above(plv: Estimate) -> bool:
-    return plv.value is not None and plv.low is not None and plv.low > 0.0
+    """Whether its whole interval lies above 0; how far above may be unknown."""
+    return plv.low is not None and plv.low > 0.0
 
 
 def _said(lessons: Sequence[TeacherResult]) -> str:
@@ -44,12 +46,12 @@ def _said(lessons: Sequence[TeacherResult]) -> str:
 
 def teach_next_step(experiment: Experiment) -> str:
     """The step that brings most."""
-    if not experiment.settled:
-        return "raise teaching.target_samples until the learner without a proxy converges."
-    saves, _, unknown = sorted_by_worth(experiment.teachers)
-    if unknown:
+    if unknown := why_unknown(experiment.needs):
+        return f"{unknown.remedy}: {unknown.reason}."
+    saves, _, both = sorted_by_worth(experiment.teachers)
+    if both:
         more = f"{_more_of_it(experiment)}, which narrows the intervals"
-        return f"{more}: {listed([one.name for one in unknown])} cannot be judged yet."
+        return f"{more}: {listed([one.name for one in both])} cannot be judged yet."
     if saves:
         return f"train in a proxy that saves samples, then on target samples; {SEARCH} a better one."
     return f"train without these proxies; {SEARCH} one that saves samples."

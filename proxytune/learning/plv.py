@@ -40,6 +40,16 @@ class Estimate:
     low: float | None
     high: float | None
 
+    @property
+    def above_zero(self) -> bool:
+        """Whether its whole interval lies above 0; how far above may be unknown."""
+        return self.low is not None and self.low > 0.0
+
+    @property
+    def at_most_zero(self) -> bool:
+        """Whether no part of its interval lies above 0."""
+        return self.high is not None and self.high <= 0.0
+
 
 @dataclass(frozen=True)
 class Teaching:

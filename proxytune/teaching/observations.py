@@ -62,7 +62,7 @@ def _plv(experiment: Experiment, names: Sequence[str]) -> Array:
 
 
 def _saves(teacher: TeacherResult) -> bool:
-    return teacher.worth is not None and teacher.worth.plv.low is not None and teacher.worth.plv.low > 0.0
+    return teacher.worth is not None and teacher.worth.plv.above_zero
 
 
 def _by_chance(prpv: Mapping[str, Predictivity | None], name: str) -> bool:

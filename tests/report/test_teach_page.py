@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
+import pytest
 
 from proxytune.learning.costs import Costs
 from proxytune.learning.curves import Curve
@@ -14,7 +15,7 @@ from proxytune.learning.published import Published
 from proxytune.report.page import foot_of, html_of
 from proxytune.report.teaching.figure import teach_figure
 from proxytune.report.teaching.page import teach_page
-from proxytune.report.teaching.words import sorted_by_worth, teach_answer, teach_next_step
+from proxytune.report.teaching.words import plv_answer, plv_next_step, sorted_by_worth, teach_answer, teach_next_step
 from proxytune.report.writing import save
 from proxytune.teaching.experiment import Experiment, TeacherResult
 
@@ -108,6 +109,26 @@ def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
     assert costs["sure"] == "750 (250 to 875)"
     assert costs["far"] == "unknown (300 or more)"
     assert any("off_policy 2.5, on_policy 2.5, label 0" in note for note in table.notes)
+
+
+@pytest.mark.parametrize(
+    ("plv", "judged", "step"),
+    [
+        (Worth(84, 33, 180), "it saves target samples.", "train in proxy: nominal θ, then on target samples."),
+        (Worth(-84, -180, -33), "it saves none.", "train without a proxy, or raise teaching.budget"),
+        (Worth(10, -20, 30), "that it saves any is not shown: the interval holds 0.", "raise teaching.seeds"),
+    ],
+)
+def test_a_search_by_plv_says_of_its_best_finalist_what_the_interval_allows(plv, judged, step):
+    study = SimpleNamespace(trials=range(3), confirmed=experiment((lesson("proxy", plv),)))
+    assert plv_answer(study).endswith(f"target samples saved; {judged}")
+    assert plv_next_step(study).startswith(step)
+
+
+def test_where_the_finalists_cannot_be_judged_the_next_step_says_why():
+    study = SimpleNamespace(trials=range(3), confirmed=experiment((lesson("proxy", NOTHING),), gain=6.0))
+    assert "no finalist is known to save" in plv_answer(study)
+    assert plv_next_step(study).startswith("raise teaching.target_samples: without a proxy the score still rises")
 
 
 def test_where_examinations_are_chosen_more_of_them_are_next():

@@ -10,6 +10,7 @@ from proxytune.learning.curves import Array, Curve
 from proxytune.learning.posterior import DRAWS, Draws, crossing, draw_curves
 
 LEVELS = (0.025, 0.975)
+"""Ends of a 95 % interval, as quantiles of draws."""
 ROUNDING = 1e-9
 Samples = TypeVar("Samples", float, Array)
 

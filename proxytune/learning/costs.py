@@ -54,12 +54,6 @@ def split_samples(count: Array | float, expert_drives: float) -> tuple[Array, Ar
         return np.where(off < count, np.subtract(count, off), 0.0), off
 
 
-def cost_of(costs: Costs, count: Array | float, expert_drives: float) -> Array:
-    """What so many target samples cost, of which the expert drives for the first ones; as in `split_samples`."""
-    (on, off), (cost_on, cost_off) = split_samples(count, expert_drives), costs.per_sample
-    return cost_on * on + cost_off * off
-
-
 def cost_saved(costs: Costs, *, without: tuple[Array, Array], with_proxy: tuple[Array, Array]) -> Array:
     """PLV in cost: what the target samples cost that are needed without a proxy, less those needed with it.
 
@@ -69,4 +63,11 @@ def cost_saved(costs: Costs, *, without: tuple[Array, Array], with_proxy: tuple[
         with_proxy: The same with it.
     """
     cost_on, cost_off = costs.per_sample
-    return general_plv(without=without, with_proxy=with_proxy, cost_on=cost_on, cost_off=cost_off)  # eq. (6)
+    paid, paid_with = _with_a_price(costs, without), _with_a_price(costs, with_proxy)
+    return general_plv(without=paid, with_proxy=paid_with, cost_on=cost_on, cost_off=cost_off)  # eq. (6)
+
+
+def _with_a_price(costs: Costs, samples: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Samples without those that cost nothing, of which there may be infinitely many."""
+    on, off = (np.where(price > 0.0, count, 0.0) for price, count in zip(costs.per_sample, samples, strict=True))
+    return on, off

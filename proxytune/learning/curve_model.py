@@ -24,6 +24,8 @@ PRIORS: Mapping[str, tuple[float, float]] = {
 }
 """Median of each hyperparameter, and the spread of its logarithm; scores have standard deviation 1."""
 
+REPEATED = ("shared", "own", "drift")
+"""Hyperparameters that only several repetitions tell."""
 LEVEL = 3.0
 """Prior standard deviation of the level that all curves share."""
 NEAR = 0.7
@@ -113,7 +115,7 @@ def fit_curve_model(marks: Marks) -> CurveModel:
     spread, start = np.ones(len(scaled)), np.log([median for median, _ in PRIORS.values()])
     for _ in range(1 + ROUNDS):
         given = (marks, scaled, spread)
-        found = minimize(_misfit, start, args=given, method="L-BFGS-B", bounds=_bounds(), options={"maxiter": 40})
+        found = minimize(_misfit, start, args=given, method="L-BFGS-B", bounds=_bounds(marks), options={"maxiter": 40})
         start, values = found.x, _named(found.x)
         factor = cho_factor(_covariance(marks, values, spread), lower=True)
         weights = cho_solve(factor, scaled)
@@ -121,9 +123,12 @@ def fit_curve_model(marks: Marks) -> CurveModel:
     return CurveModel(marks, values, centre, unit, used, factor, weights)
 
 
-def _bounds() -> list[tuple[float, float]]:
+def _bounds(marks: Marks) -> list[tuple[float, float]]:
     """How small and how large the logarithm of each hyperparameter may be."""
-    return [(np.log(median) - FARTHEST * width, np.log(median) + FARTHEST * width) for median, width in PRIORS.values()]
+    # One repetition does not tell what it does to a learner from the learner's mean curve
+    held = REPEATED if len(np.unique(marks.repetition)) == 1 else ()
+    far = {name: 0.0 if name in held else FARTHEST * width for name, (_, width) in PRIORS.items()}
+    return [(np.log(median) - far[name], np.log(median) + far[name]) for name, (median, _) in PRIORS.items()]
 
 
 def _named(logarithms: Array) -> dict[str, float]:

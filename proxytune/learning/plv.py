@@ -10,6 +10,8 @@ from proxytune.learning.curves import Array, Curve
 from proxytune.learning.posterior import DRAWS, Draws, crossing, draw_curves
 
 LEVELS = (0.025, 0.975)
+"""Ends of a 95 % interval, as quantiles of draws."""
+ROUNDING = 1e-9
 Samples = TypeVar("Samples", float, Array)
 
 
@@ -39,6 +41,16 @@ class Estimate:
     low: float | None
     high: float | None
 
+    @property
+    def above_zero(self) -> bool:
+        """Whether its whole interval lies above 0; how far above may be unknown."""
+        return self.low is not None and self.low > 0.0
+
+    @property
+    def at_most_zero(self) -> bool:
+        """Whether no part of its interval lies above 0."""
+        return self.high is not None and self.high <= 0.0
+
 
 @dataclass(frozen=True)
 class Teaching:
@@ -67,16 +79,21 @@ class SampleNeeds:
         curves: The scores that the examinations gave, by name.
         draws: The mean curves.
         when: When a learner counts as converged; its level is the posterior's mean where none was stated.
-        settled: Whether the learner without a proxy converges: over the last doubling of samples it gains no more than
-            the tolerance.
+        gain: What the learner without a proxy gains over the last doubling of samples; None where it has learnt nothing
+            before that.
         needed: η by name (draws,); infinite where it is not reached up to the largest count.
     """
 
     curves: Mapping[str, Curve]
     draws: Draws
     when: Convergence
-    settled: bool
+    gain: float | None
     needed: Mapping[str, Array]
+
+    @property
+    def settled(self) -> bool:
+        """Whether the learner without a proxy converges: over the last doubling it gains no more than the tolerance."""
+        return self.gain is not None and self.gain <= self.when.tolerance
 
     @property
     def last(self) -> float:
@@ -121,20 +138,34 @@ def sample_needs(
     Args:
         curves: Scores by name of the learning curve.
         none: The name of the learner without a proxy.
-        best_score: The score of a flawless examination; none lies beyond it, nor below its negative.
+        best_score: The score of a flawless examination; none is expected beyond it, nor below its negative.
         tolerance: How far below the level still counts as converged.
         level: The score that counts as converged; None for what the learner without a proxy comes to.
         draws: How many draws.
     """
-    drawn = draw_curves(curves, (-best_score, best_score), draws)
+    drawn = draw_curves(curves, _bounds(curves, best_score), draws)
     alone = drawn.scores[none]
     levels = alone[:, -1] if level is None else np.full(len(alone), level)
-    half = int(np.flatnonzero(2.0 * drawn.counts <= drawn.counts[-1])[-1])
-    settled = bool(alone[:, -1].mean() - alone[:, half].mean() <= tolerance)
-    needed = {name: crossing(drawn.counts, scores, levels - tolerance) for name, scores in drawn.scores.items()}
-    return SampleNeeds(
-        curves, drawn, Convergence(float(levels.mean()) if level is None else level, tolerance), settled, needed
-    )
+    needed = {
+        name: crossing(drawn.counts, scores, levels - tolerance, drawn.first) for name, scores in drawn.scores.items()
+    }
+    when = Convergence(float(levels.mean()) if level is None else level, tolerance)
+    return SampleNeeds(curves, drawn, when, _last_gain(drawn, alone), needed)
+
+
+def _last_gain(drawn: Draws, alone: Array) -> float | None:
+    """What the learner without a proxy gains over the last doubling of samples; None if it begins within that."""
+    if 2.0 * drawn.first > drawn.counts[-1] * (1.0 + ROUNDING):
+        return None
+    # Where the first count is half the last one, the place drawn next to it may lie before anything is learnt
+    half = max(np.flatnonzero(2.0 * drawn.counts <= drawn.counts[-1])[-1], np.argmax(np.isfinite(alone[0])))
+    return float(alone[:, -1].mean() - alone[:, half].mean())
+
+
+def _bounds(curves: Mapping[str, Curve], best_score: float) -> tuple[float, float]:
+    """Lowest and highest score there can be; a family's own scores may lie beyond those of one that drives."""
+    scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
+    return float(min(-best_score, scores.min())), float(max(best_score, scores.max()))
 
 
 def teaching(needs: SampleNeeds, *, none: str, proxy: str) -> Teaching:
@@ -142,19 +173,44 @@ def teaching(needs: SampleNeeds, *, none: str, proxy: str) -> Teaching:
 
     Where convergence is not reached, η is known to lie beyond the largest count: ends that this leaves open are None.
     """
-    without, needed, last = needs.needed[none], needs.needed[proxy], needs.last
     return Teaching(
-        without=_estimate(lambda alone, taught: alone, without, needed, last),
-        needed=_estimate(lambda alone, taught: -taught, without, needed, last, sign=-1.0),
-        plv=_estimate(lambda alone, taught: plv(without=alone, with_proxy=taught), without, needed, last),
-        factor=_estimate(lambda alone, taught: alone / taught, without, needed, last),
-        reduction=_estimate(lambda alone, taught: (alone - taught) / alone, without, needed, last),
+        without=samples_needed(needs, none),
+        needed=samples_needed(needs, proxy),
+        plv=difference(needs, more=none, less=proxy),
+        factor=estimate(lambda alone, taught: alone / taught, needs, more=none, less=proxy),
+        reduction=estimate(lambda alone, taught: 1.0 - taught / alone, needs, more=none, less=proxy),
     )
+
+
+def samples_needed(needs: SampleNeeds, name: str) -> Estimate:
+    """How many target samples a learner needs, with its 95 % interval; None beyond the largest count."""
+    needed = needs.needed[name]
+    least = np.minimum(needed, needs.last)
+    return _ends(least=least, middle=needed, most=needed)
 
 
 def difference(needs: SampleNeeds, *, more: str, less: str) -> Estimate:
     """How many more target samples one learner needs than another, with its 95 % interval."""
-    return _estimate(lambda one, other: one - other, needs.needed[more], needs.needed[less], needs.last)
+    return estimate(lambda one, other: plv(without=one, with_proxy=other), needs, more=more, less=less)
+
+
+def estimate(figure: Callable[[Array, Array], Array], needs: SampleNeeds, *, more: str, less: str) -> Estimate:
+    """A figure of what two learners need, with the ends of its 95 % interval that unreached η leave possible.
+
+    Args:
+        figure: From the η of both, draw by draw; it rises with the first and falls with the second.
+        needs: How many target samples each learner needs.
+        more: The name of the first learner.
+        less: The name of the second.
+    """
+    first, second, last = needs.needed[more], needs.needed[less], needs.last
+    reached = np.isfinite(second)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        least = np.where(reached, figure(np.minimum(first, last), second), -np.inf)
+        most = figure(first, np.minimum(second, last))
+        # Even a figure that is bounded is not known where the first is not
+        known = np.where(np.isfinite(first), figure(first, second), np.inf)
+    return _ends(least=least, middle=np.where(reached, known, -np.inf), most=most)
 
 
 def mean_score(needs: SampleNeeds, name: str, place: int) -> Estimate:
@@ -163,18 +219,10 @@ def mean_score(needs: SampleNeeds, name: str, place: int) -> Estimate:
     return Estimate(*(_finite(float(end)) for end in (scores.mean(), *np.quantile(scores, LEVELS))))
 
 
-def _estimate(
-    figure: Callable[[Array, Array], Array], without: Array, needed: Array, last: float, sign: float = 1.0
-) -> Estimate:
-    """A figure that rises with η(∅) and falls with η(S): its median, and the ends that unreached η leave possible."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        reached = np.isfinite(needed)
-        least = np.where(reached, figure(np.minimum(without, last), needed), -np.inf)
-        most = figure(without, np.minimum(needed, last))
-        middle = np.where(reached, figure(without, needed), -np.inf)
+def _ends(*, least: Array, middle: Array, most: Array) -> Estimate:
+    """The median of a figure, and its 95 % interval from the least and the most that it may be in each draw."""
     ends = (_quantile(middle, 0.5), _quantile(least, LEVELS[0]), _quantile(most, LEVELS[1]))
-    value, low, high = (_finite(sign * end) for end in ends)
-    return Estimate(value, low, high) if sign > 0 else Estimate(value, high, low)
+    return Estimate(*(_finite(end) for end in ends))
 
 
 def _quantile(values: Array, level: float) -> float:

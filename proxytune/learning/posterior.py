@@ -26,12 +26,14 @@ class Draws:
         scores: Mean scores by name of the curve, (draws, counts) each; NaN before anything can have been learnt.
         monotone: Whether the data allow a curve to rise only, by name; then it is drawn so.
         model: What they are drawn from; its curves are numbered in the order of `scores`.
+        first: The smallest number of target samples after which something has been learnt.
     """
 
     counts: Array
     scores: Mapping[str, Array]
     monotone: Mapping[str, bool]
     model: CurveModel
+    first: float
 
 
 def draw_curves(curves: Mapping[str, Curve], bounds: tuple[float, float], draws: int = DRAWS, seed: int = 0) -> Draws:
@@ -63,7 +65,7 @@ def draw_curves(curves: Mapping[str, Curve], bounds: tuple[float, float], draws:
     for name, curve in curves.items():
         if not np.isfinite(curve.scores[:, 0]).any():
             scores[name][:, place < 1.0 - 1e-9] = np.nan
-    return Draws(counts_at(place, first), scores, rising, model)
+    return Draws(counts_at(place, first), scores, rising, model, first)
 
 
 def _marks(curves: Mapping[str, Curve], first: float) -> Marks:
@@ -99,13 +101,14 @@ def _rising(drawn: Array, sure: Array) -> Array:
     return np.array([isotonic_regression(one, weights=sure).x for one in drawn])
 
 
-def crossing(counts: Array, scores: Array, threshold: Array) -> Array:
+def crossing(counts: Array, scores: Array, threshold: Array, first: float) -> Array:
     """η of each draw: the number of target samples from which on the mean score stays converged; infinite where none.
 
     Args:
         counts: Numbers of target samples (counts,).
         scores: Mean scores (draws, counts); NaN where there is no learner yet.
         threshold: The lowest score that counts (draws,).
+        first: The number of target samples after which there is a learner.
     """
     above = scores - threshold[:, None]
     below = ~(above >= 0.0)
@@ -114,7 +117,8 @@ def crossing(counts: Array, scores: Array, threshold: Array) -> Array:
     rows = np.arange(len(scores))
     low, high = above[rows, here], above[rows, after]
     with np.errstate(invalid="ignore", divide="ignore"):
-        # Before anything is learnt there is no score to rise from.
-        share = np.where(np.isfinite(low) & (high > low), -low / (high - low), 1.0)
-    between = counts[here] + share * (counts[after] - counts[here])
+        share = np.where(high > low, -low / (high - low), 1.0)
+    # Before anything is learnt there is no score to rise from, and the next place drawn may lie beyond the first count
+    rising = counts[here] + share * (counts[after] - counts[here])
+    between = np.where(np.isnan(low), np.maximum(first, counts[here]), rising)
     return np.asarray(np.where(last < 0, counts[0], np.where(last == len(counts) - 1, np.inf, between)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from proxytune.learning.costs import Array, Costs, cost_of, cost_saved, read_costs, split_samples
+from proxytune.learning.costs import Array, Costs, cost_saved, read_costs, split_samples
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.published import Published, read_published
 from proxytune.learning.spending import FIRST_COUNTS, FIRST_REPETITIONS
@@ -87,10 +87,6 @@ class TeachingSettings:
         if self.target_lessons == EXPERT:
             return math.inf
         return 0.0 if with_proxy else float(self.target_samples[1])
-
-    def target_cost(self, count: Array | float, *, with_proxy: bool) -> Array:
-        """What so many target samples cost; any real number of them, of any shape."""
-        return cost_of(self.costs, count, self.expert_drives(with_proxy=with_proxy))
 
     def cost_saved(self, *, without: Array | float, needed: Array | float) -> Array:
         """PLV in cost (eq. 6), from the target samples needed without a proxy and with it, of any shape."""

@@ -113,17 +113,20 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spendi
 
 def _cells(needs: SampleNeeds, names: Collection[str], spending: Spending) -> _Cells:
     """Every place of the drawn curves at which somebody may be examined."""
-    counts = needs.draws.counts.round().astype(int)
-    open_ = [
-        place for place in range(0, len(counts), APART) if not counts[place] or counts[place] >= spending.counts[1]
-    ]
+    counts, scores = needs.draws.counts.round().astype(int), needs.draws.scores
+    open_ = {
+        counts[place]: place
+        # Of places of one count the last one: before the first count a learner without a proxy is not drawn
+        for place in range(0, len(counts), APART)
+        if not place or counts[place] >= spending.counts[1]
+    }
     cells = [
         (number, name, place)
         for number, name in enumerate(needs.curves)
-        for place in open_
-        if name in names and (counts[place] or name != spending.none)
+        for count, place in open_.items()
+        if name in names and (count or name != spending.none) and np.isfinite(scores[name][0, place])
     ]
-    drawn = np.column_stack([needs.draws.scores[name][:, place] for _, name, place in cells])
+    drawn = np.column_stack([scores[name][:, place] for _, name, place in cells])
     at = np.array([place for _, _, place in cells])
     return _Cells(np.array([number for number, _, _ in cells]), tuple(name for _, name, _ in cells), counts[at], drawn)
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from proxytune.learning.plv import LEVELS
 from proxytune.scores import Array
 
-LEVELS = (0.025, 0.975)
 SURE = 0.95
 """Two proxies are ordered where so many of the draws order them so."""
 

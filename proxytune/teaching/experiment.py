@@ -9,11 +9,11 @@ from proxytune.domain import Classroom
 from proxytune.errors import InputError
 from proxytune.extensions import make
 from proxytune.learning.cache import Cache
-from proxytune.learning.curves import Curve
+from proxytune.learning.curves import Array, Curve
 from proxytune.learning.identity import learner_identity
 from proxytune.learning.learner import Learner
 from proxytune.learning.lessons import Distribution
-from proxytune.learning.plv import Convergence, Estimate, SampleNeeds, Teaching, mean_score, teaching
+from proxytune.learning.plv import Convergence, Estimate, SampleNeeds, Teaching, estimate, mean_score, teaching
 from proxytune.learning.settings import EXPERT, LEARNER, NONE, TeachingSettings
 from proxytune.running.progress import Watcher
 from proxytune.study.family import check_bounds, load_family
@@ -35,6 +35,7 @@ class TeacherResult:
         curve: Scores in the target after so many target samples, having learnt from the proxy first.
         zero_shot: Mean score before any target sample.
         worth: PLV and what it is made of; None where the learner without a proxy has not converged.
+        cost: PLV in cost, in the unit of [teaching.costs]; None likewise.
     """
 
     name: str
@@ -42,6 +43,7 @@ class TeacherResult:
     curve: Curve
     zero_shot: Estimate
     worth: Teaching | None
+    cost: Estimate | None
 
 
 @dataclass(frozen=True)
@@ -125,13 +127,25 @@ def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watch
 def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, Curve]) -> Experiment:
     """Judge each proxy by the learning curves: a pure function of them and of what counts as converged."""
     needs = needs_of(setup, curves)
-    teachers = [_teacher(needs, name, proxy) for name, proxy in setup.settings.proxies.items()]
+    teachers = [_teacher(setup.settings, needs, name, proxy) for name, proxy in setup.settings.proxies.items()]
     return Experiment(settings, setup.target.best_score, needs, tuple(teachers))
 
 
-def _teacher(needs: SampleNeeds, name: str, proxy: Distribution) -> TeacherResult:
-    worth = teaching(needs, none=NONE, proxy=name) if needs.settled else None
-    return TeacherResult(name, proxy, needs.curves[name], mean_score(needs, name, 0), worth)
+def _teacher(taught: TeachingSettings, needs: SampleNeeds, name: str, proxy: Distribution) -> TeacherResult:
+    zero_shot, curve = mean_score(needs, name, 0), needs.curves[name]
+    if not needs.settled:
+        return TeacherResult(name, proxy, curve, zero_shot, None, None)
+    worth = teaching(needs, none=NONE, proxy=name)
+    return TeacherResult(name, proxy, curve, zero_shot, worth, _cost_saved(taught, needs, name))
+
+
+def _cost_saved(taught: TeachingSettings, needs: SampleNeeds, name: str) -> Estimate:
+    """PLV in cost (eq. 6)."""
+
+    def saved(without: Array, needed: Array) -> Array:
+        return taught.cost_saved(without=without, needed=needed)
+
+    return estimate(saved, needs, more=NONE, less=name)
 
 
 def check_proxies(settings: StudySettings, setup: TeachingSetup, proxies: Mapping[str, Distribution]) -> None:

@@ -26,7 +26,8 @@ from proxytune.study.outputs import score_trials
 from proxytune.study.settings import StudySettings
 from proxytune.study.stages.stopping import nothing_to_gain, out_of_time
 from proxytune.teaching.box import distribution
-from proxytune.teaching.examining import Scores, curves_of, examine_curves, needs_of
+from proxytune.teaching.convergence import why_unknown
+from proxytune.teaching.examining import Scores, count_examinations, curves_of, examine_curves, needs_of
 from proxytune.teaching.experiment import Experiment, teaching_settings
 from proxytune.teaching.finalists import confirm, finalists
 from proxytune.teaching.points import TeachingSetup
@@ -120,19 +121,17 @@ class PlvSearch:
             by_prpv: The θ of lowest PRPV, where that is known: it is taught beside the finalists.
 
         Raises:
-            RunError: If the learner does not converge without a proxy, so that no PLV is known.
+            RunError: If the learner does not converge without a proxy, so that PLV is not known.
             LearnerError: If an expert cannot drive somewhere in the box.
         """
         settings, taught = self.settings, self.setup.settings
         alone = examine_curves(self.setup, {NONE: None}, settings.jobs, self.watcher)
         needs = needs_of(self.setup, curves_of(taught, alone))
-        if not needs.settled:
-            raise RunError(
-                f"{settings.path}: without a proxy the score still rises by more than {taught.tolerance:g} up to "
-                f"{taught.target_samples[-1]} target samples, so PLV is not known; raise teaching.target_samples"
-            )
+        if unknown := why_unknown(needs):
+            raise RunError(f"{settings.path}: {unknown.reason}, so PLV is not known; {unknown.remedy}")
         self._check_facts()
         tried = ProxyTrials(self, alone)
+        self.watcher.begin("learning", count_examinations(taught, tried.done))
         Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
         named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
         confirmed = confirm(settings, self.setup, named, self.watcher)
@@ -165,6 +164,11 @@ class ProxyTrials:
     def __init__(self, search: PlvSearch, alone: Scores) -> None:
         self._search, self._alone = search, alone
         self._records = [trial for trial in search.store.trials(OBJECTIVE) if trial.state != "open"]
+
+    @property
+    def done(self) -> int:
+        """How many have been tried."""
+        return len(self._records)
 
     def trials(self) -> Sequence[Trial]:
         """The finished trials, in order."""

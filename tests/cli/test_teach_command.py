@@ -23,6 +23,10 @@ def test_teach_prints_one_document_with_the_promised_keys(make_study, capsys):
     assert document["without"]["scores"][0][0] is None
     assert right["plv"]["value"] == pytest.approx(right["without"]["value"] - right["needed"]["value"], abs=5.0)
     assert right["zero_shot_interval"][0] <= right["zero_shot"] <= right["zero_shot_interval"][1]
+    assert right["plv_cost"]["value"] == right["plv"]["value"]
+    taught = document["settings"]["teaching"]
+    assert taught["costs"] == {"off_policy": 1.0, "on_policy": 1.0, "label": 0.0}
+    assert (taught["rehearsal"], taught["proxy_lessons"], taught["target_lessons"]) == (0.0, "expert", "expert")
     for proxy in document["proxies"].values():
         assert isinstance(proxy["prpv"], float | int)
         assert proxy["prpv_interval"][0] <= proxy["prpv"] <= proxy["prpv_interval"][1]

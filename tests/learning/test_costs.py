@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxytune.learning.costs import Costs, cost_of, cost_saved, split_samples
+from proxytune.learning.costs import Costs, cost_saved, split_samples
 from proxytune.learning.plv import plv
 
 COSTS = Costs(off_policy=3.0, on_policy=0.5, label=0.25)
@@ -26,17 +26,27 @@ def test_the_expert_drives_for_the_first_samples():
 
 def test_what_is_never_reached_costs_without_end():
     assert split_samples(np.inf, np.inf) == (0.0, np.inf)
-    assert cost_of(COSTS, np.array([np.inf, 4.0]), np.inf).tolist() == [np.inf, 13.0]
-    assert cost_of(COSTS, np.inf, 10.0) == np.inf
+    nothing = (0.0, 0.0)
+    assert cost_saved(COSTS, without=split_samples(np.array([np.inf, 4.0]), np.inf), with_proxy=nothing).tolist() == [
+        np.inf,
+        13.0,
+    ]
+    assert cost_saved(COSTS, without=split_samples(np.inf, 10.0), with_proxy=nothing) == np.inf
+
+
+def test_what_costs_nothing_adds_nothing_however_many_samples_it_takes():
+    free = Costs(off_policy=2.0, on_policy=0.0)
+    assert cost_saved(free, without=split_samples(np.inf, 10.0), with_proxy=split_samples(5.0, 0.0)) == 20.0
 
 
 @given(counts, counts, st.floats(0.0, 1e3))
 def test_more_samples_never_cost_less(count, more, expert_drives):
-    assert cost_of(COSTS, count + more, expert_drives) >= cost_of(COSTS, count, expert_drives)
+    splits = (split_samples(count + more, expert_drives), split_samples(count, expert_drives))
+    assert cost_saved(COSTS, without=splits[0], with_proxy=splits[1]) >= 0.0
 
 
 def test_a_sample_costs_its_driving_and_its_label():
-    assert cost_of(COSTS, 25.0, 10.0) == 10 * 3.25 + 15 * 0.75
+    assert cost_saved(COSTS, without=split_samples(25.0, 10.0), with_proxy=(0.0, 0.0)) == 10 * 3.25 + 15 * 0.75
 
 
 @given(counts, counts)

@@ -57,3 +57,19 @@ def test_scores_that_are_all_the_same_are_fitted_without_complaint(score):
     mean, covariance = model.mean_curves(np.array([0, 1]), np.array([1.0, 2.5]))
     assert mean == pytest.approx([score, score])
     assert np.isfinite(covariance).all()
+
+
+def test_one_repetition_leaves_the_mean_curves_near_their_scores():
+    scores = np.array(
+        [
+            [50.2, 50.2, 54.2, 57.4, 56.4, 57.7, 58.7],
+            [57.6, 55.7, 56.6, 58.1, 57.1, 57.9, 58.8],
+            [-58.6, 8.9, 21.9, 34.8, 44.8, 51.8, 55.5],
+            [51.3, 52.7, 54.1, 56.8, 57.2, 58.0, 58.9],
+        ]
+    )
+    curve, at = np.indices(scores.shape).reshape(2, -1)
+    model = fit_curve_model(Marks(curve, np.zeros(scores.size, dtype=int), at.astype(float), scores.ravel()))
+    means, covariance = model.mean_curves(np.array([1, 2]), np.array([1.0, 1.0]))
+    assert means[0] - means[1] > 20.0
+    assert np.sqrt(np.diag(covariance)).min() > 2.0

@@ -27,6 +27,17 @@ class Together(Schoolroom):
 
 
 @dataclass(frozen=True)
+class Unfinished:
+    """Has no finite score from one of its starts."""
+
+    inner: Wobbly
+    score: float
+
+    def examine(self, episode, policy):
+        return self.score if episode.start == 2 else 1.0
+
+
+@dataclass(frozen=True)
 class Manifold(Matrix):
     def act_many(self, weights, observations):
         return observations @ weights["matrix"]
@@ -42,6 +53,12 @@ def test_a_classroom_is_asked_for_all_episodes_at_once_if_it_can_and_else_for_ea
 def test_missing_scores_are_told_in_one_line():
     with pytest.raises(EpisodeError, match="examine_together gave 3 scores for 4 episodes; give each its own"):
         examine(Together(Wobbly(), lost=1), EPISODES, policy_of(Matrix(), WEIGHTS))
+
+
+@pytest.mark.parametrize("score", [np.nan, np.inf, -np.inf])
+def test_a_score_that_is_no_finite_number_is_told_with_its_start(score):
+    with pytest.raises(EpisodeError, match=r"the examination from start 2 gave -?(nan|inf); give a finite score"):
+        examine(Unfinished(Wobbly(), score), EPISODES, policy_of(Matrix(), WEIGHTS))
 
 
 def test_a_policy_answers_many_observations_at_once_only_if_its_learner_does():

@@ -67,6 +67,39 @@ def test_a_learner_counts_as_settled_where_the_last_doubling_gains_no_more_than_
     assert not sample_needs({"none": rising}, none="none", best_score=60.0, tolerance=5.0).settled
 
 
+def test_a_grid_whose_first_count_is_beyond_half_its_last_tells_no_gain():
+    alone = Curve((0, 500, 800), np.array([[np.nan, 50.0, 50.0], [np.nan, 49.0, 51.0]]))
+    needs = sample_needs({"none": alone}, none="none", best_score=60.0, tolerance=5.0)
+    assert (needs.gain, needs.settled) == (None, False)
+
+
+@pytest.mark.parametrize("grid", [(0, 400, 800), (0, 3, 6), (0, 50, 100)])
+def test_a_grid_that_begins_at_half_its_last_tells_the_gain(grid):
+    alone = Curve(grid, np.array([[np.nan, 20.0, 50.0], [np.nan, 19.0, 51.0], [np.nan, 21.0, 50.5]]))
+    needs = sample_needs({"none": alone}, none="none", best_score=60.0, tolerance=5.0)
+    assert 20.0 < needs.gain < 35.0
+
+
+def test_what_is_needed_without_a_proxy_does_not_depend_on_which_proxy_it_is_held_against():
+    needs = judged(good=curve(20, 48, 50, 50, 50), never=curve(0, 0, 0, 0, 0))
+    good, never = (teaching(needs, none="none", proxy=name) for name in ("good", "never"))
+    assert good.without == never.without
+    assert good.without.low > 200.0
+
+
+def test_a_reduction_is_bounded_but_not_known_where_the_learner_without_a_proxy_does_not_get_there():
+    found = worth(curve(40, 50, 58, 59, 59), level=59.0).reduction
+    assert found.value is None
+    assert 0.0 < found.low < found.high == 1.0
+
+
+def test_scores_beyond_the_best_and_its_negative_are_no_other_scores():
+    lower = {"none": curve(np.nan, -900, -600, -200, -190), "proxy": curve(-500, -200, -190, -190, -190)}
+    needs = sample_needs(lower, none="none", best_score=0.0, tolerance=20.0)
+    assert -195.0 < needs.when.level < -185.0
+    assert 200.0 < teaching(needs, none="none", proxy="proxy").without.value < 800.0
+
+
 def test_intervals_are_wider_where_seeds_differ_more():
     spans = []
     for wobble in (1.0, 8.0):

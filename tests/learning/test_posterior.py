@@ -18,7 +18,7 @@ def curve(*means, wobble=1.0, seeds=6):
 
 
 def crossed(*scores, threshold=45.0):
-    return float(crossing(COUNTS, np.array([scores], dtype=float), np.array([threshold]))[0])
+    return float(crossing(COUNTS, np.array([scores], dtype=float), np.array([threshold]), first=100.0)[0])
 
 
 def test_samples_are_needed_up_to_where_the_curve_comes_to_stay_above_the_threshold():
@@ -35,6 +35,12 @@ def test_what_is_not_reached_is_infinite_and_never_extrapolated():
 
 def test_without_any_sample_there_is_no_learner_so_none_are_not_enough():
     assert crossed(np.nan, 50, 50, 50) == 100.0
+
+
+def test_the_first_count_is_enough_though_the_next_place_drawn_lies_beyond_it():
+    scores = np.array([[np.nan, np.nan, 50.0, 50.0], [np.nan, np.nan, 40.0, 50.0]])
+    needed = crossing(np.array([0.0, 60.0, 120.0, 200.0]), scores, np.array([45.0, 45.0]), first=100.0)
+    assert needed.tolist() == [100.0, 160.0]
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)

@@ -43,22 +43,21 @@ def test_the_expert_drives_and_a_sample_costs_one_unless_it_is_said_otherwise(tm
 @pytest.mark.parametrize("with_proxy", [False, True])
 def test_where_the_expert_drives_all_target_samples_are_off_policy(tmp_path, with_proxy):
     told = read(tmp_path, costs={"off_policy": 2, "on_policy": 5, "label": 1})
-    assert told.target_cost(30, with_proxy=with_proxy) == 90.0
+    counts = {"without": 0.0, "needed": 30.0} if with_proxy else {"without": 30.0, "needed": 0.0}
+    assert abs(told.cost_saved(**counts)) == 90.0
 
 
 def test_where_the_learner_drives_the_first_round_without_a_proxy_is_the_experts(tmp_path):
     told = read(tmp_path, target_lessons="learner", costs={"off_policy": 2, "on_policy": 5, "label": 1})
     counts = np.array([0.0, 4.5, 10.0, 11.0, 40.0])
-    assert told.target_cost(counts, with_proxy=False).tolist() == [0.0, 13.5, 30.0, 36.0, 210.0]
-    assert told.target_cost(counts, with_proxy=True).tolist() == [0.0, 27.0, 60.0, 66.0, 240.0]
+    assert told.cost_saved(without=counts, needed=0.0).tolist() == [0.0, 13.5, 30.0, 36.0, 210.0]
+    assert told.cost_saved(without=0.0, needed=counts).tolist() == [0.0, -27.0, -60.0, -66.0, -240.0]
 
 
-def test_what_a_proxy_saves_in_cost_is_the_difference_of_what_the_samples_cost(tmp_path):
+def test_what_a_proxy_saves_in_cost_is_told_for_arrays_of_any_shape(tmp_path):
     told = read(tmp_path, target_lessons="learner", costs={"off_policy": 2, "on_policy": 5, "label": 1})
-    without, needed = np.array([0.0, 7.0, 500.0]), np.array([[0.0], [12.0]])
-    saved = told.target_cost(without, with_proxy=False) - told.target_cost(needed, with_proxy=True)
-    np.testing.assert_allclose(told.cost_saved(without=without, needed=needed), saved)
-    assert saved.shape == (2, 3)
+    saved = told.cost_saved(without=np.array([0.0, 7.0, 500.0]), needed=np.array([[0.0], [12.0]]))
+    assert saved.tolist() == [[0.0, 21.0, 2970.0], [-72.0, -51.0, 2898.0]]
     assert read(tmp_path).cost_saved(without=400.0, needed=100.0) == 300.0
 
 

@@ -1,6 +1,7 @@
 """Examinations go where they tell most about PLV, by a rule that only the known scores decide."""
 
 import numpy as np
+import pytest
 
 from proxytune.learning.curves import Curve
 from proxytune.learning.plv import sample_needs
@@ -67,6 +68,19 @@ def test_the_learner_without_a_proxy_alone_is_examined_for_how_many_samples_it_n
 
 def test_the_same_scores_choose_the_same_examinations():
     assert next_examinations(needs(), list(CURVES), SPENDING) == next_examinations(needs(), list(CURVES), SPENDING)
+
+
+@pytest.mark.parametrize("first", [1, 2, 7])
+def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first(first):
+    grid = (0, first, 8, 64, 512)
+    spending = Spending("none", grid, 4, 12)
+    scores = np.array([[np.nan, 1.0, 5.0, 30.0, 50.0], [np.nan, 3.0, 9.0, 35.0, 49.0]])
+    curves = {"none": Curve(grid, scores), "proxy": Curve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0))}
+    found = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, draws=300)
+    chosen = next_examinations(found, list(curves), spending)
+    assert len(set(chosen)) == len(chosen) == spending.batch
+    # The crossing lies between 8 and 512
+    assert np.mean([one.samples >= 8 for one in chosen]) > 0.5
 
 
 def test_where_every_repetition_of_every_count_is_done_fewer_or_none_are_left():

@@ -1,9 +1,12 @@
 """What the comparison of several families says and draws: no more than its intervals allow."""
 
+from dataclasses import replace
+
 import pytest
 from matplotlib.text import Text
 from several_tuned import compared, family, lesson
 
+from proxytune.learning.plv import Estimate
 from proxytune.report.families.figure import families_figure
 from proxytune.report.families.words import families_answer, families_next_step
 from proxytune.report.style import COLUMN
@@ -67,7 +70,7 @@ def test_without_fresh_episodes_nothing_is_claimed():
         ),
         (
             {"bullet": lesson(300.0), "planar": lesson(290.0, (10.0, -50.0, 30.0))},
-            "target samples saved; cannot be told from it: planar, 10 (-50 to 30) more samples.",
+            "target samples saved; cannot be told from it: planar, 10 (−50 to 30) more samples.",
         ),
         (
             {"bullet": lesson(5.0), "planar": Lesson({}, failure="no")},
@@ -98,6 +101,12 @@ def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
     assert figure.axes[1].get_xlim()[0] < -40.0
     figure.canvas.draw()
     assert all(text.get_fontsize() >= 6.0 for text in figure.findobj(Text) if text.get_text())
+
+
+def test_an_interval_of_which_one_end_is_not_known_is_drawn_to_the_other():
+    lessons = {"a": lesson(-20.0), "b": replace(lesson(-30.0), plv=Estimate(-30.0, None, 5.0))}
+    plv = families_figure(compared(family("a"), family("b"), lessons=lessons)).axes[1]
+    assert [-30.0, 5.0] in [list(line.get_xdata()) for line in plv.lines]
 
 
 def test_without_teaching_the_figure_has_no_panel_of_it_and_a_long_name_is_shortened():

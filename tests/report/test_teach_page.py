@@ -4,7 +4,9 @@ from dataclasses import replace
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
+import pytest
 
+from proxytune.learning.costs import Costs
 from proxytune.learning.curves import Curve
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Estimate as Worth
@@ -13,7 +15,7 @@ from proxytune.learning.published import Published
 from proxytune.report.page import foot_of, html_of
 from proxytune.report.teaching.figure import teach_figure
 from proxytune.report.teaching.page import teach_page
-from proxytune.report.teaching.words import sorted_by_worth, teach_answer, teach_next_step
+from proxytune.report.teaching.words import plv_answer, plv_next_step, sorted_by_worth, teach_answer, teach_next_step
 from proxytune.report.writing import save
 from proxytune.teaching.experiment import Experiment, TeacherResult
 
@@ -24,12 +26,14 @@ EVIL = "<script>alert(1)</script>"
 
 PREDICTS = SimpleNamespace(prpv=3.0, interval=(2.0, 5.0), resampled=None, chance=SimpleNamespace(explains=False))
 NOBODY = MappingProxyType({})
+COSTS = Costs()
 
 
 def lesson(name, plv):
     worth = Teaching(Worth(400, 200, 400), Worth(100, 50, 400), plv, NOTHING, NOTHING)
     scores = np.linspace(10.0, 50.0, 5) + np.arange(3)[:, None]
-    return TeacherResult(name, Distribution({}), Curve(COUNTS, scores), Worth(10.0, 8.0, 12.0), worth)
+    cost = Worth(*(None if end is None else 2.5 * end for end in (plv.value, plv.low, plv.high)))
+    return TeacherResult(name, Distribution({}), Curve(COUNTS, scores), Worth(10.0, 8.0, 12.0), worth, cost)
 
 
 LESSONS = (
@@ -37,22 +41,23 @@ LESSONS = (
     lesson("harmful", Worth(None, None, 0)),
     lesson("wide", Worth(300, -100, 400)),
     lesson("reaching", Worth(200, None, 400)),
+    lesson("far", Worth(None, 120, None)),
     lesson(EVIL, Worth(0, 0, 0)),
 )
 
 
-def experiment(lessons=LESSONS, settled=True, published=NOBODY, examinations=None):
+def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, costs=COSTS):
     without = Curve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
     curves = {"none": without, **{one.name: one.curve for one in lessons}}
     needs = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, level=50.0, draws=60)
-    teaching = SimpleNamespace(published=published, published_in="a paper", examinations=examinations)
+    teaching = SimpleNamespace(published=published, published_in="a paper", examinations=examinations, costs=costs)
     settings = SimpleNamespace(name=EVIL, teaching=teaching)
-    return Experiment(settings, 60.0, replace(needs, settled=settled), lessons)
+    return Experiment(settings, 60.0, replace(needs, gain=gain), lessons)
 
 
 def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so():
     saves, none, unknown = sorted_by_worth(LESSONS)
-    assert [one.name for one in saves] == ["sure"]
+    assert [one.name for one in saves] == ["sure", "far"]
     assert [one.name for one in none] == ["harmful", EVIL]
     assert [one.name for one in unknown] == ["wide", "reaching"]
 
@@ -84,8 +89,46 @@ def test_the_next_step_is_more_seeds_while_something_is_open():
 
 
 def test_without_convergence_plv_is_unknown_and_more_samples_are_next():
-    assert "is unknown: without a proxy 400 samples are too few" in teach_answer(experiment(settled=False))
-    assert "raise teaching.target_samples" in teach_next_step(experiment(settled=False))
+    rising = experiment(gain=5.1)
+    assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
+    assert teach_next_step(rising).startswith("raise teaching.target_samples: ")
+
+
+def test_a_grid_that_shows_no_rise_at_its_end_is_not_said_to_rise():
+    coarse = experiment(gain=None)
+    assert "is unknown: teaching.target_samples has no number from 1 to half of 400" in teach_answer(coarse)
+    assert "add numbers between 0 and 400" in teach_next_step(coarse)
+
+
+def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
+    stated = experiment(costs=Costs(2.5, 2.5, 0.0), published={"sure": Published(47.4, 250, 0.97)})
+    table, plain = (teach_page(one, {}, b"a picture", foot_of("teach")).parts[0] for one in (stated, experiment()))
+    assert table.columns == (*plain.columns, "PLV in cost")
+    costs = {row[0]: row[-1] for row in table.rows}
+    assert costs["none"] == ""
+    assert costs["sure"] == "750 (250 to 875)"
+    assert costs["far"] == "unknown (300 or more)"
+    assert any("off_policy 2.5, on_policy 2.5, label 0" in note for note in table.notes)
+
+
+@pytest.mark.parametrize(
+    ("plv", "judged", "step"),
+    [
+        (Worth(84, 33, 180), "it saves target samples.", "train in proxy: nominal θ, then on target samples."),
+        (Worth(-84, -180, -33), "it saves none.", "train without a proxy, or raise teaching.budget"),
+        (Worth(10, -20, 30), "that it saves any is not shown: the interval holds 0.", "raise teaching.seeds"),
+    ],
+)
+def test_a_search_by_plv_says_of_its_best_finalist_what_the_interval_allows(plv, judged, step):
+    study = SimpleNamespace(trials=range(3), confirmed=experiment((lesson("proxy", plv),)))
+    assert plv_answer(study).endswith(f"target samples saved; {judged}")
+    assert plv_next_step(study).startswith(step)
+
+
+def test_where_the_finalists_cannot_be_judged_the_next_step_says_why():
+    study = SimpleNamespace(trials=range(3), confirmed=experiment((lesson("proxy", NOTHING),), gain=6.0))
+    assert "no finalist is known to save" in plv_answer(study)
+    assert plv_next_step(study).startswith("raise teaching.target_samples: without a proxy the score still rises")
 
 
 def test_where_examinations_are_chosen_more_of_them_are_next():

@@ -1,14 +1,17 @@
 """The learning experiment finds which proxy teaches, goes on where it was left, and says what cannot be used."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from taught import GRID, make_taught
 from telling import Telling
 
 from proxytune.errors import EpisodeError, InputError, LearnerError, SettingsError
+from proxytune.learning.costs import Costs
 from proxytune.running.progress import Silent
 from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import load_setup, run_experiment
+from proxytune.teaching.experiment import judge_curves, load_setup, run_experiment
 
 
 def run(folder):
@@ -87,6 +90,26 @@ def test_a_target_budget_too_small_to_converge_is_no_plv(make_study):
     found = run(make_taught(make_study, grid=[0, 3, 6]))
     assert not found.settled
     assert all(lesson.worth is None for lesson in found.teachers)
+
+
+def test_plv_in_cost_is_plv_times_the_cost_where_every_sample_costs_the_same(make_study):
+    costs = "[teaching.costs]\noff_policy = 2.0\non_policy = 2.0"
+    for one in run(make_taught(make_study, more=costs)).teachers:
+        doubled = [2.0 * end for end in (one.worth.plv.value, one.worth.plv.low, one.worth.plv.high)]
+        assert [one.cost.value, one.cost.low, one.cost.high] == pytest.approx(doubled)
+
+
+def test_where_the_learner_drives_its_first_samples_without_a_proxy_cost_what_the_experts_do(make_study):
+    settings = read_study_settings(make_taught(make_study))
+    setup = load_setup(settings)
+    curves = run_experiment(settings, setup, Silent()).needs.curves
+    own = replace(setup.settings, target_lessons="learner", costs=Costs(off_policy=10.0, on_policy=1.0))
+    for one in judge_curves(settings, replace(setup, settings=own), curves).teachers:
+        assert one.cost.value == pytest.approx(one.worth.plv.value + 9.0 * GRID[1])
+
+
+def test_where_plv_is_unknown_so_is_its_cost(make_study):
+    assert all(one.cost is None for one in run(make_taught(make_study, grid=[0, 3, 6])).teachers)
 
 
 def test_an_expert_that_cannot_drive_is_told_with_the_proxys_name(make_study):

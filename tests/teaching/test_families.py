@@ -2,12 +2,12 @@
 
 from contextlib import nullcontext
 
-import numpy as np
 import pytest
 from several import make_several
 from taught import TEACHING
 
 from proxytune.errors import LearnerError, SettingsError
+from proxytune.learning.plv import difference
 from proxytune.running.progress import Silent
 from proxytune.study.settings import read_study_settings
 from proxytune.teaching.experiment import load_setup, run_experiment
@@ -49,11 +49,11 @@ def test_a_family_is_worth_what_teach_says_of_its_best_theta(taught):
         assert teacher.worth is not None
         assert lessons[teacher.name].plv == teacher.worth.plv
         assert lessons[teacher.name].needed == teacher.worth.needed
-        assert lessons[teacher.name].zero_shot == np.mean(teacher.curve.scores[:, 0])
+        assert lessons[teacher.name].zero_shot == teacher.zero_shot.value
     right, far = lessons["right"], lessons["far"]
     assert (right.theta, right.more) == (RIGHT, None)
     assert right.plv.value > far.plv.value
-    assert far.more.value == right.plv.value - far.plv.value
+    assert far.more == difference(experiment.needs, more="far", less="right")
 
 
 def test_the_learner_without_a_proxy_is_examined_once_for_all_and_nothing_is_made_again(taught, tmp_path):

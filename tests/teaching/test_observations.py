@@ -26,11 +26,11 @@ def curve(means):
     return Curve(GRID, np.array(means) + 0.5 * np.random.default_rng(1).normal(size=(5, len(GRID))))
 
 
-def experiment(settled=True):
+def experiment(settled=True, names=()):
     needs = sample_needs(
         {name: curve(means) for name, means in MEANS.items()}, none="none", best_score=60.0, tolerance=5.0
     )
-    needs = replace(needs, settled=settled)
+    needs = replace(needs, gain=0.0 if settled else 5.1)
     teachers = [
         TeacherResult(
             name,
@@ -38,8 +38,9 @@ def experiment(settled=True):
             needs.curves[name],
             mean_score(needs, name, 0),
             teaching(needs, none="none", proxy=name),
+            None,
         )
-        for name in list(MEANS)[1:]
+        for name in names or list(MEANS)[1:]
     ]
     return Experiment(SimpleNamespace(), 60.0, needs, tuple(teachers))
 
@@ -75,6 +76,15 @@ def test_a_proxy_that_saves_though_chance_predicts_as_well_shows_that_a_bad_pred
 def test_where_no_proxy_shows_it_that_is_said():
     found = observe(experiment(), predicting(GOOD))
     assert "none of these proxies shows it" in observation_lines(found, experiment())[1]
+
+
+def test_a_single_proxy_is_not_ranked_but_may_teach_though_it_predicts_badly():
+    alone = experiment(names=["slow starter"])
+    found = observe(alone, predicting(GOOD, poor=("slow starter",)))
+    assert (found.zero_shot, found.prpv, found.poor_predictors) == (None, None, ("slow starter",))
+    (only,) = observation_lines(found, alone)
+    assert only.startswith("A proxy that predicts badly can still teach")
+    assert "shown here, since slow starter saves samples" in only
 
 
 def test_where_plv_is_unknown_nothing_is_observed():

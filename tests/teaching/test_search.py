@@ -1,6 +1,7 @@
 """A study of learning value looks where asked, finds the proxy that teaches, and goes on where it was left."""
 
 import re
+from typing import ClassVar
 
 import pytest
 from taught import make_taught
@@ -17,12 +18,13 @@ from proxytune.teaching.search import OBJECTIVE, PlvSearch
 BOX = {"trim": "[-0.3, 0.3]"}
 
 
-def run(folder, left=None):
+def run(folder, left=None, watcher=None):
     settings = read_study_settings(folder)
     setup = load_setup(settings)
     space = search_space(settings, setup.settings.widths, left or {})
     with Store.open(folder) as store:
-        return PlvSearch(settings, setup, store, space, Silent()).run(make_proposer("gp", settings.initial))
+        search = PlvSearch(settings, setup, store, space, watcher or Silent())
+        return search.run(make_proposer("gp", settings.initial))
 
 
 @pytest.mark.slow
@@ -32,6 +34,20 @@ def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(
     assert found.best.worth.plv.value == max(trial.worth.plv.value for trial in found.trials)
     assert found.best.worth.plv.value > min(trial.worth.plv.value for trial in found.trials)
     assert abs(found.best.theta["trim"] - 0.12) < 0.15
+
+
+def test_what_a_run_that_goes_on_has_done_before_is_known_at_once(make_study):
+    class Known(Silent):
+        known: ClassVar = []
+
+        def begin(self, what, known):
+            self.known.append(known)
+
+    folder = make_taught(make_study, parameters=BOX, more="budget = 2", initial="2", grid=[0, 40, 80, 160, 320])
+    run(folder)
+    run(folder, watcher=Known())
+    # After those of the learner without a proxy: both trials, each of three repetitions at five counts
+    assert Known.known[:3] == [3 * 5, 0, 2 * 3 * 5]
 
 
 @pytest.mark.slow
@@ -141,5 +157,10 @@ def test_a_width_without_its_parameter_is_one_line(make_study):
 
 
 def test_where_the_target_alone_is_not_learnt_there_is_no_plv_to_search_for(make_study):
-    with pytest.raises(RunError, match=r"has not|PLV is not known; raise teaching\.target_samples"):
+    with pytest.raises(RunError, match=r"still rises by more than 6 .* PLV is not known; raise teaching\.target"):
         run(make_taught(make_study, parameters=BOX, grid=[0, 3, 6]))
+
+
+def test_a_level_that_is_not_reached_without_a_proxy_is_told_before_any_proxy_is_tried(make_study):
+    with pytest.raises(RunError, match=r"does not come to 64 within 640 samples, .* lower teaching\.level"):
+        run(make_taught(make_study, parameters=BOX, more="level = 70.0"))

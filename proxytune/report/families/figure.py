@@ -71,8 +71,8 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
             continue
         middle, low, high = value
         marker, edge, face = LOOKS[_standing(panel, name)]
-        if low is not None and high is not None:
-            axes.plot([low, high], [place, place], color=edge, linewidth=1.2)
+        ends = [middle if end is None else end for end in (low, high)]
+        axes.plot(ends, [place, place], color=edge, linewidth=1.2)
         axes.plot([middle], [place], marker, color=edge, markerfacecolor=face, markersize=4.5)
     axes.set_xlabel(panel.title, fontsize=8)
     dress(axes)

@@ -14,9 +14,10 @@ from proxytune.report.study.page import study_command, study_settings
 from proxytune.study.families.compared import ComparedFamilies
 
 CAPTION = (
-    "A row per family, each at the best θ that was found in the same time; lines are 95 % intervals. Filled circles "
-    "are best, open ones cannot be told from them, squares are worse. Differences are judged episode by episode (PRPV, "
-    "time) or seed by seed (PLV), so that they can be told though the lines overlap."
+    "A row per family, each at the best θ that was found in the same time; lines are 95 % intervals, without an end "
+    "that is not known. Filled circles are best, open ones cannot be told from them, squares are worse. Differences "
+    "are judged episode by episode (PRPV, time) or draw by draw of the learning curves (PLV), so that they can be told "
+    "though the lines overlap."
 )
 
 

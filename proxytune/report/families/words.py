@@ -97,7 +97,8 @@ def _say_teaching(compared: ComparedFamilies) -> str:
         why = "nothing was taught yet" if not lessons else "learners have not converged; raise teaching.target_samples"
         return f"PLV (proxy learning value) is not known, {why}"
     worth = f"PLV (proxy learning value) {_plv(lessons[choice.best].plv)} target samples saved"
-    if not _saves(lessons[choice.best].plv):
+    highest = lessons[choice.best].plv
+    if highest is None or not highest.above_zero:
         return f"none is shown to save target samples; highest is {choice.best}, {worth}"
     others = [name for name in lessons if name not in (choice.best, *choice.alike)]
     alike = [f"{name}, {more_text(lessons[name])} more samples" for name in choice.alike]
@@ -114,10 +115,6 @@ def _behind(lesson: Lesson) -> str:
 
 def _plv(plv: Estimate | None) -> str:
     return UNKNOWN if plv is None else count(plv, UNKNOWN)
-
-
-def _saves(plv: Estimate | None) -> bool:
-    return plv is not None and plv.low is not None and plv.low > 0.0
 
 
 def _say_cost(compared: ComparedFamilies) -> str:

@@ -56,6 +56,7 @@ def _lesson(lesson: TeacherResult, prpv: Predictivity | None) -> dict[str, Any]:
         "zero_shot": lesson.zero_shot.value,
         "zero_shot_interval": [lesson.zero_shot.low, lesson.zero_shot.high],
         **{name: estimate(getattr(worth, name) if worth else None) for name in figures},
+        "plv_cost": estimate(lesson.cost),
         **_curve(lesson.curve),
     }
 
@@ -78,10 +79,12 @@ def _curve(curve: Curve) -> dict[str, Any]:
 def _settings(experiment: Experiment) -> dict[str, Any]:
     taught = teaching_settings(experiment.settings)
     names = ("learner", "proxy_samples", "seeds", "lesson_s", "level", "tolerance", "examinations")
+    lessons = ("rehearsal", "proxy_lessons", "target_lessons")
     return {
         "target": str(taught.target),
         "target_samples": list(taught.target_samples),
-        **{name: getattr(taught, name) for name in names},
+        **{name: getattr(taught, name) for name in (*names, *lessons)},
+        "costs": asdict(taught.costs),
         "published": {name: asdict(row) for name, row in taught.published.items()},
         "published_in": taught.published_in,
     }

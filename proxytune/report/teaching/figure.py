@@ -9,13 +9,12 @@ from matplotlib.figure import Figure
 
 from proxytune.learning.curve_model import places
 from proxytune.learning.curves import Array
-from proxytune.learning.plv import Estimate
+from proxytune.learning.plv import LEVELS, Estimate
 from proxytune.learning.settings import NONE
 from proxytune.report.style import BLUE, COLUMN, GREY, dress, legend_below
 from proxytune.teaching.experiment import Experiment, TeacherResult, teaching_settings
 
 COLUMNS = 2
-LEVELS = (0.025, 0.975)
 
 
 class _Look(NamedTuple):

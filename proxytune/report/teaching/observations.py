@@ -12,12 +12,12 @@ SECOND = "A proxy that predicts badly can still teach (the paper's second observ
 
 
 def observation_lines(found: Observations | None, experiment: Experiment) -> tuple[str, ...]:
-    """Both observations, each with its evidence; none where PLV is unknown."""
+    """Both observations, each with its evidence; none where PLV is unknown, and the first of several proxies only."""
     if found is None:
         return ()
     starts = {one.name: f"{one.zero_shot.value:.1f}" for one in experiment.teachers if one.zero_shot.value is not None}
-    lines = [f"{FIRST}: {_first(found.zero_shot, starts)}.", f"{SECOND}: {_second(found)}."]
-    return tuple(lines)
+    first = [f"{FIRST}: {_first(found.zero_shot, starts)}."] if found.zero_shot else []
+    return (*first, f"{SECOND}: {_second(found)}.")
 
 
 def _first(found: Agreement, starts: Mapping[str, str]) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from proxytune.report.page import Foot, Page, Picture, Table, Words, terminal_tables
 from proxytune.report.teaching.observations import observation_lines
 from proxytune.report.teaching.plv_document import CONFIRMED, plv_table
-from proxytune.report.teaching.table import COLUMNS, PLV_MEANING, convergence_lines, table_rows
+from proxytune.report.teaching.table import COLUMNS, PLV_MEANING, columns_of, convergence_lines, meanings, table_rows
 from proxytune.report.teaching.words import plv_answer, plv_next_step, teach_answer, teach_next_step
 from proxytune.teaching.experiment import Experiment
 from proxytune.teaching.observations import observe
@@ -37,12 +37,12 @@ TRIALS = (
 
 def teach_page(experiment: Experiment, prpv: Mapping[str, Predictivity | None], figure: bytes, foot: Foot) -> Page:
     """A learning experiment as a page: the paper's table 1 and the curves."""
-    lines = (PLV_MEANING, *convergence_lines(experiment))
+    lines = (*meanings(experiment), *convergence_lines(experiment))
     observations = observation_lines(observe(experiment, prpv), experiment)
     said = [Words("The paper's two observations", observations)] if observations else []
     rows = tuple(table_rows(experiment, prpv))
     picture = Picture("What each proxy saves, curve by curve", figure, CURVES)
-    table = Table("PLV of each proxy (the paper's table 1)", COLUMNS, rows, lines)
+    table = Table("PLV of each proxy (the paper's table 1)", columns_of(experiment), rows, lines)
     name = f"{experiment.settings.name}: proxies as teachers"
     parts: tuple[Table | Picture | Words, ...] = (table, *said, *_published(experiment, rows), picture)
     return Page(name, teach_answer(experiment), teach_next_step(experiment), parts, foot)
@@ -56,7 +56,7 @@ def _published(experiment: Experiment, rows: Sequence[tuple[str, ...]]) -> tuple
     here = {row[0]: row for row in rows}
     cells = []
     for name, theirs in taught.published.items():
-        _, _, zero_shot, needed, _, reduction = here[name]
+        _, _, zero_shot, needed, _, reduction = here[name][: len(COLUMNS)]
         published = (f"{theirs.zero_shot:g}", f"{theirs.samples}", f"{theirs.reduction:.0%}")
         cells.append((name, published[0], zero_shot, published[1], needed, published[2], reduction))
     return (Table("Beside what was published", PUBLISHED, tuple(cells), tuple(filter(None, [taught.published_in]))),)

@@ -56,6 +56,7 @@ def _confirmed(experiment: Experiment) -> dict[str, Any]:
                 "theta": theta_of(one.proxy),
                 "zero_shot": one.zero_shot.value,
                 "plv": estimate(one.worth.plv if one.worth else None),
+                "plv_cost": estimate(one.cost),
                 "needed": estimate(one.worth.needed if one.worth else None),
                 "best_saves_more": estimate(saves_more(experiment, best.name, one.name)) if best else None,
             }

@@ -1,24 +1,31 @@
 """A learning experiment for people: the paper's table 1."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import astuple
 from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from proxytune.learning.costs import Costs
 from proxytune.learning.plv import Estimate
 from proxytune.learning.settings import NONE
-from proxytune.report.numbers import fixed, span
+from proxytune.report.numbers import fixed, short, span
 from proxytune.report.teaching.observations import observation_lines
-from proxytune.teaching.experiment import Experiment, TeacherResult
+from proxytune.teaching.convergence import why_unknown
+from proxytune.teaching.experiment import Experiment, TeacherResult, teaching_settings
 from proxytune.teaching.observations import observe
 from proxytune.teaching.predictivity import Predictivity
 
 COLUMNS = ("proxy", "PRPV", "zero-shot score", "samples needed", "PLV", "reduction")
+COST = "PLV in cost"
 NOT_REACHED, UNKNOWN = "not converged", "unknown"
 CONVERGED = "converged: the mean score is at least {} and stays so"
 PLV_MEANING = "PLV (proxy learning value): target samples saved by learning in the proxy first"
+COST_MEANING = (
+    "PLV in cost: what these cost, in the unit of [teaching.costs]: off_policy {:g}, on_policy {:g}, label {:g}"
+)
 
 
 def teach_table(
@@ -26,21 +33,43 @@ def teach_table(
 ) -> RenderableType:
     """The result of a learning experiment as `teach` shows it."""
     table = Table(box=None, pad_edge=False)
-    for name in COLUMNS:
+    for name in columns_of(experiment):
         table.add_column(name, justify="left" if name == "proxy" else "right", overflow="fold")
     for row in table_rows(experiment, prpv):
         table.add_row(*row)
     observations = observation_lines(observe(experiment, prpv), experiment)
-    lines = [PLV_MEANING, *convergence_lines(experiment), *observations]
+    lines = [*meanings(experiment), *convergence_lines(experiment), *observations]
     lines += [f"{what}: {path}" for what, path in files.items()]
     return Group(table, *(Text(line) for line in lines))
+
+
+def columns_of(experiment: Experiment) -> tuple[str, ...]:
+    """The heads of table 1; PLV in cost is told where costs are stated."""
+    return (*COLUMNS, COST) if _costs(experiment) else COLUMNS
+
+
+def meanings(experiment: Experiment) -> list[str]:
+    """What PLV is, and PLV in cost where that is told."""
+    costs = _costs(experiment)
+    return [PLV_MEANING, *([COST_MEANING.format(*astuple(costs))] if costs else [])]
+
+
+def _costs(experiment: Experiment) -> Costs | None:
+    """What target samples cost, None where that is one each, as in PLV."""
+    costs = teaching_settings(experiment.settings).costs
+    return None if costs == Costs() else costs
 
 
 def table_rows(experiment: Experiment, prpv: Mapping[str, Predictivity | None]) -> list[tuple[str, ...]]:
     """The rows of table 1 as texts: the learner without a proxy, then one per proxy."""
     worth = next((lesson.worth for lesson in experiment.teachers if lesson.worth), None)
-    alone = (NONE, "", "", count(worth.without) if worth else NOT_REACHED, "", "")
-    return [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in experiment.teachers)]
+    unseen = UNKNOWN if experiment.needs.gain is None else NOT_REACHED
+    alone = (NONE, "", "", count(worth.without) if worth else unseen, "", "")
+    rows = [alone, *(_row(lesson, prpv.get(lesson.name)) for lesson in experiment.teachers)]
+    if not _costs(experiment):
+        return rows
+    saved = ("", *(_cost(lesson.cost) for lesson in experiment.teachers))
+    return [(*row, cost) for row, cost in zip(rows, saved, strict=True)]
 
 
 def _row(lesson: TeacherResult, prpv: Predictivity | None) -> tuple[str, ...]:
@@ -53,15 +82,10 @@ def _row(lesson: TeacherResult, prpv: Predictivity | None) -> tuple[str, ...]:
 
 def convergence_lines(experiment: Experiment) -> list[str]:
     """What counts as converged, and whether the learner without a proxy has."""
-    when, last = experiment.when, experiment.without.counts[-1]
-    converged = CONVERGED.format(f"{when.threshold:.1f} of {experiment.best_score:g}")
-    if experiment.settled:
-        return [converged, *(line for lesson in experiment.teachers for line in _say_factor(lesson))]
-    return [
-        converged,
-        f"without a proxy the score still rises by more than {when.tolerance:g} up to {last} target samples: it has "
-        "not converged and PLV is unknown; raise teaching.target_samples",
-    ]
+    converged = CONVERGED.format(f"{experiment.when.threshold:.1f} of {experiment.best_score:g}")
+    unknown = why_unknown(experiment.needs)
+    said = [f"{unknown.reason}, so PLV is not known; {unknown.remedy}"] if unknown else []
+    return [converged, *said, *(line for lesson in experiment.teachers for line in _say_factor(lesson))]
 
 
 def _say_factor(lesson: TeacherResult) -> list[str]:
@@ -77,8 +101,16 @@ def _say_factor(lesson: TeacherResult) -> list[str]:
 
 def count(figure: Estimate, missing: str = NOT_REACHED) -> str:
     """A number of samples with its interval; without a number, why it is missing."""
-    value = missing if figure.value is None else _samples(figure.value)
-    ends = _ends(figure)
+    return _with_ends(figure, missing, _samples)
+
+
+def _cost(figure: Estimate | None) -> str:
+    """What is saved in cost with its interval, empty where the learner without a proxy has not converged."""
+    return "" if figure is None else _with_ends(figure, UNKNOWN, short)
+
+
+def _with_ends(figure: Estimate, missing: str, write: Callable[[float], str]) -> str:
+    value, ends = missing if figure.value is None else write(figure.value), _ends(figure, write)
     return f"{value} ({ends})" if ends else value
 
 
@@ -87,12 +119,12 @@ def one_decimal(figure: Estimate) -> str:
     return "" if figure.value is None else f"{figure.value:.1f}"
 
 
-def _ends(figure: Estimate) -> str:
-    """The interval of a number of samples; an end that lies beyond the grid is left open."""
+def _ends(figure: Estimate, write: Callable[[float], str]) -> str:
+    """An interval; an end that the grid does not tell is left open."""
     if figure.low is None:
-        return "" if figure.high is None else f"at most {_samples(figure.high)}"
-    low = _samples(figure.low)
-    return f"{low} or more" if figure.high is None else f"{low} to {_samples(figure.high)}"
+        return "" if figure.high is None else f"at most {write(figure.high)}"
+    low = write(figure.low)
+    return f"{low} or more" if figure.high is None else f"{low} to {write(figure.high)}"
 
 
 def _samples(value: float) -> str:

@@ -6,36 +6,34 @@ from proxytune.learning.lessons import describe
 from proxytune.learning.plv import Estimate
 from proxytune.report.numbers import listed
 from proxytune.report.teaching.table import UNKNOWN, count
+from proxytune.teaching.convergence import why_unknown
 from proxytune.teaching.experiment import Experiment, TeacherResult
 from proxytune.teaching.finalists import best_teacher, saves_more
 from proxytune.teaching.search import PlvStudy
 
+MORE_PROXIES = "raise teaching.budget, or widen [parameters], so that other proxies are tried"
 SEARCH = '`study` with objective = "plv" looks for'
 
 
 def teach_answer(experiment: Experiment) -> str:
     """Which proxies save target samples, which save none, and of which that is open."""
-    if not experiment.settled:
-        last = experiment.without.counts[-1]
-        return f"PLV (proxy learning value) is unknown: without a proxy {last} samples are too few to converge."
-    saves, none, unknown = sorted_by_worth(experiment.teachers)
+    unknown = why_unknown(experiment.needs)
+    if unknown and not experiment.settled:
+        return f"PLV (proxy learning value) is unknown: {unknown.reason}."
+    saves, none, both = sorted_by_worth(experiment.teachers)
     sentences = [
         f"Target samples saved (PLV, proxy learning value, with 95 % interval): {_said(saves) or 'none is shown'}.",
         f"None saved: {_said(none)}." if none else "",
-        f"Open, since the interval reaches to both sides of 0: {_said(unknown)}." if unknown else "",
+        f"Open, since the interval reaches to both sides of 0: {_said(both)}." if both else "",
     ]
     return " ".join(filter(None, sentences))
 
 
 def sorted_by_worth(teachers: Sequence[TeacherResult]) -> tuple[list[TeacherResult], ...]:
     """The proxies whose whole interval of PLV lies above 0, those of which none of it does, and the others."""
-    saves = [one for one in teachers if one.worth and _above(one.worth.plv)]
-    none = [one for one in teachers if one.worth and one.worth.plv.high is not None and one.worth.plv.high <= 0.0]
+    saves = [one for one in teachers if one.worth and one.worth.plv.above_zero]
+    none = [one for one in teachers if one.worth and one.worth.plv.at_most_zero]
     return saves, none, [one for one in teachers if one not in (*saves, *none)]
-
-
-def _above(plv: Estimate) -> bool:
-    return plv.value is not None and plv.low is not None and plv.low > 0.0
 
 
 def _said(lessons: Sequence[TeacherResult]) -> str:
@@ -44,12 +42,12 @@ def _said(lessons: Sequence[TeacherResult]) -> str:
 
 def teach_next_step(experiment: Experiment) -> str:
     """The step that brings most."""
-    if not experiment.settled:
-        return "raise teaching.target_samples until the learner without a proxy converges."
-    saves, _, unknown = sorted_by_worth(experiment.teachers)
-    if unknown:
+    if unknown := why_unknown(experiment.needs):
+        return f"{unknown.remedy}: {unknown.reason}."
+    saves, _, both = sorted_by_worth(experiment.teachers)
+    if both:
         more = f"{_more_of_it(experiment)}, which narrows the intervals"
-        return f"{more}: {listed([one.name for one in unknown])} cannot be judged yet."
+        return f"{more}: {listed([one.name for one in both])} cannot be judged yet."
     if saves:
         return f"train in a proxy that saves samples, then on target samples; {SEARCH} a better one."
     return f"train without these proxies; {SEARCH} one that saves samples."
@@ -69,24 +67,33 @@ def plv_answer(study: PlvStudy) -> str:
     experiment, best = study.confirmed, best_teacher(study.confirmed)
     if best is None or best.worth is None:
         return f"Of {len(study.trials)} proxies tried, no finalist is known to save target samples."
-    worth = (
-        "it saves target samples" if _above(best.worth.plv) else "that it saves any is not shown: the interval holds 0"
-    )
     others = [one.name for one in experiment.teachers if one is not best]
-    behind = [name for name in others if _above(saves_more(experiment, best.name, name))]
+    behind = [name for name in others if saves_more(experiment, best.name, name).above_zero]
     alike = [name for name in others if name not in behind]
     sentences = [
         f"After {len(study.trials)} proxies tried, {best.name} ({describe(best.proxy)}) has the highest PLV (proxy "
-        f"learning value): {count(best.worth.plv, UNKNOWN)} target samples saved; {worth}.",
+        f"learning value): {count(best.worth.plv, UNKNOWN)} target samples saved; {_judged(best.worth.plv)}.",
         f"It saves more than {listed(behind)}." if behind else "",
         f"That it saves more than {listed(alike)} is not shown." if alike else "",
     ]
     return " ".join(filter(None, sentences))
 
 
+def _judged(plv: Estimate) -> str:
+    """Whether a proxy is shown to save any target samples."""
+    if plv.above_zero:
+        return "it saves target samples"
+    return "it saves none" if plv.at_most_zero else "that it saves any is not shown: the interval holds 0"
+
+
 def plv_next_step(study: PlvStudy) -> str:
     """The step that brings most."""
     best = best_teacher(study.confirmed)
-    if best is not None and best.worth is not None and _above(best.worth.plv):
+    if best is None or best.worth is None:
+        unknown = why_unknown(study.confirmed.needs)
+        return f"{unknown.remedy}: {unknown.reason}." if unknown else f"{MORE_PROXIES}."
+    if best.worth.plv.at_most_zero:
+        return f"train without a proxy, or {MORE_PROXIES}."
+    if best.worth.plv.above_zero:
         return f"train in {best.name}: {describe(best.proxy)}, then on target samples."
     return f"{_more_of_it(study.confirmed)}, which narrows the intervals, or teaching.budget, which tries more proxies."

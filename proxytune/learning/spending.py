@@ -117,7 +117,7 @@ def _cells(needs: SampleNeeds, names: Collection[str], spending: Spending) -> _C
     open_ = {
         counts[place]: place
         # Of places of one count the last one: before the first count a learner without a proxy is not drawn
-        for place in range(0, len(counts), APART)
+        for place in (*range(0, len(counts) - 1, APART), len(counts) - 1)
         if not place or counts[place] >= spending.counts[1]
     }
     cells = [

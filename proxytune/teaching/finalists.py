@@ -5,10 +5,11 @@ examinations that the search has not used.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from proxytune.errors import LearnerError
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Estimate, difference
 from proxytune.learning.settings import NONE
@@ -22,12 +23,25 @@ from proxytune.study.settings import StudySettings
 from proxytune.teaching.box import WIDTH, distribution
 from proxytune.teaching.examining import curves_of, examine_curves
 from proxytune.teaching.experiment import Experiment, TeacherResult, judge_curves
-from proxytune.teaching.points import TeachingSetup
+from proxytune.teaching.points import Point, TeachingSetup
 
 BEST, SINGLE, BOX, BY_PRPV = "best p(θ)", "best single θ", "all of the box", "lowest PRPV"
 CLOUD = 4096
 CLOSER = 2
 """A finalist gets so many times the examinations of a trial, where these are chosen."""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What the finalists are worth under fresh seeds.
+
+    Attributes:
+        experiment: Those that can teach, and the learner without a proxy.
+        unable: Why each of the others cannot, by name.
+    """
+
+    experiment: Experiment
+    unable: Mapping[str, str]
 
 
 def finalists(
@@ -59,14 +73,25 @@ def finalists(
 
 def confirm(
     settings: StudySettings, setup: TeachingSetup, named: Mapping[str, Distribution], watcher: Watcher
-) -> Experiment:
+) -> Confirmation:
     """Teach the finalists and the learner without a proxy under fresh seeds."""
-    taught = replace(setup.settings, proxies=named)
-    if taught.examinations is not None:
-        taught = replace(taught, examinations=CLOSER * taught.examinations)
+    examinations = setup.settings.examinations
+    taught = replace(setup.settings, examinations=examinations and CLOSER * examinations)
     fresh = replace(setup, seed=fresh_seed(setup.seed, 1), settings=taught)
-    scores = examine_curves(fresh, {NONE: None, **named}, settings.jobs, watcher)
-    return judge_curves(settings, fresh, curves_of(fresh.settings, scores))
+    unable = {name: reason for name, proxy in named.items() if (reason := _why_unable(fresh, name, proxy))}
+    able = {name: proxy for name, proxy in named.items() if name not in unable}
+    fresh = replace(fresh, settings=replace(taught, proxies=able))
+    scores = examine_curves(fresh, {NONE: None, **able}, settings.jobs, watcher)
+    return Confirmation(judge_curves(settings, fresh, curves_of(fresh.settings, scores)), unable)
+
+
+def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:
+    """Why a proxy cannot teach, empty if it can: nobody has driven in it before, and its expert may leave the road."""
+    try:
+        setup.prepare(Point(name, proxy, 0, 0))
+    except LearnerError as problem:
+        return str(problem)
+    return ""
 
 
 def best_teacher(experiment: Experiment) -> TeacherResult | None:

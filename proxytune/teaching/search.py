@@ -7,7 +7,7 @@ A proposal is a pure function of seed and finished trials, trials are kept in st
 import json
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from proxytune.errors import RunError
@@ -68,6 +68,7 @@ class PlvStudy:
         trials: Every proxy tried, in order.
         stopped: Why no further one was.
         confirmed: The finalists, taught anew under seeds that the search has not used.
+        unable: Why finalists cannot teach, by name of those.
     """
 
     settings: StudySettings
@@ -77,6 +78,7 @@ class PlvStudy:
     trials: tuple[PlvTrial, ...]
     stopped: str
     confirmed: Experiment
+    unable: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def narrowed(self) -> bool:
@@ -134,9 +136,11 @@ class PlvSearch:
         self.watcher.begin("learning", count_examinations(taught, tried.done))
         Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
         named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
-        confirmed = confirm(settings, self.setup, named, self.watcher)
-        without = needs.curves[NONE]
-        return PlvStudy(settings, self.space, without, needs.when, tuple(tried.tried()), tried.ended(), confirmed)
+        last = confirm(settings, self.setup, named, self.watcher)
+        trials, ended = tuple(tried.tried()), tried.ended()
+        return PlvStudy(
+            settings, self.space, needs.curves[NONE], needs.when, trials, ended, last.experiment, last.unable
+        )
 
     def facts(self) -> dict[str, Any]:
         """All that a trial depends on; if it changes, trials lose their meaning."""

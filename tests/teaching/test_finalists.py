@@ -1,5 +1,7 @@
 """The finalists of a search by PLV are the best by all trials together, none twice, and are taught afresh."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from taught import make_taught
@@ -69,8 +71,20 @@ def test_finalists_are_taught_with_lessons_and_examinations_that_the_search_has_
     }
     examine_curves(setup, {NONE: None, **named}, 1, Silent())
     before = set(journal.read_text().splitlines())
-    found = confirm(settings, setup, named, Silent())
+    found = confirm(settings, setup, named, Silent()).experiment
     after = journal.read_text().splitlines()[len(before) :]
     assert not before & {line for line in after if line.startswith("exam")} - before
     assert best_teacher(found).name == "right"
     assert saves_more(found, "right", "wrong").low > 0.0
+
+
+def test_a_finalist_whose_expert_cannot_drive_is_left_out_with_the_reason(make_study):
+    folder = make_taught(make_study, **BOX_KEYS)
+    settings = read_study_settings(folder)
+    setup = load_setup(settings)
+    other = load_setup(read_study_settings(make_taught(make_study, called="blocked", domain={"blocked": "0.9"})))
+    found = confirm(
+        settings, replace(setup, proxy=other.proxy), {"right": Distribution({"trim": (0.12, 0.12)})}, Silent()
+    )
+    assert found.experiment.teachers == ()
+    assert found.unable["right"].startswith("right: the expert cannot drive here")

@@ -1,11 +1,10 @@
 """What `study --json` prints of several families; its keys are promises."""
 
-from dataclasses import asdict
 from typing import Any
 
-from proxytune.learning.plv import Estimate
 from proxytune.report.families.words import families_sentence
 from proxytune.report.study.knowledge_document import intervals_document
+from proxytune.report.teaching.document import estimate
 from proxytune.study.families.compared import Choice, ComparedFamilies, Lesson, TunedFamily
 from proxytune.study.settings import as_document
 
@@ -75,15 +74,11 @@ def _lesson(lesson: Lesson | None) -> dict[str, Any]:
     return {
         "plv": lesson.plv.value if lesson.plv else None,
         "plv_interval": [lesson.plv.low, lesson.plv.high] if lesson.plv else None,
-        "needed": _estimate(lesson.needed),
-        "more": _estimate(lesson.more),
+        "needed": estimate(lesson.needed),
+        "more": estimate(lesson.more),
         "zero_shot": lesson.zero_shot,
         "cannot_teach": lesson.failure or None,
     }
-
-
-def _estimate(figure: Estimate | None) -> dict[str, Any] | None:
-    return None if figure is None else asdict(figure)
 
 
 def _differences(compared: ComparedFamilies) -> list[dict[str, Any]]:

@@ -68,7 +68,7 @@ def plv_page(study: PlvStudy, figure: bytes, foot: Foot) -> Page:
     proxies = Table("Proxies tried, the best first", table.columns, table.rows)
     stopped = Words("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
     picture = Picture("PLV of the proxies tried", figure, TRIALS)
-    finalists = Table(CONFIRMED.rstrip(":"), finals.columns, finals.rows, (PLV_MEANING,))
+    finalists = Table(CONFIRMED.rstrip(":"), finals.columns, finals.rows, (PLV_MEANING, *study.unable.values()))
     return Page(
         study.settings.name, plv_answer(study), plv_next_step(study), (finalists, picture, proxies, stopped), foot
     )

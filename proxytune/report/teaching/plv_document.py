@@ -25,7 +25,7 @@ def plv_document(study: PlvStudy) -> dict[str, Any]:
         "name": study.settings.name,
         "objective": "plv",
         "best": _trial(study.best),
-        "confirmed": _confirmed(study.confirmed),
+        "confirmed": {**_confirmed(study.confirmed), "cannot_teach": dict(study.unable)},
         "trials": [_trial(trial) for trial in study.trials],
         "searched": {interval.name: [interval.low, interval.high] for interval in study.space.intervals},
         "narrowed_by_prpv": study.narrowed,
@@ -91,7 +91,8 @@ def plv_table(study: PlvStudy, files: Mapping[str, Any]) -> RenderableType:
         finals.add_column(name, justify="left" if name in FINALS[:2] else "right", overflow="fold")
     for row in _final_rows(study):
         finals.add_row(*row)
-    return Group(Text(head), table, *(Text(line) for line in lines), Text(f"\n{CONFIRMED}"), finals)
+    above, below = map(Text, lines), map(Text, study.unable.values())
+    return Group(Text(head), table, *above, Text(f"\n{CONFIRMED}"), finals, *below)
 
 
 def _final_rows(study: PlvStudy) -> list[tuple[str, ...]]:

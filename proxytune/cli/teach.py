@@ -25,7 +25,7 @@ from proxytune.study.provenance import adopt
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 from proxytune.teaching.examining import count_examinations
-from proxytune.teaching.experiment import load_setup, run_experiment
+from proxytune.teaching.experiment import check_proxies, load_setup, run_experiment
 from proxytune.teaching.predictivity import predictivity
 
 
@@ -43,6 +43,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     folder = study_folder(arguments.path)
     study = open_study(folder)
     setup = load_setup(study.settings)
+    # Before anything is written.
+    check_proxies(study.settings, setup)
     proxies = setup.settings.proxies
     with locked(folder), Store.open(folder) as store:
         adopt(study, store)

@@ -10,6 +10,9 @@ from proxytune.teaching.points import TeachingSetup
 WIDTH = " width"
 """What the width of a parameter's distribution is called, after the parameter."""
 
+ROUNDING = 1e-9
+"""Share of a box by which a width may be larger."""
+
 SLACK = 1.0 / 30.0
 """A parameter that PRPV has pinned down is still searched over this share of its box, to both sides."""
 
@@ -25,13 +28,23 @@ def search_space(
         left: The ends of what PRPV cannot tell from the best, by parameter; empty where the box is not narrowed.
 
     Raises:
-        SettingsError: If a width is of a parameter that is not searched.
+        SettingsError: If a width is of a parameter that is not searched, or wider than its box.
     """
-    for name in widths:
-        if name not in settings.space.names:
-            raise settings.error(f"teaching.width.{name}", "is not among [parameters]; add it there, or take this out")
+    for name, (_, widest) in widths.items():
+        _check_width(settings, name, widest)
     centres = [_narrowed(box, left.get(box.name)) for box in settings.space.intervals]
     return Space((*centres, *(Interval(name + WIDTH, *bounds) for name, bounds in sorted(widths.items()))))
+
+
+def _check_width(settings: StudySettings, name: str, widest: float) -> None:
+    key = f"teaching.width.{name}"
+    box = next((box for box in settings.space.intervals if box.name == name), None)
+    if box is None:
+        raise settings.error(key, "is not among [parameters]; add it there, or take this out")
+    whole = box.high - box.low
+    # 0.3 − 0.1 is a little less than 0.2.
+    if widest > whole * (1.0 + ROUNDING):
+        raise settings.error(key, f"must be at most {whole:g}, all of its box in [parameters], got {widest:g}")
 
 
 def _narrowed(box: Interval, left: tuple[float, float] | None) -> Interval:

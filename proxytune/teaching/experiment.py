@@ -116,11 +116,8 @@ def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watch
         InputError: If there is no proxy, or one's expert cannot drive.
         RunError: If a domain, the learner or the machine fails; all that was finished is kept.
     """
-    proxies = setup.settings.proxies
-    if not proxies:
-        raise settings.error("teaching.proxies", "is missing; name at least one, as in [teaching.proxies.nominal]")
-    check_proxies(settings, setup, proxies)
-    scores = examine_curves(setup, {NONE: None, **proxies}, settings.jobs, watcher)
+    check_proxies(settings, setup)
+    scores = examine_curves(setup, {NONE: None, **setup.settings.proxies}, settings.jobs, watcher)
     return judge_curves(settings, setup, curves_of(setup.settings, scores))
 
 
@@ -148,13 +145,15 @@ def _cost_saved(taught: TeachingSettings, needs: SampleNeeds, name: str) -> Esti
     return estimate(saved, needs, more=NONE, less=name)
 
 
-def check_proxies(settings: StudySettings, setup: TeachingSetup, proxies: Mapping[str, Distribution]) -> None:
-    """Refuse a parameter that the family has not, or a value beyond its bounds.
+def check_proxies(settings: StudySettings, setup: TeachingSetup) -> None:
+    """Refuse a study without proxies, a parameter that the family has not, or a value beyond its bounds.
 
     Raises:
         SettingsError: With the proxy and the parameter.
     """
-    for proxy, where in proxies.items():
+    if not setup.settings.proxies:
+        raise settings.error("teaching.proxies", "is missing; name at least one, as in [teaching.proxies.nominal]")
+    for proxy, where in setup.settings.proxies.items():
         for name, (low, high) in where.bounds.items():
             key, given = f"teaching.proxies.{proxy}.{name}", f"{low:g} to {high:g}"
             check_bounds(settings, setup.proxy, key, name, (low, high), given)

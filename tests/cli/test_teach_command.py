@@ -89,27 +89,96 @@ def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, capsys):
     assert (folder / "study.db").exists()
 
 
-@pytest.mark.parametrize(
-    ("edit", "status", "says"),
-    [
-        (("[0, 20,", "[20,"), 2, "teaching.target_samples: must begin with 0"),
-        (("[teaching]", "[teachings]"), 2, "teachings: unknown key; did you mean 'teaching'?"),
-        (
-            ("schoolroom:Matrix", "schoolroom"),
-            2,
-            "teaching.learner: learner 'schoolroom' is unknown",
-        ),
-    ],
-)
-def test_bad_input_is_one_line(make_study, capsys, edit, status, says):
-    folder = make_taught(make_study)
-    path = folder / "study.toml"
-    path.write_text(path.read_text().replace(*edit))
-    assert main(["teach", str(folder)]) == status
+def refused(command, folder, capsys):
+    """A command ends with one line on bad input and has written nothing; what it says."""
+    before = sorted(folder.rglob("*"))
+    assert main([command, str(folder)]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert says in err
-    assert len(err.strip().splitlines()) == 1
+    assert len(err.splitlines()) == 1
+    assert sorted(folder.rglob("*")) == before
+    return err.removeprefix(f"proxytune {command}: {folder / 'study.toml'}: ")
+
+
+def edited(folder, before, after):
+    path = folder / "study.toml"
+    assert before in path.read_text()
+    path.write_text(path.read_text().replace(before, after))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "says"),
+    [
+        ("[0, 20,", "[20,", "teaching.target_samples: must begin with 0"),
+        ("[teaching]", "[teachings]", "teachings: unknown key; did you mean 'teaching'?"),
+        ("schoolroom:Matrix", "schoolroom", "teaching.learner: learner 'schoolroom' is unknown"),
+        ("schoolroom:schoolroom", "wobbly:wobbly", "family: wobbly:wobbly cannot teach: it lacks best_score"),
+        ("trim = -0.3\n", "trim = -0.4\n", "teaching.proxies.wrong.trim: must lie within [-0.3, 0.3], got -0.4"),
+        ("trim = [0.0, 0.3]", "trim = [0.0, 0.5]", "teaching.proxies.wide.trim: must lie within [-0.3, 0.3], got 0 to"),
+        ("trim = -0.3\n", "tilt = 1.0\n", "teaching.proxies.wrong.tilt: unknown parameter; did you mean 'trim'?"),
+        ("trim = -0.3\n", "trim = nan\n", "teaching.proxies.wrong.trim: must be finite"),
+    ],
+)
+def test_bad_input_is_one_line(make_study, capsys, before, after, says):
+    folder = edited(make_taught(make_study), before, after)
+    assert refused("teach", folder, capsys).startswith(says)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ("[teaching.costs]\nlabel = -1.0", "teaching.costs.label: must be between 0 and inf, got -1.0"),
+        ("[teaching.costs]\non_policy = nan", "teaching.costs.on_policy: must be finite, got nan"),
+        ('[teaching.costs]\noff_policy = "much"', "teaching.costs.off_policy: must be a number, got 'much'"),
+        ("[teaching.costs]\nlabels = 1.0", "teaching.costs.labels: unknown key; did you mean 'label'?"),
+        ("examinations = 7", "teaching.examinations: must be between 8 and 1000000, got 7"),
+        ("examinations = 20.0", "teaching.examinations: must be a whole number, got 20.0"),
+        ('examinations = "20"', "teaching.examinations: must be a whole number, got '20'"),
+        ("rehearsal = 1.0", "teaching.rehearsal: must be between 0 and 0.99, got 1.0"),
+        ("rehearsal = -0.1", "teaching.rehearsal: must be between 0 and 0.99, got -0.1"),
+        ('target_lessons = "nobody"', "teaching.target_lessons: unknown value 'nobody'"),
+        ('target_lessons = "learner"', "teaching.target_lessons: schoolroom:schoolroom cannot teach a learner that"),
+        ('proxy_lessons = "learner"', "teaching.proxy_lessons: schoolroom:schoolroom cannot teach a learner that"),
+        ("[teaching.width]\ntrim = [-0.1, 0.1]", "teaching.width.trim: a width is at least 0, got -0.1"),
+        ("[teaching.width]\ntrim = [0.0, nan]", "teaching.width.trim: bounds must be finite"),
+    ],
+)
+@pytest.mark.parametrize("command", ["teach", "study"])
+def test_a_bad_key_of_teaching_is_one_line(make_study, capsys, command, more, says):
+    folder = make_taught(make_study, more=more, objective='"plv"')
+    assert refused(command, folder, capsys).startswith(says)
+
+
+def test_a_study_without_proxies_is_one_line(make_study, capsys):
+    folder = make_taught(make_study)
+    path = folder / "study.toml"
+    path.write_text(path.read_text().split("[teaching.proxies")[0])
+    assert refused("teach", folder, capsys).startswith("teaching.proxies: is missing; name at least one")
+
+
+@pytest.mark.parametrize(
+    ("width", "says"),
+    [
+        ("trim = [0.0, 0.7]", "teaching.width.trim: must be at most 0.4, all of its box in [parameters], got 0.7"),
+        ("delay = [0.0, 0.1]", "teaching.width.delay: is not among [parameters]; add it there"),
+    ],
+)
+def test_a_width_that_cannot_be_searched_is_one_line(make_study, capsys, width, says):
+    keys = {"parameters": {"trim": "[-0.2, 0.2]"}, "objective": '"plv"'}
+    folder = make_taught(make_study, more=f"[teaching.width]\n{width}", **keys)
+    assert refused("study", folder, capsys).startswith(says)
+
+
+def test_an_expert_without_labels_where_the_learner_drives_is_one_line_and_nothing_is_drawn(make_study, capsys):
+    keys = {"family": '"tightrope:tightrope"', "domain": {"silent": "true"}, "more": 'target_lessons = "learner"'}
+    folder = edited(make_taught(make_study, **keys), "schoolroom:Matrix", "tightrope:Cells")
+    assert main(["teach", str(folder), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.splitlines()[-1].startswith("proxytune teach: none: an expert without labels on the learner's states: ")
+    assert "Traceback" not in err
+    assert not (folder / "figures").exists()
 
 
 def test_an_expert_that_cannot_drive_is_one_line_and_nothing_is_drawn(make_study, capsys):

@@ -156,6 +156,16 @@ def test_a_width_without_its_parameter_is_one_line(make_study):
         search_space(settings, {"delay": (0.0, 0.1)}, {})
 
 
+@pytest.mark.parametrize(("widest", "wide"), [(0.2001, "0.2001"), (600.0, "600")])
+def test_a_width_beyond_the_parameters_box_is_one_line(make_study, widest, wide):
+    settings = read_study_settings(make_taught(make_study, parameters={"trim": "[0.1, 0.3]"}))
+    with pytest.raises(SettingsError) as told:
+        search_space(settings, {"trim": (0.0, widest)}, {})
+    path, says = settings.path, f"must be at most 0.2, all of its box in [parameters], got {wide}"
+    assert str(told.value) == f"{path}: teaching.width.trim: {says}"
+    assert search_space(settings, {"trim": (0.0, 0.2)}, {}).names == ("trim", "trim width")
+
+
 def test_where_the_target_alone_is_not_learnt_there_is_no_plv_to_search_for(make_study):
     with pytest.raises(RunError, match=r"still rises by more than 6 .* PLV is not known; raise teaching\.target"):
         run(make_taught(make_study, parameters=BOX, grid=[0, 3, 6]))

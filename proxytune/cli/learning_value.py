@@ -19,8 +19,8 @@ from proxytune.study.result import StudyResult
 from proxytune.study.settings import LEARNING
 from proxytune.study.study import Study
 from proxytune.teaching.box import search_space
-from proxytune.teaching.examining import count_examinations
 from proxytune.teaching.experiment import load_setup
+from proxytune.teaching.finalists import most_examinations
 from proxytune.teaching.search import PlvSearch
 
 
@@ -32,9 +32,8 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]
     search_space(settings, widths, {})
     predictive = by_prpv() if setup.settings.narrow else None
     space = search_space(settings, widths, predictive.knowledge.as_good[1] if predictive else {})
-    # The learner without a proxy is taught twice, and at most four finalists are.
-    points = count_examinations(setup.settings, setup.settings.budget + 6)
-    watching = renewed_page(settings, LEARNING, Bars(points, "points of learning curves"))
+    terminal = Bars(most_examinations(setup.settings), "points of learning curves")
+    watching = renewed_page(settings, LEARNING, terminal)
     with locked(folder), Store.open(folder) as store, watching as bars:
         search = PlvSearch(settings, setup, store, space, bars)
         chosen = predictive.best.trial.theta if predictive else None

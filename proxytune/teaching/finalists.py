@@ -12,7 +12,7 @@ import numpy as np
 from proxytune.errors import LearnerError
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Estimate, difference
-from proxytune.learning.settings import NONE
+from proxytune.learning.settings import NONE, TeachingSettings
 from proxytune.running.progress import Watcher
 from proxytune.search.design import from_unit, unit_points
 from proxytune.search.proposer import Trial, with_failures_as_worst
@@ -21,7 +21,7 @@ from proxytune.seeds import fresh_seed, proposal_seed
 from proxytune.space import Space, Theta
 from proxytune.study.settings import StudySettings
 from proxytune.teaching.box import WIDTH, distribution
-from proxytune.teaching.examining import curves_of, examine_curves
+from proxytune.teaching.examining import count_examinations, curves_of, examine_curves
 from proxytune.teaching.experiment import Experiment, TeacherResult, judge_curves
 from proxytune.teaching.points import Point, TeachingSetup
 
@@ -71,12 +71,21 @@ def finalists(
     return {name: one for name, one in named.items() if name == next(first for first in named if named[first] == one)}
 
 
+def most_examinations(taught: TeachingSettings) -> int:
+    """The most that a search by PLV takes: every trial, four finalists, and the learner without a proxy beside both."""
+    return count_examinations(taught, taught.budget + 1) + count_examinations(_closer(taught), 5)
+
+
+def _closer(taught: TeachingSettings) -> TeachingSettings:
+    """How finalists are examined."""
+    return replace(taught, examinations=taught.examinations and CLOSER * taught.examinations)
+
+
 def confirm(
     settings: StudySettings, setup: TeachingSetup, named: Mapping[str, Distribution], watcher: Watcher
 ) -> Confirmation:
     """Teach the finalists and the learner without a proxy under fresh seeds."""
-    examinations = setup.settings.examinations
-    taught = replace(setup.settings, examinations=examinations and CLOSER * examinations)
+    taught = _closer(setup.settings)
     fresh = replace(setup, seed=fresh_seed(setup.seed, 1), settings=taught)
     unable = {name: reason for name, proxy in named.items() if (reason := _why_unable(fresh, name, proxy))}
     able = {name: proxy for name, proxy in named.items() if name not in unable}

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from taught import make_taught
+from taught import GRID, make_taught
 
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.settings import NONE
@@ -15,7 +15,17 @@ from proxytune.study.settings import read_study_settings
 from proxytune.teaching.box import search_space
 from proxytune.teaching.examining import examine_curves
 from proxytune.teaching.experiment import load_setup
-from proxytune.teaching.finalists import BEST, BOX, BY_PRPV, SINGLE, best_teacher, confirm, finalists, saves_more
+from proxytune.teaching.finalists import (
+    BEST,
+    BOX,
+    BY_PRPV,
+    SINGLE,
+    best_teacher,
+    confirm,
+    finalists,
+    most_examinations,
+    saves_more,
+)
 
 BOX_KEYS = {"parameters": {"trim": "[-0.3, 0.3]"}}
 WIDTH = "[teaching.width]\ntrim = [0.0, 0.4]\n"
@@ -76,6 +86,16 @@ def test_finalists_are_taught_with_lessons_and_examinations_that_the_search_has_
     assert not before & {line for line in after if line.startswith("exam")} - before
     assert best_teacher(found).name == "right"
     assert saves_more(found, "right", "wrong").low > 0.0
+
+
+def test_what_a_search_takes_at_most_counts_finalists_twice_where_examinations_are_chosen(make_study):
+    def most(more):
+        return most_examinations(
+            load_setup(read_study_settings(make_taught(make_study, called=more[:8], more=more))).settings
+        )
+
+    assert most("budget = 3\nexaminations = 10") == 4 * 10 + 5 * 20
+    assert most("budget = 4") == (5 + 5) * 3 * len(GRID)
 
 
 def test_a_finalist_whose_expert_cannot_drive_is_left_out_with_the_reason(make_study):

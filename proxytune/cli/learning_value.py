@@ -3,6 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from rich.console import Group
+from rich.text import Text
+
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.live_page import renewed_page
 from proxytune.report.page import foot_of, html_of
@@ -10,6 +13,7 @@ from proxytune.report.study.page import study_command, study_settings
 from proxytune.report.teaching.page import plv_page
 from proxytune.report.teaching.plv_document import plv_document, plv_table
 from proxytune.report.teaching.plv_figure import plv_figure
+from proxytune.report.teaching.words import plv_answer
 from proxytune.report.writing import save, write_text
 from proxytune.running.progress import Bars
 from proxytune.search.engines.registry import make_proposer
@@ -43,4 +47,5 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]
     page, foot = folder / "report.html", foot_of(study_command(settings), study_settings(settings))
     write_text(page, html_of(plv_page(result, figure.read_bytes(), foot)))
     document = {**plv_document(result), "figure": str(figure), "report": str(page)}
-    return Answer(document, plv_table(result, {"figure": figure, "report": page}))
+    shown = plv_table(result, {"figure": figure, "report": page})
+    return Answer(document, Group(Text(f"{plv_answer(result)}\n"), shown))

@@ -114,6 +114,7 @@ def _lesson(classroom: Classroom, where: Distribution, seed: int, number: int) -
 def describe(where: Distribution) -> str:
     """p(θ) in words."""
     spans = [
-        f"{n} = {low:g}" if low == high else f"{n} in [{low:g}, {high:g}]" for n, (low, high) in where.bounds.items()
+        f"{name} = {low:.3g}" if low == high else f"{name} in [{low:.3g}, {high:.3g}]"
+        for name, (low, high) in where.bounds.items()
     ]
     return ", ".join(spans) or "nominal θ"

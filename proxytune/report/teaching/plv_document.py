@@ -7,7 +7,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.learning.lessons import describe
+from proxytune.learning.lessons import Distribution
+from proxytune.report.numbers import short
 from proxytune.report.teaching.document import estimate, theta_of
 from proxytune.report.teaching.table import CONVERGED, PLV_MEANING, UNKNOWN, count, one_decimal
 from proxytune.study.settings import as_document
@@ -16,7 +17,7 @@ from proxytune.teaching.finalists import best_teacher, saves_more
 from proxytune.teaching.search import PlvStudy, PlvTrial
 
 CONFIRMED = "Finalists, taught anew with fresh lessons, learners and examinations:"
-FINALS = ("finalist", "θ", "zero-shot score", "samples needed", "PLV", "the best saves more by")
+SCORES = ("zero-shot score", "samples needed", "PLV")
 
 
 def plv_document(study: PlvStudy) -> dict[str, Any]:
@@ -67,15 +68,11 @@ def _confirmed(experiment: Experiment) -> dict[str, Any]:
 
 def plv_table(study: PlvStudy, files: Mapping[str, Any]) -> RenderableType:
     """The trials, the best one first, and what was searched."""
-    names = study.space.names
-    table = Table(box=None, pad_edge=False)
-    for name in ("trial", *names, "zero-shot score", "samples needed", "PLV"):
-        table.add_column(name, justify="right", overflow="fold")
+    table = _table("trial", study, SCORES)
     ordered = sorted(study.trials, key=lambda trial: (trial is not study.best, trial.number))
     for trial in ordered:
-        values = [f"{trial.theta[name]:.4g}" for name in names]
         scores = (one_decimal(trial.zero_shot), count(trial.worth.needed), count(trial.worth.plv, UNKNOWN))
-        table.add_row(str(trial.number), *values, *scores)
+        table.add_row(str(trial.number), *_spans(study, trial.proxy), *scores)
     head = f"{study.settings.name}: {len(study.trials)} proxies tried, the one of highest PLV first"
     box = ", ".join(f"{interval.name} [{interval.low:.4g}, {interval.high:.4g}]" for interval in study.space.intervals)
     by = " (narrowed to the θ whose PRPV is as low as the best, within noise)" if study.narrowed else ""
@@ -86,13 +83,26 @@ def plv_table(study: PlvStudy, files: Mapping[str, Any]) -> RenderableType:
         CONVERGED.format(f"{study.when.threshold:.1f}"),
         *(f"{what}: {path}" for what, path in files.items()),
     ]
-    finals = Table(box=None, pad_edge=False)
-    for name in FINALS:
-        finals.add_column(name, justify="left" if name in FINALS[:2] else "right", overflow="fold")
+    finals = _table("finalist", study, (*SCORES, "the best saves more by"))
     for row in _final_rows(study):
         finals.add_row(*row)
     above, below = map(Text, lines), map(Text, study.unable.values())
     return Group(Text(head), table, *above, Text(f"\n{CONFIRMED}"), finals, *below)
+
+
+def _table(first: str, study: PlvStudy, figures: tuple[str, ...]) -> Table:
+    """An empty table of proxies: what they are called, p(θ) by parameter, and figures."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column(first, overflow="fold")
+    for name in (*study.settings.space.names, *figures):
+        table.add_column(name, justify="right", overflow="fold")
+    return table
+
+
+def _spans(study: PlvStudy, proxy: Distribution) -> list[str]:
+    """What each parameter is in a proxy, or between which values it is drawn."""
+    bounds = [proxy.bounds[name] for name in study.settings.space.names]
+    return [short(low) if low == high else f"{short(low)} to {short(high)}" for low, high in bounds]
 
 
 def _final_rows(study: PlvStudy) -> list[tuple[str, ...]]:
@@ -103,5 +113,5 @@ def _final_rows(study: PlvStudy) -> list[tuple[str, ...]]:
         plv = count(one.worth.plv, UNKNOWN) if one.worth else UNKNOWN
         needed = count(one.worth.needed) if one.worth else ""
         less = count(saves_more(experiment, best.name, one.name), UNKNOWN) if best and best is not one else ""
-        rows.append((one.name, describe(one.proxy), one_decimal(one.zero_shot), needed, plv, less))
+        rows.append((one.name, *_spans(study, one.proxy), one_decimal(one.zero_shot), needed, plv, less))
     return rows

@@ -116,7 +116,7 @@ def _with_ends(figure: Estimate, missing: str, write: Callable[[float], str]) ->
 
 def one_decimal(figure: Estimate) -> str:
     """A score, empty where there is none."""
-    return "" if figure.value is None else f"{figure.value:.1f}"
+    return "" if figure.value is None else fixed(figure.value, 1)
 
 
 def _ends(figure: Estimate, write: Callable[[float], str]) -> str:

@@ -98,3 +98,8 @@ def test_an_imitator_of_enough_target_samples_drives_the_twins_loop(study):
     assert np.mean(scores) > 30.0 * 45.0 / 60.0
     assert min(scores) >= -30.0
     assert max(scores) <= 30.0
+
+
+@pytest.mark.parametrize("name", ["twin.toml", "target.csv"])
+def test_the_study_of_randomisation_asks_of_the_same_target_as_that_of_teachers(name):
+    assert (STUDIES / "which_randomisation" / name).read_bytes() == (STUDIES / "teacher" / name).read_bytes()

@@ -6,6 +6,7 @@ do to this one, plus noise. The last three are larger where scores differ more, 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,21 @@ class Marks:
     place: Array
     score: Array
 
+    @cached_property
+    def same(self) -> NDArray[np.bool_]:
+        """Whether two are of one curve (examinations, examinations)."""
+        return np.asarray(self.curve[:, None] == self.curve)
+
+    @cached_property
+    def together(self) -> NDArray[np.bool_]:
+        """Whether two are of one repetition."""
+        return np.asarray(self.repetition[:, None] == self.repetition)
+
+    @cached_property
+    def apart(self) -> Array:
+        """How many doublings two are apart."""
+        return np.asarray(np.abs(self.place[:, None] - self.place))
+
 
 def places(counts: Array, first: float) -> Array:
     """Numbers of target samples as doublings: 0 for none, 1 for the first count, nearly one more for each twofold."""
@@ -76,14 +92,12 @@ class CurveModel:
         values: Its hyperparameters by name.
         centre: Mean of all scores.
         unit: Their standard deviation.
-        spread: How much scores differ at each examination, relative to all.
     """
 
     marks: Marks
     values: Mapping[str, float]
     centre: float
     unit: float
-    spread: Array
     _factor: tuple[Array, bool] = field(repr=False)
     _weights: Array = field(repr=False)
 
@@ -119,8 +133,8 @@ def fit_curve_model(marks: Marks) -> CurveModel:
         start, values = found.x, _named(found.x)
         factor = cho_factor(_covariance(marks, values, spread), lower=True)
         weights = cho_solve(factor, scaled)
-        used, spread = spread, _spread(marks, _residuals(marks, values, scaled, weights), marks.curve, marks.place)
-    return CurveModel(marks, values, centre, unit, used, factor, weights)
+        spread = _spread(marks, _residuals(marks, values, scaled, weights), marks.curve, marks.place)
+    return CurveModel(marks, values, centre, unit, factor, weights)
 
 
 def _bounds(marks: Marks) -> list[tuple[float, float]]:
@@ -144,13 +158,12 @@ def _misfit(logarithms: Array, marks: Marks, scaled: Array, spread: Array) -> fl
 
 
 def _covariance(marks: Marks, values: Mapping[str, float], spread: Array) -> Array:
-    same = marks.curve[:, None] == marks.curve
-    together = marks.repetition[:, None] == marks.repetition
-    apart = np.abs(marks.place[:, None] - marks.place)
-    drift = _matern(apart, values["drift"]) * together
-    about = drift * (values["shared"] ** 2 + values["own"] ** 2 * same) + values["noise"] ** 2 * np.eye(len(spread))
+    drift = _matern(marks.apart, values["drift"]) * marks.together
+    about = drift * (values["shared"] ** 2 + values["own"] ** 2 * marks.same) + values["noise"] ** 2 * np.eye(
+        len(spread)
+    )
     sure = NUGGET * np.eye(len(spread))
-    return np.asarray(_means(values, same, apart) + spread[:, None] * spread * about + sure)
+    return np.asarray(_means(values, marks.same, marks.apart) + spread[:, None] * spread * about + sure)
 
 
 def _means(values: Mapping[str, float], same: NDArray[np.bool_], apart: Array) -> Array:
@@ -166,8 +179,7 @@ def _matern(apart: Array, length: float) -> Array:
 
 def _residuals(marks: Marks, values: Mapping[str, float], scaled: Array, weights: Array) -> Array:
     """What the mean curves leave of the scores, scaled."""
-    same, apart = marks.curve[:, None] == marks.curve, np.abs(marks.place[:, None] - marks.place)
-    return np.asarray(scaled - _means(values, same, apart) @ weights)
+    return np.asarray(scaled - _means(values, marks.same, marks.apart) @ weights)
 
 
 def _spread(marks: Marks, residuals: Array, curve: NDArray[np.intp], place: Array) -> Array:

@@ -89,7 +89,7 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spendi
     cells, wanted = _cells(needs, names, spending), _finite_plv(needs, names, spending.none)
     targets = wanted.shape[1]
     joint = np.cov(np.column_stack((wanted, cells.drawn)), rowvar=False)
-    noise = needs.draws.model.noise_at(cells.number, places(cells.count.astype(float), spending.counts[1]))
+    noise = needs.draws.model.noise_at(cells.number, places(cells.count.astype(float), needs.draws.first))
     done = {
         Examination(name, int(repetition), curve.counts[place])
         for name, curve in needs.curves.items()
@@ -97,15 +97,14 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spendi
     }
     chosen: list[Examination] = []
     while len(chosen) < spending.batch:
-        free = [
-            _free_repetition(done, cells.name[cell], int(cells.count[cell]), spending) for cell in range(len(noise))
-        ]
         tells = np.sum(joint[:targets, targets:] ** 2, axis=0) / (np.diag(joint)[targets:] + noise)
-        best = int(np.argmax([gain if there is not None else -1.0 for gain, there in zip(tells, free, strict=True)]))
-        if (repetition := free[best]) is None:
+        ordered = np.argsort(-tells, kind="stable").tolist()
+        free = ((cell, _next_of(cells, cell, done, spending)) for cell in ordered)
+        best, examination = next(((cell, one) for cell, one in free if one), (0, None))
+        if examination is None:
             break
-        chosen.append(Examination(cells.name[best], repetition, int(cells.count[best])))
-        done.add(chosen[-1])
+        chosen.append(examination)
+        done.add(examination)
         column = joint[:, targets + best]
         joint = joint - np.outer(column, column) / (column[targets + best] + noise[best])
     return chosen
@@ -138,8 +137,10 @@ def _finite_plv(needs: SampleNeeds, names: Sequence[str], none: str) -> Array:
     return np.column_stack([needed[none] - needed[name] for name in proxies] or [needed[none]])
 
 
-def _free_repetition(done: Collection[Examination], name: str, count: int, spending: Spending) -> int | None:
-    """The repetition in which this learner has been examined least, among those in which it has not been here."""
+def _next_of(cells: _Cells, cell: int, done: Collection[Examination], spending: Spending) -> Examination | None:
+    """The examination here in the repetition in which this learner has been examined least; None if all are done."""
+    name, count = cells.name[cell], int(cells.count[cell])
     often = Counter(one.repetition for one in done if one.curve == name)
-    free = [number for number in range(spending.repetitions) if Examination(name, number, count) not in done]
-    return min(free, key=lambda number: (often[number], number), default=None)
+    possible = (Examination(name, number, count) for number in range(spending.repetitions))
+    free = [one for one in possible if one not in done]
+    return min(free, key=lambda one: (often[one.repetition], one.repetition), default=None)

@@ -1,6 +1,5 @@
 """Learning in one domain: its lessons' samples, and the weights they lead to, each cached by what determines it."""
 
-import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from proxytune.domain import Classroom, Demonstration, Policy
 from proxytune.learning.cache import Arrays, Cache, digest
-from proxytune.learning.learner import Learner, Weights
+from proxytune.learning.learner import Learner, Weights, policy_of
 from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.learning.rehearsal import mix_samples
 from proxytune.learning.settings import LEARNER
@@ -157,7 +156,7 @@ class Stage:
     def _policy(self, number: int) -> Policy | None:
         """Who drives in a round; None for the expert."""
         weights = self.weights(self.lessons.begin(number)) if self.lessons.on_policy else None
-        return None if weights is None else functools.partial(self.trainee.learner.act, weights)
+        return None if weights is None else policy_of(self.trainee.learner, weights)
 
     def _train(self, count: int) -> Weights:
         samples = self.samples(count)

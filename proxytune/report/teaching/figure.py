@@ -67,7 +67,7 @@ def _panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> None:
 
 def _places(experiment: Experiment, counts: Array) -> Array:
     """Where counts stand on the axis: as doublings, none at 0."""
-    return places(counts, float(experiment.without.counts[1]))
+    return places(counts, experiment.needs.draws.first)
 
 
 def _curve(axes: Axes, experiment: Experiment, name: str, look: _Look) -> None:

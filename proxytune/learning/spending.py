@@ -1,7 +1,7 @@
 """Where the next examinations tell most about PLV: a pure function of the scores that are known."""
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.learning.curve_model import places
-from proxytune.learning.curves import Array
+from proxytune.learning.curves import Array, Curve
 from proxytune.learning.plv import SampleNeeds
 
 BEYOND = 1.5
@@ -26,6 +26,9 @@ class Examination(NamedTuple):
     curve: str
     repetition: int
     samples: int
+
+
+Scores = Mapping[Examination, float]
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,20 @@ class _Cells:
     name: tuple[str, ...]
     count: NDArray[np.intp]
     drawn: Array
+
+
+def curves_of(counts: Sequence[int], scores: Scores) -> dict[str, Curve]:
+    """Scores as learning curves, by name, each over the grid of counts and what was examined between these."""
+    return {name: _curve(counts, name, scores) for name in dict.fromkeys(one.curve for one in scores)}
+
+
+def _curve(counts: Sequence[int], name: str, scores: Scores) -> Curve:
+    own = [one for one in scores if one.curve == name]
+    all_counts = sorted({*counts, *(one.samples for one in own)})
+    table = np.full((1 + max(one.repetition for one in own), len(all_counts)), np.nan)
+    for one in own:
+        table[one.repetition, all_counts.index(one.samples)] = scores[one]
+    return Curve(tuple(all_counts), table)
 
 
 def first_examinations(names: Sequence[str], spending: Spending) -> list[Examination]:

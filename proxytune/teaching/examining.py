@@ -13,7 +13,7 @@ from proxytune.learning.curves import Curve
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import SampleNeeds, sample_needs
 from proxytune.learning.settings import NONE, TeachingSettings
-from proxytune.learning.spending import Examination, Spending, first_examinations, next_examinations
+from proxytune.learning.spending import Examination, Scores, Spending, curves_of, first_examinations, next_examinations
 from proxytune.running.progress import Watcher
 from proxytune.teaching.points import Point, TeachingSetup, prepare_shared, score_points
 
@@ -21,8 +21,6 @@ BATCH = 12
 """So many examinations are chosen at once, however many processes there are."""
 DRAWS = 500
 """So many draws of the learning curves choose the next examinations."""
-
-Scores = Mapping[Examination, float]
 
 
 def examine_curves(
@@ -53,7 +51,8 @@ def examine_curves(
     while batch and len(scores) < wanted:
         scores |= _examine(setup, proxies, batch[: wanted - len(scores)], jobs, watcher)
         if len(scores) < wanted:
-            batch = next_examinations(needs_of(setup, curves_of(taught, scores), DRAWS), list(proxies), spending)
+            needs = needs_of(setup, curves_of(taught.target_samples, scores), DRAWS)
+            batch = next_examinations(needs, list(proxies), spending)
     return scores
 
 
@@ -62,24 +61,10 @@ def count_examinations(taught: TeachingSettings, curves: int) -> int:
     return curves * (taught.examinations or taught.seeds * len(taught.target_samples))
 
 
-def curves_of(taught: TeachingSettings, scores: Scores) -> dict[str, Curve]:
-    """Scores as learning curves, by name, each over the grid and what was examined between its counts."""
-    return {name: _curve(taught, name, scores) for name in dict.fromkeys(one.curve for one in scores)}
-
-
 def needs_of(setup: TeachingSetup, curves: Mapping[str, Curve], draws: int = posterior.DRAWS) -> SampleNeeds:
     """How many target samples each learner needs, by what [teaching] says of convergence."""
     taught, best = setup.settings, setup.target.best_score
     return sample_needs(curves, none=NONE, best_score=best, tolerance=taught.tolerance, level=taught.level, draws=draws)
-
-
-def _curve(taught: TeachingSettings, name: str, scores: Scores) -> Curve:
-    own = [one for one in scores if one.curve == name]
-    counts = sorted({*taught.target_samples, *(one.samples for one in own)})
-    table = np.full((1 + max(one.repetition for one in own), len(counts)), np.nan)
-    for one in own:
-        table[one.repetition, counts.index(one.samples)] = scores[one]
-    return Curve(tuple(counts), table)
 
 
 def _whole_grid(taught: TeachingSettings, names: Mapping[str, Distribution | None]) -> list[Examination]:

@@ -15,10 +15,11 @@ from proxytune.learning.learner import Learner
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Estimate, SampleNeeds, Teaching, estimate, mean_score, teaching
 from proxytune.learning.settings import EXPERT, LEARNER, NONE, TeachingSettings
+from proxytune.learning.spending import curves_of
 from proxytune.running.progress import Watcher
 from proxytune.study.family import check_bounds, load_family
 from proxytune.study.settings import StudySettings
-from proxytune.teaching.examining import curves_of, examine_curves, needs_of
+from proxytune.teaching.examining import examine_curves, needs_of
 from proxytune.teaching.points import TeachingSetup
 
 CACHE = "teaching"
@@ -118,7 +119,7 @@ def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watch
     """
     check_proxies(settings, setup)
     scores = examine_curves(setup, {NONE: None, **setup.settings.proxies}, settings.jobs, watcher)
-    return judge_curves(settings, setup, curves_of(setup.settings, scores))
+    return judge_curves(settings, setup, curves_of(setup.settings.target_samples, scores))
 
 
 def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, Curve]) -> Experiment:

@@ -9,11 +9,12 @@ from proxytune.errors import LearnerError
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import SampleNeeds, difference, mean_score, teaching
 from proxytune.learning.settings import NONE
+from proxytune.learning.spending import curves_of
 from proxytune.running.progress import Watcher
 from proxytune.space import Theta
 from proxytune.study.families.compared import Lesson, best_teacher
 from proxytune.study.settings import StudySettings
-from proxytune.teaching.examining import count_examinations, curves_of, examine_curves, needs_of
+from proxytune.teaching.examining import count_examinations, examine_curves, needs_of
 from proxytune.teaching.experiment import classroom, load_setup
 
 
@@ -64,7 +65,7 @@ def teach_families(
             failed[name] = problem
     if len(failed) == len(rooms):
         raise next(iter(failed.values()))
-    needs = needs_of(setup, curves_of(setup.settings, scores))
+    needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
     lessons = {name: _lesson(needs, name, thetas[name]) for name in rooms if name not in failed}
     best = best_teacher(lessons)
     if best is not None:

@@ -13,6 +13,7 @@ from proxytune.errors import LearnerError
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Estimate, difference
 from proxytune.learning.settings import NONE, TeachingSettings
+from proxytune.learning.spending import curves_of
 from proxytune.running.progress import Watcher
 from proxytune.search.design import from_unit, unit_points
 from proxytune.search.proposer import Trial, with_failures_as_worst
@@ -21,7 +22,7 @@ from proxytune.seeds import fresh_seed, proposal_seed
 from proxytune.space import Space, Theta
 from proxytune.study.settings import StudySettings
 from proxytune.teaching.box import WIDTH, distribution
-from proxytune.teaching.examining import count_examinations, curves_of, examine_curves
+from proxytune.teaching.examining import count_examinations, examine_curves
 from proxytune.teaching.experiment import Experiment, TeacherResult, judge_curves
 from proxytune.teaching.points import Point, TeachingSetup
 
@@ -91,7 +92,7 @@ def confirm(
     able = {name: proxy for name, proxy in named.items() if name not in unable}
     fresh = replace(fresh, settings=replace(taught, proxies=able))
     scores = examine_curves(fresh, {NONE: None, **able}, settings.jobs, watcher)
-    return Confirmation(judge_curves(settings, fresh, curves_of(fresh.settings, scores)), unable)
+    return Confirmation(judge_curves(settings, fresh, curves_of(taught.target_samples, scores)), unable)
 
 
 def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:

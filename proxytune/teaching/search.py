@@ -15,6 +15,7 @@ from proxytune.learning.curves import Curve
 from proxytune.learning.lessons import Distribution
 from proxytune.learning.plv import Convergence, Estimate, Teaching, mean_score, teaching
 from proxytune.learning.settings import NONE
+from proxytune.learning.spending import Scores, curves_of
 from proxytune.running.progress import Watcher
 from proxytune.search.engines.gaussian_process import expected_improvement
 from proxytune.search.loop import Propose, Search
@@ -27,7 +28,7 @@ from proxytune.study.settings import StudySettings
 from proxytune.study.stages.stopping import nothing_to_gain, out_of_time
 from proxytune.teaching.box import distribution
 from proxytune.teaching.convergence import why_unknown
-from proxytune.teaching.examining import Scores, count_examinations, curves_of, examine_curves, needs_of
+from proxytune.teaching.examining import count_examinations, examine_curves, needs_of
 from proxytune.teaching.experiment import Experiment, teaching_settings
 from proxytune.teaching.finalists import confirm, finalists
 from proxytune.teaching.points import TeachingSetup
@@ -128,7 +129,7 @@ class PlvSearch:
         """
         settings, taught = self.settings, self.setup.settings
         alone = examine_curves(self.setup, {NONE: None}, settings.jobs, self.watcher)
-        needs = needs_of(self.setup, curves_of(taught, alone))
+        needs = needs_of(self.setup, curves_of(taught.target_samples, alone))
         if unknown := why_unknown(needs):
             raise RunError(f"{settings.path}: {unknown.reason}, so PLV is not known; {unknown.remedy}")
         self._check_facts()
@@ -221,7 +222,7 @@ class ProxyTrials:
         search, name = self._search, f"trial {number}"
         setup, proxy = search.setup, distribution(search.setup, theta)
         scores = examine_curves(setup, {name: proxy}, search.settings.jobs, search.watcher, self._alone)
-        needs = needs_of(setup, curves_of(setup.settings, scores))
+        needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
         worth = teaching(needs, none=NONE, proxy=name)
         return PlvTrial(number, theta, proxy, needs.curves[name], worth, mean_score(needs, name, 0))
 

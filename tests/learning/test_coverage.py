@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from made_up_learners import BEST, GRID, NONE, TOLERANCE, MadeUpLearners
 
-from proxytune.learning.curves import Curve
 from proxytune.learning.plv import sample_needs, teaching
-from proxytune.learning.spending import Spending, first_examinations, next_examinations
+from proxytune.learning.spending import Spending, curves_of, first_examinations, next_examinations
 
 REPETITIONS = 8
 CLASSROOMS = 50
@@ -18,18 +17,6 @@ def needs_of(curves, draws=2000):
     return sample_needs(curves, none=NONE, best_score=BEST, tolerance=TOLERANCE, draws=draws)
 
 
-def curves_of(scores):
-    curves = {}
-    for name in dict.fromkeys(one.curve for one in scores):
-        own = [one for one in scores if one.curve == name]
-        counts = sorted({*GRID, *(one.samples for one in own)})
-        table = np.full((REPETITIONS, len(counts)), np.nan)
-        for one in own:
-            table[one.repetition, counts.index(one.samples)] = scores[one]
-        curves[name] = Curve(tuple(counts), table)
-    return curves
-
-
 def spend(learners, examinations):
     """The curves after so many examinations that were chosen."""
     spending, scores = Spending(NONE, GRID, REPETITIONS, 12), {}
@@ -37,7 +24,7 @@ def spend(learners, examinations):
     while True:
         for one in batch[: examinations - len(scores)]:
             scores[one] = learners.score(one.curve, one.repetition, one.samples)
-        curves = curves_of(scores)
+        curves = curves_of(GRID, scores)
         if len(scores) >= examinations:
             return curves
         batch = next_examinations(needs_of(curves, 500), learners.names, spending)

@@ -7,10 +7,10 @@ from telling import Telling
 
 from proxytune.errors import SettingsError
 from proxytune.learning.settings import NONE
-from proxytune.learning.spending import Examination
+from proxytune.learning.spending import Examination, curves_of
 from proxytune.running.progress import Silent
 from proxytune.study.settings import read_study_settings
-from proxytune.teaching.examining import count_examinations, curves_of, examine_curves
+from proxytune.teaching.examining import count_examinations, examine_curves
 from proxytune.teaching.experiment import load_setup, run_experiment
 
 CURVES = 4
@@ -97,12 +97,11 @@ def test_curves_whose_scores_are_known_are_not_examined_further(make_study):
     assert len(alone) == 14
     assert len(with_proxy) == 28
     assert {one: with_proxy[one] for one in alone} == alone
-    assert curves_of(setup.settings, with_proxy).keys() == {NONE, "right"}
+    assert curves_of(GRID, with_proxy).keys() == {NONE, "right"}
 
 
-def test_scores_become_curves_over_the_grid_and_what_lies_between(make_study):
-    taught = load_setup(read_study_settings(make_taught(make_study))).settings
-    curve = curves_of(taught, {Examination("a", 1, 33): 7.0, Examination("a", 0, 0): 3.0})["a"]
+def test_scores_become_curves_over_the_grid_and_what_lies_between():
+    curve = curves_of(GRID, {Examination("a", 1, 33): 7.0, Examination("a", 0, 0): 3.0})["a"]
     assert curve.counts == tuple(sorted({*GRID, 33}))
     assert curve.scores[1, curve.counts.index(33)] == 7.0
     assert len(curve.examined) == 2

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from wobbly import Wobbly, wobbly
+from walled import Walled, inside
+from wobbly import Wobbly
 
 from proxytune.domain import Demonstration, Episode, Policy
 from proxytune.errors import EpisodeError
@@ -24,7 +24,7 @@ def answers(theta: Mapping[str, float]) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Schoolroom:
+class Schoolroom(Walled):
     """Wobbly, and an expert in it.
 
     Attributes:
@@ -36,13 +36,6 @@ class Schoolroom:
     inner: Wobbly
     blocked: float = 0.0
     journal: str = ""
-
-    best_score = 60.0
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") or name == "inner":
-            raise AttributeError(name)
-        return getattr(self.inner, name)
 
     @property
     def identity(self) -> str:
@@ -67,17 +60,11 @@ class Schoolroom:
         wrong = np.abs(answered - seen @ answers({**dict(self.inner.theta), **dict(episode.theta)})).mean()
         return self.best_score * (1.0 - 2.0 * min(1.0, float(wrong)))
 
-    def _note(self, what: str, episode: Episode) -> None:
-        if self.journal:
-            with open(self.journal, "a") as journal:
-                journal.write(f"{what} {episode.seed}\n")
-
 
 def schoolroom(section: Section, *, model: Path | None) -> Schoolroom:
     """The family that a [domain] table describes."""
-    own = {key: section.values[key] for key in section.values if key in ("blocked", "teaching_journal")}
-    rest = Section(section.path, section.name, {k: v for k, v in section.values.items() if k not in own})
-    return Schoolroom(wobbly(rest, model=model), own.get("blocked", 0.0), own.get("teaching_journal", ""))
+    inner, own = inside(section, model, ("blocked", "teaching_journal"))
+    return Schoolroom(inner, own.get("blocked", 0.0), own.get("teaching_journal", ""))
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from wobbly import Wobbly, wobbly
+from walled import Walled, inside
+from wobbly import Wobbly
 
 from proxytune.domain import Demonstration, Episode, Policy
 from proxytune.errors import EpisodeError
@@ -20,7 +20,7 @@ FALLEN = 1.0
 
 
 @dataclass(frozen=True)
-class Tightrope:
+class Tightrope(Walled):
     """Wobbly, with a deviation that grows by a third per step unless a command counters it.
 
     Attributes:
@@ -32,13 +32,6 @@ class Tightrope:
     inner: Wobbly
     silent: bool = False
     journal: str = ""
-
-    best_score = 60.0
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("__") or name == "inner":
-            raise AttributeError(name)
-        return getattr(self.inner, name)
 
     @property
     def identity(self) -> str:
@@ -83,17 +76,11 @@ class Tightrope:
         theta: Mapping[str, float] = {**dict(self.inner.theta), **dict(episode.theta)}
         return 1.3 + theta.get("trim", 0.0)
 
-    def _note(self, what: str, episode: Episode) -> None:
-        if self.journal:
-            with open(self.journal, "a") as journal:
-                journal.write(f"{what} {episode.seed}\n")
-
 
 def tightrope(section: Section, *, model: Path | None) -> Tightrope:
     """The family that a [domain] table describes."""
-    own = {key: section.values[key] for key in section.values if key in ("silent", "teaching_journal")}
-    rest = Section(section.path, section.name, {k: v for k, v in section.values.items() if k not in own})
-    return Tightrope(wobbly(rest, model=model), own.get("silent", False), own.get("teaching_journal", ""))
+    inner, own = inside(section, model, ("silent", "teaching_journal"))
+    return Tightrope(inner, own.get("silent", False), own.get("teaching_journal", ""))
 
 
 @dataclass(frozen=True)

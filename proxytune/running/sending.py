@@ -78,7 +78,9 @@ def load_sent(recipe: Recipe) -> Callable[[Any], Any]:
     """
     if recipe.made_by:
         check_code(dict(recipe.made_by))
-    sys.path.extend(folder for folder in recipe.path if folder not in sys.path)
+    # A process that has done other work looks in that work's folders last; on another machine its own come first.
+    paths = (sys.path, recipe.path) if recipe.made_by else (recipe.path, sys.path)
+    sys.path[:] = dict.fromkeys(folder for path in paths for folder in path)
     unpack(recipe.packed) if recipe.made_by else open_folders(recipe.own)
     try:
         return cast("Callable[[Any], Any]", pickle.loads(recipe.pickled))

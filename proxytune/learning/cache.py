@@ -93,7 +93,7 @@ def _is_alive(process: int) -> bool:
 
 def _read(path: Path) -> Arrays:
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             return {name: file[name] for name in file.files if name != FACTS}
     # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.
     except Exception as problem:

@@ -10,15 +10,23 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 
 
+def pip(*words):
+    done = subprocess.run(
+        [sys.executable, "-m", "pip", words[0], "--quiet", "--no-deps", *words[1:]],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if "No matching distribution found for hatchling" in done.stderr:
+        pytest.skip("no network: pip cannot fetch hatchling to build a wheel")
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
     """The wheel's content, as pip would lay it into site-packages."""
     folder = tmp_path_factory.mktemp("wheel")
-    build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", folder, ROOT]
-    done = subprocess.run(build, capture_output=True, text=True, check=False)
-    if done.returncode and "hatchling" in done.stderr:
-        pytest.skip("no network: pip cannot fetch hatchling to build a wheel")
-    assert done.returncode == 0, done.stderr
+    pip("wheel", "--wheel-dir", folder, ROOT)
     (wheel,) = folder.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "site")
@@ -63,3 +71,9 @@ def test_a_study_that_travels_along_is_copied_and_run(installed, tmp_path):
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "quickstart" / "study.db").is_file()
     assert not (installed / "proxytune" / "studies" / "quickstart" / "study.db").exists()
+
+
+@pytest.mark.slow
+def test_an_editable_installation_is_the_checkout(tmp_path):
+    pip("install", "--target", tmp_path, "--editable", ROOT)
+    assert (tmp_path / "_proxytune.pth").read_text(encoding="utf-8").strip() == str(ROOT)

@@ -43,7 +43,13 @@ def goes_on_as_if_nothing_had_happened(folder, finished, capsys):
     return json.loads(capsys.readouterr().out)["episodes"]["run"]
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize(
+    "damage",
+    [
+        damage if damage in ("a score", "an episode") else pytest.param(damage, marks=pytest.mark.slow)
+        for damage in DAMAGES
+    ],
+)
 def test_what_is_whole_is_kept_and_the_rest_is_made_again_to_the_last_bit(finished, finished_once, capsys, damage):
     statement, kept, again = DAMAGES[damage]
     damaged(finished, statement)

@@ -70,8 +70,8 @@ def test_no_curve_gains_much_where_nothing_is_missing(clean):
     ("effect", "figures", "signals"),
     [
         ("carpet", {"factor": 0.8, "beyond": 0.0}, {"position"}),
-        ("eccentric_wheel", {"ripple": 0.25}, {"left wheel angle"}),
-        ("weak_reverse", {"factor": 0.8}, {"direction of travel", "wheel command"}),
+        pytest.param("eccentric_wheel", {"ripple": 0.25}, {"left wheel angle"}, marks=pytest.mark.slow),
+        pytest.param("weak_reverse", {"factor": 0.8}, {"direction of travel", "wheel command"}, marks=pytest.mark.slow),
         ("slipping_hub", {"factor": 0.85, "after": 15.0}, {"time in the episode", "cumulated use"}),
     ],
 )

@@ -19,13 +19,14 @@ def said_of(name, kind):
     return row
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
         "dead_band width 0.12",
-        pytest.param("turn_slip gain 0.15", marks=pytest.mark.slow),
-        pytest.param("yaw_scrub baseline 0.13", marks=pytest.mark.slow),
-        pytest.param("dropped_commands probability 0.4", marks=pytest.mark.slow),
+        "turn_slip gain 0.15",
+        "yaw_scrub baseline 0.13",
+        "dropped_commands probability 0.4",
     ],
 )
 def test_a_hidden_effect_is_named_and_nothing_else(name):

@@ -47,7 +47,7 @@ straight = Bad((1.0, 1.0))
 
 
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
-@pytest.mark.parametrize("camera", ["ground_plane", "renderer"])
+@pytest.mark.parametrize("camera", ["ground_plane", pytest.param("renderer", marks=pytest.mark.slow)])
 def test_the_same_episode_gives_the_same_trajectory_to_the_last_bit(tmp_path, plant, camera):
     domain = family(tmp_path, plant=plant, camera=camera, seconds=1.5)
     np.testing.assert_array_equal(poses(domain), poses(domain))

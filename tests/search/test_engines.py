@@ -23,7 +23,11 @@ from proxytune.search.proposer import Trial
 from proxytune.testing import check_engine
 
 HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
-HERE = [pytest.param(name, marks=pytest.mark.skipif(bool(lacking(name)), reason=lacking(name))) for name in NAMES]
+SLOW = {"skopt": [pytest.mark.slow]}
+HERE = [
+    pytest.param(name, marks=[pytest.mark.skipif(bool(lacking(name)), reason=lacking(name)), *SLOW.get(name, ())])
+    for name in NAMES
+]
 
 
 def made(engine, initial):

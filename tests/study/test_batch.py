@@ -98,7 +98,7 @@ def test_a_budget_lowered_within_an_open_batch_and_raised_again_changes_nothing(
     assert run(folder)[1] == cutting[2]
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_episode_twice(make_study, cutting, jobs):
     folder = ordered_study(make_study, "stopped", **KEYS, jobs=str(jobs))
     run_before = 0

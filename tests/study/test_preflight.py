@@ -71,7 +71,7 @@ def test_a_parameter_that_matters_is_not_looked_at_twice_and_nothing_is_simulate
     assert run(folder) == (replace(spent, episodes=0, seconds=0), found)
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_interrupted_anywhere_it_finds_the_same_and_simulates_nothing_twice(planted, jobs):
     _, whole = run(planted("whole"))
     folder = planted("stopped")

@@ -3,21 +3,15 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 
 import numpy as np
 import pytest
-from processes import ENVIRONMENT, FAKES, besides_progress, episodes, finished_episodes, start, trials, wait_for
+from launched import Launched, launching, never_stopped
+from processes import besides_progress, episodes, finished_episodes, start, trials, wait_for
 
 from proxytune.cli.main import COMMANDS, main
-from proxytune.search.engines.registry import STUDY_ENGINES, make_proposer
-from proxytune.storage.store import Store
-from proxytune.study.knowledge import goal_of
-from proxytune.study.run import run_study
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.search.engines.registry import STUDY_ENGINES
 
 PER_TRIAL = 18
 EPISODES = 7 * PER_TRIAL
@@ -25,46 +19,10 @@ DOMAIN = {"sleep": "0.03"}
 TOLD = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
 
 
-class Launched:
-    """A study run by a fork of a process that has loaded proxytune; `launcher` makes them, one at a time."""
-
-    def __init__(self, launcher, folder):
-        # What is left of a killed process, joblib's clean-up, may still print: into a file of its own.
-        self.launcher, self.output = launcher, folder.with_name(f"{folder.name}_{time.monotonic_ns()}.txt")
-        launcher.stdin.write(json.dumps(["study", str(folder), "--json", str(self.output)]) + "\n")
-        launcher.stdin.flush()
-        self.pid = int(launcher.stdout.readline())
-
-    def poll(self):
-        """Something once it has ended."""
-        try:
-            os.kill(self.pid, 0)
-        except ProcessLookupError:
-            return True
-
-    def end(self):
-        """Wait for its end: exit status, and what it printed."""
-        return int(self.launcher.stdout.readline()), self.output.read_text()
-
-
 @pytest.fixture(scope="module")
 def launcher():
-    command = [sys.executable, str(FAKES / "launcher.py")]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **pipes) as process:
+    with launching() as process:
         yield process
-        process.stdin.close()
-
-
-def never_stopped(make_study, **changes):
-    """The study run in this process, in one go: its trials and episodes."""
-    folder = make_study("whole", **changes)
-    study = open_study(folder)
-    with Store.open(folder) as store:
-        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
-        study_run = StudyRun(study, store)
-        run_study(study_run, proposer)
-    return trials(folder), episodes(folder)
 
 
 def stop(process, number):

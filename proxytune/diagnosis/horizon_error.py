@@ -85,7 +85,9 @@ def horizon_error(
     if len(np.unique(drives.block[windows.begin])) < RULES.fewest_blocks:
         return None
     blocks = blocks_of(drives, windows)
-    before, after = (how(drives, fitted.theta, windows) ** 2 for fitted in (found.declared, found.model))
+    before = how(drives, found.declared.theta, windows) ** 2
+    same = found.model.theta == found.declared.theta
+    after = before if same else how(drives, found.model.theta, windows) ** 2
     lower, turn = noise_floor(drives, windows, tested.noise)
     besides = [one.beside.theta for one in found.immaterial]
     if learnt:

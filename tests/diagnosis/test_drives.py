@@ -179,6 +179,12 @@ def test_sums_by_label_leave_negative_labels_out():
     np.testing.assert_array_equal(sums, [[0, 1], [0, 0], [8, 10], [0, 0]])
 
 
+def test_sums_by_label_are_weighted():
+    weights = np.array([2.0, 1.0, 5.0, -1.0])
+    sums = sum_by(np.array([0, 2, -1, 2]), np.arange(8.0).reshape(4, 2), 3, weights)
+    np.testing.assert_array_equal(sums, [[0, 2], [0, 0], [-4, -4]])
+
+
 def test_runs_of_labels_are_numbered_in_order():
     assert number_of(np.array([4, 4, 1, 7, 7])).tolist() == [0, 0, 1, 2, 2]
 

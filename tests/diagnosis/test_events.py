@@ -21,7 +21,7 @@ SHORT = {"episodes": 4, "seconds": 25.0}
 def ratio(effect, size, pull, energy):
     """The log-likelihood ratio of each command, one command per second."""
     late = RANDOM_EFFECTS[effect].lateness(size, 1.0)
-    return _mixture(late.commands, late.log_weights, pull, energy)
+    return _mixture(late, pull, energy)
 
 
 def weighed(theta, seed=1):
@@ -111,6 +111,14 @@ def test_what_points_against_a_loss_of_no_consequence_costs(effect, size):
     assert gains[0] > 1.0
     assert gains[1] < 0.0
     assert gains[2] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_times_are_weighed_as_their_likelihoods_add_up_however_far_apart_they_are():
+    late = RANDOM_EFFECTS["dropped_commands"].lateness(0.2, 1.0)
+    pull, energy = np.array([-900.0, 0.3, 900.0]), np.array([1.0, 2.0, 40.0])
+    each = [w - k * pull - 0.5 * k**2 * energy for k, w in zip(late.commands, late.log_weights, strict=True)]
+    wanted = np.logaddexp.reduce(each, axis=0)
+    np.testing.assert_allclose(_mixture(late, pull, energy), wanted, rtol=1e-12)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ sys.path.append(str(Path(__file__).parent))
 from planted import CALM, DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis.horizon.floor import pose_noise
+from proxytune.diagnosis.horizon.windows import pose_errors
 from proxytune.diagnosis.horizon_error import KeptAside, horizon_error
 from proxytune.diagnosis.model.fitting import evaluate
 from proxytune.diagnosis.naming.findings import AdoptedEffect, DroppedEffect, Findings, Variant
@@ -23,17 +24,31 @@ def drives():
     return planted_drives(SCRUBBED, episodes=6, seconds=15.0, noise=CALM)
 
 
-def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0):
+def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0, how=pose_errors):
     declared, extended = (evaluate(drives, theta, DECLARED, NOISE) for theta in (TRUTH, model))
     findings = Findings(declared, extended, (), (), (), (), tuple(dropped))
-    return horizon_error(findings, KeptAside(drives, drives, pose_noise(drives, model)), horizon_s, learnt or {})
+    kept = KeptAside(drives, drives, pose_noise(drives, model))
+    return horizon_error(findings, kept, horizon_s, learnt or {}, how)
 
 
 def test_before_is_the_declared_model_and_after_the_extended_one(drives):
     told = error(drives, model=SCRUBBED)
     assert told.before.value > 3.0 * told.after.value
     assert told.ratio.value == pytest.approx(told.after.value / told.before.value)
-    assert told.floor.reached == told.after.value
+    assert told.floor.reached == pytest.approx(told.after.value)
+
+
+@pytest.mark.parametrize(("model", "times"), [(TRUTH, 1), (SCRUBBED, 2)])
+def test_a_model_to_which_nothing_was_added_is_driven_once(drives, model, times):
+    driven = []
+
+    def drive(*given):
+        driven.append(given)
+        return pose_errors(*given)
+
+    told = error(drives, model=model, how=drive)
+    assert len(driven) == times
+    assert (told.before == told.after) == (times == 1)
 
 
 @pytest.mark.parametrize("how", [{"dropped": [DroppedEffect(SCRUB, Variant(SCRUBBED, DECLARED))]},

@@ -53,7 +53,7 @@ def test_long_logs_are_thinned(drives, monkeypatch):
     asked = []
     monkeypatch.setattr("proxytune.diagnosis.horizon.polish.MOST_WINDOWS", 5)
     monkeypatch.setattr(
-        "proxytune.diagnosis.horizon.polish.pose_differences",
+        "proxytune.diagnosis.horizon.polish.predicted_motion",
         lambda d, t, w: asked.append(len(w.begin)) or np.zeros((len(w.window), 3)),
     )
     fit_windows(drives, TRUTH, DECLARED, cut(drives, 2.0))

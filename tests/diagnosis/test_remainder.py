@@ -52,6 +52,15 @@ def test_the_guard_and_the_held_out_errors_tell_of_blocks_that_were_not_fitted(f
     assert inside.mean() < learnt.held_out.mean()
 
 
+def test_curves_that_promise_nothing_to_who_asks_are_not_used(found):
+    drives, learnt = found
+    asked = []
+    refused = remainder(drives, TRUTH, lambda held_out: asked.append(held_out))
+    assert (refused.used, dict(refused.guard), dict(refused.theta)) == (False, {}, {})
+    np.testing.assert_array_equal(asked, [learnt.held_out])
+    np.testing.assert_array_equal(refused.held_out, learnt.held_out)
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_nothing_is_used_where_nothing_is_missing(seed):
     drives = planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed)

@@ -16,12 +16,13 @@ from proxytune.diagnosis.horizon.windows import (
     blocks_of,
     cut,
     measured_motion,
-    pose_differences,
     pose_errors,
+    predicted_motion,
     ratio,
     select_windows,
 )
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
+from proxytune.diagnosis.measured.recent import Recent
 from proxytune.diagnosis.model.coordinates import Coordinate, smooth_coordinates, span, theta_at
 from proxytune.diagnosis.model.fitting import STEP, Fit, evaluate
 from proxytune.diagnosis.rules import RULES
@@ -96,7 +97,9 @@ class _Problem(NamedTuple):
     theta: Theta
     free: tuple[Coordinate, ...]
     windows: Windows
+    measured: Floats
     weights: Floats
+    misses: Recent[Floats]
 
     @property
     def start(self) -> Floats:
@@ -113,7 +116,13 @@ class _Problem(NamedTuple):
         return theta_at(self.theta, self.free, low + fractions * (high - low))
 
     def left(self, fractions: Floats) -> Floats:
-        return np.asarray((pose_differences(self.drives, self.at(fractions), self.windows) * self.weights).ravel())
+        return self.misses.get(fractions.tobytes(), lambda: self._misses(self.at(fractions)))
+
+    def _misses(self, theta: Theta) -> Floats:
+        apart = predicted_motion(self.drives, theta, self.windows) - self.measured
+        misses = np.asarray((apart * self.weights).ravel())
+        misses.setflags(write=False)
+        return misses
 
     def slopes(self, fractions: Floats) -> Floats:
         here, columns = self.left(fractions), []
@@ -127,8 +136,9 @@ class _Problem(NamedTuple):
 
 def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows) -> _Problem:
     """The least-squares problem of these windows; a heading error counts as the way it makes over the median chord."""
-    chord = float(np.median(np.hypot(*measured_motion(drives, windows)[:, :2].T)))
-    return _Problem(drives, theta, free, windows, np.array((1.0, 1.0, max(chord, 1e-3))))
+    measured = measured_motion(drives, windows)
+    chord = float(np.median(np.hypot(*measured[:, :2].T)))
+    return _Problem(drives, theta, free, windows, measured, np.array((1.0, 1.0, max(chord, 1e-3))), Recent())
 
 
 def _thin(windows: Windows) -> Windows:

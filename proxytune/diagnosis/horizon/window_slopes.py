@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.horizon.windows import Windows, cut, length_of, motion_in, select_windows
+from proxytune.diagnosis.measured.angles import cosine_and_sine
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, relative
 from proxytune.diagnosis.model.replay import tracked_paths, window_features, window_twists
-from proxytune.driving.planar import integrate
+from proxytune.diagnosis.model.walk import walk
 from proxytune.effects.learnt.effect import Learnt
 from proxytune.effects.learnt.table import is_learnt
 from proxytune.space import Theta
@@ -66,31 +67,57 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
     measured = relative(drives.poses[begin[window], 0], drives.poses[windows.increment, 1])
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
     features = window_features(drives, named, offered, begin, length)
-    parts = [_pose_slopes(drives, twists, walked, basis, unit)[window, tick - 1] for basis, unit in features]
+    lever = _lever(twists, walked, 1.0 / drives.tick_hz)
+    parts = [_pose_slopes(lever, basis, unit, (window, tick - 1)) for basis, unit in features]
     turn = walked[window, 0, 2]
     columns = _turn_frames(np.concatenate(parts, axis=-1), -turn)
     scale = np.array((1.0, 1.0, way))
     return Slopes((measured - predicted) * scale, columns * scale[:, None], drives.block[begin[window]])
 
 
-def _pose_slopes(drives: Drives, twists: Floats, walked: Floats, basis: Floats, unit: Floats) -> Floats:
-    """Change of the poses after each tick (W, length, 3, knots) per weight of a curve, to first order."""
-    tick_s = 1.0 / drives.tick_hz
-    poses = integrate(np.zeros((len(twists), 3)), twists, tick_s)
-    turn = poses[..., 2] - twists[..., 2] * tick_s / 2.0
-    axle = poses[..., :2] - 0.5 * np.diff(poses[..., :2], axis=1, prepend=0.0)
-    along = unit[0] * np.exp(1j * turn) + unit[1] * 1j * np.exp(1j * turn)
-    about = unit[2] * 1j
-    place = along - about * (axle[..., 0] + 1j * axle[..., 1])
-    turned = np.cumsum(basis, axis=1) * tick_s
-    shifted = np.cumsum(place[..., None] * basis, axis=1) * tick_s
-    shifted += about * (walked[:, 1:, 0] + 1j * walked[:, 1:, 1])[..., None] * turned
-    return np.stack((shifted.real, shifted.imag, unit[2] * turned), axis=2)
+class _Lever(NamedTuple):
+    """What a twist added in one tick does to the places that come after, as complex numbers (W, length).
+
+    Attributes:
+        along: The way of forward motion at 1 m/s within the tick [m].
+        about: How far a turn at 1 rad/s within the tick moves places, less what the next says [m].
+        after: How far a turn by 1 rad moves the tracked place after the tick, seen from the origin [m].
+        tick_s: Length of a tick [s].
+    """
+
+    along: Floats
+    about: Floats
+    after: Floats
+    tick_s: float
+
+
+def _lever(twists: Floats, walked: Floats, tick_s: float) -> _Lever:
+    """The lever of twists (W, length, 3), along which the tracked places (W, length + 1, 3) are."""
+    poses = walk(twists, tick_s)
+    cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
+    axle = 0.5 * (poses[:, 1:] + poses[:, :-1])
+    about = (axle[..., 1] - 1j * axle[..., 0]) * tick_s
+    return _Lever((cosine + 1j * sine) * tick_s, about, 1j * walked[:, 1:, 0] - walked[:, 1:, 1], tick_s)
+
+
+def _pose_slopes(lever: _Lever, basis: Floats, unit: Floats, at: tuple[Whole, Whole]) -> Floats:
+    """Change of compared poses (M, 3, knots) per weight of a curve, to first order.
+
+    Args:
+        lever: That of the windows.
+        basis: What each weight adds in each tick (W, length, knots), in this unit.
+        unit: The unit, a twist (3,).
+        at: Window and tick after which each pose is compared, (M,) each.
+    """
+    place = (unit[0] + 1j * unit[1]) * lever.along + unit[2] * lever.about
+    turned = np.cumsum(basis, axis=1)[at] * (unit[2] * lever.tick_s)
+    moved = np.cumsum(place[..., None] * basis, axis=1)[at] + lever.after[at][:, None] * turned
+    return np.stack((moved.real, moved.imag, turned), axis=1)
 
 
 def _turn_frames(changes: Floats, angle: Floats) -> Floats:
     """Changes of poses (M, 3, knots) seen from frames turned by minus an angle (M,)."""
-    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    cosine, sine = (part[:, None] for part in cosine_and_sine(angle))
     x = cosine * changes[:, 0] - sine * changes[:, 1]
     y = sine * changes[:, 0] + cosine * changes[:, 1]
     return np.stack((x, y, changes[:, 2]), axis=1)

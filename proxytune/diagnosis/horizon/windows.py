@@ -57,8 +57,12 @@ def blocks_of(drives: Drives, windows: Windows) -> Whole:
 
 def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """The model's motion since each window's beginning less the measured one (M, 3): [m], [m], [rad]."""
-    walked = window_paths(drives, theta, windows.begin, length_of(drives, windows))
-    return motion_in(drives, walked, windows) - measured_motion(drives, windows)
+    return predicted_motion(drives, theta, windows) - measured_motion(drives, windows)
+
+
+def predicted_motion(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """The model's motion since each window's beginning (M, 3): [m], [m], [rad]."""
+    return motion_in(drives, window_paths(drives, theta, windows.begin, length_of(drives, windows)), windows)
 
 
 def length_of(drives: Drives, windows: Windows) -> int:

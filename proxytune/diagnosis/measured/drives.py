@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from proxytune.diagnosis.measured.angles import cosine_and_sine
 from proxytune.diagnosis.measured.commands import commands_a_second, commands_of
 from proxytune.diagnosis.measured.instants import ends_of, path_between
+from proxytune.diagnosis.measured.recent import Recent
 from proxytune.driving.robot import Robot
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode
@@ -76,6 +78,11 @@ class Drives:
         return relative(self.poses[:, 0], self.poses[:, 1])
 
     @cached_property
+    def replays(self) -> Recent[Floats]:
+        """The increments (N, 3) that models made of these drives lately."""
+        return Recent()
+
+    @cached_property
     def places(self) -> Floats:
         """Measured place at the start of each tick (E, T, 2) [m], interpolated."""
         return self._interpolated(self.poses[:, 0, :2])
@@ -138,7 +145,7 @@ class Drives:
 def relative(origin: Floats, pose: Floats) -> Floats:
     """Poses (…, 3) seen from the frame of others."""
     difference = pose - origin
-    cosine, sine = np.cos(origin[..., 2]), np.sin(origin[..., 2])
+    cosine, sine = cosine_and_sine(origin[..., 2])
     forward = cosine * difference[..., 0] + sine * difference[..., 1]
     left = cosine * difference[..., 1] - sine * difference[..., 0]
     return np.stack((forward, left, difference[..., 2]), axis=-1)
@@ -228,10 +235,11 @@ def _travel(number: Whole, poses: Floats, rows: Whole, rate_hz: float) -> Floats
     return np.stack((np.hypot(chord[:, 0], chord[:, 1]) * share, np.abs(chord[:, 2]) * share), axis=1)
 
 
-def sum_by(labels: Whole, values: Floats, count: int) -> Floats:
-    """Sums of values (M, …) over those with one label each (count, …); labels below 0 belong nowhere."""
+def sum_by(labels: Whole, values: Floats, count: int, weights: Floats | None = None) -> Floats:
+    """Sums of values (M, …), weighted (M,), over those with one label each (count, …); no label is below 0."""
     own = labels >= 0
-    rows = sparse.csr_array((np.ones(own.sum()), (labels[own], np.flatnonzero(own))), shape=(count, len(labels)))
+    share = np.ones(own.sum()) if weights is None else weights[own]
+    rows = sparse.csr_array((share, (labels[own], np.flatnonzero(own))), shape=(count, len(labels)))
     flat = values.reshape(len(values), -1)
     return np.asarray(rows @ flat).reshape(count, *values.shape[1:])
 

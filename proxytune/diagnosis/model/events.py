@@ -4,7 +4,6 @@ A mean model cannot see them: a command that is lost now and then changes the mo
 """
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +11,8 @@ from scipy.optimize import minimize_scalar
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, sum_by
 from proxytune.diagnosis.model.fitting import Fit
-from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, increments_along, paths
-from proxytune.effects.trace import Draws
+from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, increments, increments_along, paths
+from proxytune.effects.trace import Draws, Lateness
 
 MEMORY_S = 2.5
 """A command moves nothing any more after so long."""
@@ -70,12 +69,6 @@ def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
     return tuple(_weigh(name, draws, rate, answered) for name, draws in RANDOM_EFFECTS.items())
 
 
-def _mixture(late: Floats, weight: Floats, pull: Floats, size: Floats) -> Floats:
-    """Log-likelihood ratio of being late by one of these times, in commands, with these log-weights."""
-    ratios = [w - step * pull - 0.5 * step**2 * size for step, w in zip(late, weight, strict=True)]
-    return np.asarray(np.logaddexp.reduce(ratios, axis=0))
-
-
 def _weigh(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
     best, gain = likeliest_size(draws, rate_hz, answered.pull, answered.size)
     chance = np.max([_ratio(draws, rate_hz, size, answered.others, answered.size) for size in _grid(draws)], axis=0)
@@ -103,7 +96,15 @@ def _grid(draws: Draws) -> Floats:
 def _ratio(draws: Draws, rate_hz: float, size: float, pull: Floats, energy: Floats) -> Floats:
     """The log-likelihood ratio of an effect of this size, over all commands (…,)."""
     late = draws.lateness(size, rate_hz)
-    return np.asarray(_mixture(late.commands, late.log_weights, pull, energy).sum(axis=-1))
+    return np.asarray(np.apply_along_axis(lambda row: _mixture(late, row, energy).sum(), -1, pull))
+
+
+def _mixture(late: Lateness, pull: Floats, energy: Floats) -> Floats:
+    """The log-likelihood ratio of each command's having been late by one of these times (commands,)."""
+    steps = np.stack((-late.commands, -0.5 * late.commands**2, late.log_weights), axis=1)
+    ratios = steps @ np.stack((pull, energy, np.ones_like(pull)))
+    most = ratios.max(axis=0)
+    return np.asarray(most + np.log(np.exp(ratios - most).sum(axis=0)))
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:
@@ -117,13 +118,14 @@ def responses(fitted: Fit, others: Floats) -> Responses:
     """
     drives = fitted.drives
     changed, phase = _changed_commands(drives)
-    here = increments_along(drives, paths(drives, fitted.theta))
-    found = [_respond_to_phase(fitted, changed[phase == number], here, others) for number in np.unique(phase)]
+    values = np.concatenate((fitted.innovations[:, None], others), axis=1)
+    heard = _Innovations(values, values**2)
+    found = [_respond_to_phase(fitted, changed[phase == number], heard) for number in np.unique(phase)]
     if not found:
         return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
-    pull, size, pulls = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
+    size, pulls = (np.concatenate(part) for part in zip(*found, strict=True))
     kept = size > 1e-3
-    return Responses(pull[kept], size[kept], pulls[:, kept])
+    return Responses(pulls[kept, 0], size[kept], pulls[kept, 1:].T)
 
 
 def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
@@ -148,30 +150,34 @@ def _lose_commands(drives: Drives, lost: Whole) -> Floats:
     return duties
 
 
-def _respond_to_phase(fitted: Fit, lost: Whole, here: Floats, others: Floats) -> tuple[Floats, Floats, Floats]:
-    """Pull, size and other pulls of commands of one phase."""
+class _Innovations(NamedTuple):
+    """The innovations of a model and others beside them (3N, columns), and their squares."""
+
+    values: Floats
+    squares: Floats
+
+
+def _respond_to_phase(fitted: Fit, lost: Whole, heard: _Innovations) -> tuple[Floats, Floats]:
+    """The size of the response to each command of one phase (commands,), and its pulls (commands, columns)."""
     drives = fitted.drives
-    other = replace(drives, duties=_lose_commands(drives, lost))
-    change = fitted.whiten.whiten(here - increments_along(other, paths(other, fitted.theta)))
+    without = increments_along(drives, paths(drives, fitted.theta, _lose_commands(drives, lost)))
+    change = fitted.whiten.whiten(increments(drives, fitted.theta) - without)
     label = np.repeat(_label(drives, lost), 3)
     size = sum_by(label, change**2, len(lost))
-    both = np.concatenate((fitted.innovations[:, None], others), axis=1)
-    pulls = sum_by(label, change[:, None] * both, len(lost))
-    pulls /= _loudness(label, change, both, pulls / (size[:, None] + 1e-12))
-    return pulls[:, 0], size, pulls[:, 1:].T
+    pulls = sum_by(label, heard.values, len(lost), change)
+    return size, pulls / _loudness(label, change, heard, pulls / (size[:, None] + 1e-12))
 
 
-def _loudness(label: Whole, change: Floats, innovations: Floats, share: Floats) -> Floats:
+def _loudness(label: Whole, change: Floats, heard: _Innovations, share: Floats) -> Floats:
     """Standard deviation of what the loss of a command does not explain, where it acts, at least 1 (commands, columns).
 
     After a command all motion may be harder to predict: only what points its way speaks for its loss.
     """
-    weight = np.abs(change)
-    count = len(share)
+    weight, count = np.abs(change), len(share)
     total = sum_by(label, weight, count)[:, None] + 1e-12
-    along = sum_by(label, (weight * change)[:, None] * innovations, count)
-    cubes = sum_by(label, weight * change**2, count)[:, None]
-    energy = sum_by(label, weight[:, None] * innovations**2, count) - 2.0 * share * along + share**2 * cubes
+    along = sum_by(label, heard.values, count, weight * change)
+    cubes = sum_by(label, weight, count, change**2)[:, None]
+    energy = sum_by(label, heard.squares, count, weight) - 2.0 * share * along + share**2 * cubes
     return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
 
 

@@ -5,7 +5,7 @@ the pose noise of its two ends, which it shares with its neighbours. So the erro
 the whitened innovations of the Kalman filter that re-anchors the pose are L⁻¹e, L its Cholesky factor.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,12 @@ JITTER = np.array((1e-5, 1e-5, 1e-5)) ** 2
 THINNED = 2400
 RUN = 12
 """Noise is fitted to about so many increments, in runs of so many: more hardly sharpen five values, and cost most."""
+
+SMALLEST, LARGEST = 1e-6, 3.0
+"""Noise lies between these, each value in its own unit."""
+
+STEP = 1e-4
+"""Finite differences step by this in the logarithm of a value of the noise."""
 
 HUBER = 3.0
 """Innovations beyond so many standard deviations count linearly."""
@@ -78,14 +84,13 @@ class Whitener:
 
 def whitener(drives: Drives, noise: Noise) -> Whitener:
     """The whitener of these drives under this noise."""
-    return _factor(_parts(drives), noise)
+    return _factor(_covariance(drives, np.square((*noise.drive, *noise.pose))))
 
 
-def _factor(parts: Floats, noise: Noise) -> Whitener:
-    """The whitener under a noise, from what each of its variances adds."""
-    variances = np.square((*noise.drive, *noise.pose))
-    band = (variances @ parts).reshape(BAND, -1)
-    band[0] += np.tile(JITTER, band.shape[1] // 3)
+def _factor(covariance: Floats) -> Whitener:
+    """The whitener of errors with this covariance, in lower banded form (6 · 3N)."""
+    band = covariance.reshape(BAND, -1)
+    band.reshape(BAND, -1, 3)[0] += JITTER
     return Whitener(cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False))
 
 
@@ -129,7 +134,8 @@ def _blocks(drives: Drives, variances: Floats) -> tuple[Floats, Floats]:
 def huber(innovations: Floats) -> Floats:
     """The loss of each innovation: half its square, linear beyond HUBER."""
     size = np.abs(innovations)
-    return np.where(size <= HUBER, 0.5 * size**2, HUBER * (size - 0.5 * HUBER))
+    inner = np.minimum(size, HUBER)
+    return np.asarray(inner * (size - 0.5 * inner))
 
 
 def clip_outliers(innovations: Floats) -> Floats:
@@ -137,9 +143,9 @@ def clip_outliers(innovations: Floats) -> Floats:
     return np.clip(innovations, -HUBER, HUBER)
 
 
-def log_likelihood(errors: Floats, whiten: Whitener) -> Floats:
-    """Each increment's share of the log-likelihood of errors (N, 3), up to a constant (N,)."""
-    return np.asarray(-huber(whiten.whiten(errors)).reshape(-1, 3).sum(axis=1) - whiten.log_determinant)
+def log_likelihood(errors: Floats, whiten: Whitener) -> float:
+    """The log-likelihood of errors (N, 3), up to a constant."""
+    return -float(huber(whiten.whiten(errors)).sum() + np.log(whiten.factor[0]).sum())
 
 
 def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
@@ -164,18 +170,19 @@ def _choose_part(count: int) -> NDArray[np.bool_]:
 
 def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noise]:
     scale = np.concatenate((start.drive, start.pose))
-    bounds = [(np.log(1e-6 / s), np.log(3.0 / s)) for s in scale]
+    lowest, highest = np.log(SMALLEST / scale), np.log(LARGEST / scale)
     parts = _parts(drives)
 
     def surprise(logs: Floats) -> float:
-        return -float(log_likelihood(errors, _factor(parts, _scale_noise(scale, logs))).sum()) / len(errors)
+        return -log_likelihood(errors, _factor(np.square(scale * np.exp(logs)) @ parts)) / len(errors)
 
+    def with_slope(logs: Floats) -> tuple[float, Floats]:
+        here, steps = surprise(logs), np.where(logs + STEP <= highest, STEP, -STEP)
+        return here, np.array([surprise(moved) - here for moved in logs + np.diag(steps)]) / steps
+
+    bounds = list(zip(lowest, highest, strict=True))
     found = minimize(
-        surprise, np.zeros(5), method="L-BFGS-B", bounds=bounds, options={"eps": 1e-4, "ftol": 1e-9, "maxiter": 60}
+        with_slope, np.zeros(5), jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9, "maxiter": 60}
     )
-    return float(found.fun), _scale_noise(scale, found.x)
-
-
-def _scale_noise(scale: Floats, logs: Floats) -> Noise:
-    values = (scale * np.exp(logs)).tolist()
-    return replace(FIRST_GUESS, drive=tuple(values[:3]), pose=tuple(values[3:]))
+    values = (scale * np.exp(found.x)).tolist()
+    return float(found.fun), Noise(tuple(values[:3]), tuple(values[3:]))

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from proxytune.diagnosis.measured.drives import Drives, Floats, Whole, relative
+from proxytune.diagnosis.model.walk import walk
 from proxytune.driving.drivetrain import Drivetrain, drivetrain
-from proxytune.driving.planar import integrate
 from proxytune.effects import CATALOGUE, PARAMETERS, Chain, Setting, Stage, effects_from, stage_chain
 from proxytune.effects.learnt.effect import Learnt
 from proxytune.effects.trace import Draws
@@ -34,33 +34,46 @@ def expected_theta(theta: Theta, rate_hz: float) -> dict[str, float]:
     return calm
 
 
-def paths(drives: Drives, theta: Theta) -> Floats:
+def paths(drives: Drives, theta: Theta, duties: Floats | None = None) -> Floats:
     """The measured poses that a model expects from the origin (E, T + 1, 3), each episode in one go.
 
     Args:
         drives: The commands.
         theta: Values of effects besides the robot's nominal ones.
+        duties: Other commands instead (E, T, 2).
 
     Raises:
         SettingsError: If a value is out of its parameter's bounds.
     """
-    return _integrate_and_track(drives, twists_of(drives, theta), _model(drives, theta)[1])
+    train, measurement = _model(drives, theta)
+    return _walk_and_track(drives, _twists(drives, train, duties), measurement)
 
 
 def twists_of(drives: Drives, theta: Theta) -> Floats:
     """The motion that a model asks of the plant, tick by tick (E, T, 3): [m/s], [m/s], [rad/s]."""
-    train, _ = _model(drives, theta)
-    return np.asarray(train.apply(drives.duties, train.begin(_setting(drives)))[0])
+    return _twists(drives, _model(drives, theta)[0])
+
+
+def _twists(drives: Drives, train: Drivetrain, duties: Floats | None = None) -> Floats:
+    given = drives.duties if duties is None else duties
+    return np.asarray(train.apply(given, train.begin(_setting(drives)))[0])
 
 
 def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
     """Poses after each tick (E, T, 3) from the origin on, as a model's tracker sees them (E, T + 1, 3)."""
-    return _track(drives, poses, _model(drives, theta)[1])
+    walked = np.concatenate((np.zeros((len(poses), 1, 3)), poses), axis=1)
+    return _track(drives, walked, _model(drives, theta)[1])
 
 
 def increments(drives: Drives, theta: Theta) -> Floats:
-    """The motion between the measured poses (N, 3): forward, left [m], turn [rad], in the body frame."""
-    return increments_along(drives, paths(drives, theta))
+    """The motion between the measured poses (N, 3): forward, left [m], turn [rad], in the body frame; read only."""
+    return drives.replays.get(tuple(theta.items()), lambda: _increments(drives, theta))
+
+
+def _increments(drives: Drives, theta: Theta) -> Floats:
+    made = increments_along(drives, paths(drives, theta))
+    made.setflags(write=False)
+    return made
 
 
 def increments_along(drives: Drives, walked: Floats) -> Floats:
@@ -72,7 +85,7 @@ def increments_along(drives: Drives, walked: Floats) -> Floats:
 
 def increments_of_twists(drives: Drives, theta: Theta, twists: Floats) -> Floats:
     """The increments that these twists of every tick (E, T, 3) make, as a model's tracker sees them."""
-    return increments_along(drives, _integrate_and_track(drives, twists, _model(drives, theta)[1]))
+    return increments_along(drives, _walk_and_track(drives, twists, _model(drives, theta)[1]))
 
 
 def disturbed_increments(drives: Drives, theta: Theta, extra: Floats) -> Floats:
@@ -92,12 +105,29 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
         begin: The increments at whose beginnings the windows start (W,).
         length: Ticks to go on for; commands after an episode's end are those at its end.
     """
-    return _integrate_and_track(drives, window_twists(drives, theta, begin, length), _model(drives, theta)[1])
+    train, measurement = _model(drives, theta)
+    return _walk_and_track(drives, _window_twists(drives, train, begin, length), measurement)
 
 
 def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
     """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s]."""
-    train, _ = _model(drives, theta)
+    return _window_twists(drives, _model(drives, theta)[0], begin, length)
+
+
+def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int) -> Floats:
+    whole, wheels = _window_wheels(drives, train, begin, length)
+    if not train.motion.effects:
+        return train.ideal(wheels)
+    asked, driven = train.ideal(whole), replace(_setting(drives), rest=np.zeros((len(whole), 3)))
+    before = np.zeros_like(asked)
+    before[:, 1:] = train.motion.apply(asked, train.motion.begin(driven))[0][:, :-1]
+    ahead = _window_setting(drives, begin, before)
+    past = train.motion.begin_amid(ahead, driven, asked, drives.episode[begin], drives.first[begin])
+    return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
+
+
+def _window_wheels(drives: Drives, train: Drivetrain, begin: Whole, length: int) -> tuple[Floats, Floats]:
+    """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are."""
     setting = _setting(drives)
     memory = train.begin(setting)
     arrived = np.clip(train.command.apply(drives.duties, memory.command)[0], -1.0, 1.0)
@@ -105,14 +135,9 @@ def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Fl
     ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
     whole = train.actuation.apply(arrived, memory.actuation)[0]
     if drives.wheels is None:
-        wheels = whole[episode[:, None], ticks]
-    else:
-        turning = replace(setting, rest=drives.wheels[episode, start])
-        wheels = train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
-    ahead = _window_setting(drives, begin, _twists_before(drives, theta, train))
-    driven = replace(setting, rest=np.zeros((len(whole), 3)))
-    past = train.motion.begin_amid(ahead, driven, train.ideal(whole), episode, start)
-    return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
+        return whole, whole[episode[:, None], ticks]
+    turning = replace(setting, rest=drives.wheels[episode, start])
+    return whole, train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
 
 
 def window_features(
@@ -130,7 +155,7 @@ def window_features(
 
 def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:
     """Measured poses, from the origin on, that twists lead to (W, length + 1, 3)."""
-    return _integrate_and_track(drives, twists, _model(drives, theta)[1])
+    return _walk_and_track(drives, twists, _model(drives, theta)[1])
 
 
 def _window_setting(drives: Drives, begin: Whole, before: Floats) -> Setting:
@@ -143,14 +168,6 @@ def _window_setting(drives: Drives, begin: Whole, before: Floats) -> Setting:
         places=drives.poses[begin, :1, :2],
         angles=drives.angles[episode, start][:, None],
     )
-
-
-def _twists_before(drives: Drives, theta: Theta, train: Drivetrain) -> Floats:
-    """The motion in the tick before each (E, T, 3), as effects that remember it need it; none before the first."""
-    still = np.zeros((*drives.duties.shape[:2], 3))
-    if train.motion.effects:
-        still[:, 1:] = twists_of(drives, theta)[:, :-1]
-    return still
 
 
 def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
@@ -171,7 +188,7 @@ def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
     effects = effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue)
     train = drivetrain(robot, effects)
     twists, _ = train.apply(drives.duties, train.begin(replace(_setting(drives), seed=seed)))
-    return _integrate_and_track(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
+    return _walk_and_track(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
 
 
 def _wheel_speeds(drives: Drives, train: Drivetrain, setting: Setting) -> Floats:
@@ -198,14 +215,12 @@ def _setting(drives: Drives) -> Setting:
     return replace(setting, headings=drives.headings, places=drives.places, angles=drives.angles)
 
 
-def _integrate_and_track(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
-    return _track(drives, integrate(np.zeros((len(twists), 3)), twists, 1.0 / drives.tick_hz), measurement)
+def _walk_and_track(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
+    return _track(drives, walk(twists, 1.0 / drives.tick_hz), measurement)
 
 
-def _track(drives: Drives, poses: Floats, measurement: Chain) -> Floats:
-    start = np.zeros((len(poses), 1, 3))
-    walked = np.concatenate((start, poses), axis=1)
+def _track(drives: Drives, walked: Floats, measurement: Chain) -> Floats:
     if not measurement.effects:
         return walked
-    rest = replace(_setting(drives), rest=start[:, 0])
+    rest = replace(_setting(drives), rest=walked[:, 0])
     return np.asarray(measurement.apply(walked, measurement.begin(rest))[0])

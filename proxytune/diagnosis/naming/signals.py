@@ -1,6 +1,6 @@
 """What a residual may depend on: signals of the drives, and flexible motion as curves over each of them."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -110,23 +110,25 @@ def hats(signal: Floats, knots: int = KNOTS) -> Floats:
 
 def _twists(forward: Floats | None = None, sideways: Floats | None = None, yaw: Floats | None = None) -> Floats:
     """Columns of forward, sideways and yaw motion side by side (E, T, 3, columns)."""
-    parts = []
-    for channel, columns in enumerate((forward, sideways, yaw)):
-        if columns is not None:
-            block = np.zeros((*columns.shape[:2], 3, columns.shape[2]))
-            block[:, :, channel] = columns
-            parts.append(block)
-    return np.concatenate(parts, axis=-1)
+    channels = [{channel: columns} for channel, columns in enumerate((forward, sideways, yaw)) if columns is not None]
+    return _side_by_side(channels)
 
 
 def _of_wheels(motion: _Motion, left: Floats | None, right: Floats | None) -> Floats:
     """Motion that extra speeds of the wheels [m/s] make (E, T, 3, columns)."""
     baseline = motion.drives.robot.figures["effective_baseline"]
-    parts = []
-    for columns, side in ((left, -1.0), (right, 1.0)):
-        if columns is not None:
-            parts.append(np.stack((columns / 2.0, np.zeros_like(columns), side * columns / baseline), axis=2))
-    return np.concatenate(parts, axis=-1)
+    wheels = [(columns, side) for columns, side in ((left, -1.0), (right, 1.0)) if columns is not None]
+    return _side_by_side([{0: columns / 2.0, 2: side * columns / baseline} for columns, side in wheels])
+
+
+def _side_by_side(parts: Sequence[Mapping[int, Floats]]) -> Floats:
+    """Columns (E, T, columns) of parts, by the channel they go to, as (E, T, 3, columns): each lies in one piece."""
+    sizes = [next(iter(part.values())).shape for part in parts]
+    whole = np.zeros((sum(size[-1] for size in sizes), *sizes[0][:-1], 3))
+    for part, end in zip(parts, np.cumsum([size[-1] for size in sizes]), strict=True):
+        for channel, columns in part.items():
+            whole[end - columns.shape[-1] : end, ..., channel] = np.moveaxis(columns, -1, 0)
+    return np.moveaxis(whole, 0, -1)
 
 
 def _command_level(motion: _Motion) -> _Signal:

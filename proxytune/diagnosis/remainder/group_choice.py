@@ -1,6 +1,6 @@
 """The choice of groups of curves by ridge regression, one scale a group, on blocks that are left out."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -73,7 +73,7 @@ def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
     mean = given.curve.sum(axis=0).diagonal()
     pulls = {name: FREE for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
-    losses = _held_out_losses(given, *_penalise(groups, pulls, mean))
+    (losses,) = _held_out_losses(given, *_penalise(groups, [pulls], mean))
     while True:
         tried = {name: _try_group(given, groups, pulls, name, mean) for name in groups if name not in pulls}
         paying = {name: found for name, found in tried.items() if _pays(losses, found[1])}
@@ -84,7 +84,7 @@ def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
         gains[best] = float((losses - after).sum())
         losses = after
     weights = np.zeros(len(mean))
-    columns, penalty = _penalise(groups, pulls, mean)
+    columns, (penalty,) = _penalise(groups, [pulls], mean)
     total = given.curve.sum(axis=0)[np.ix_(columns, columns)]
     weights[columns] = np.linalg.solve(total + np.diag(penalty), given.pull.sum(axis=0)[columns])
     return Choice(weights, gains)
@@ -95,9 +95,9 @@ def _try_group(
 ) -> tuple[float, Floats]:
     """The strongest ridge of a group within one standard error of its best, and the losses of the parts with it."""
     ridges = [ridge for ridge in RIDGES if ridge >= FIRMEST_ONLY.get(name, 0.0)]
-    found = [_held_out_losses(given, *_penalise(groups, {**pulls, name: ridge}, mean)) for ridge in ridges]
+    found = _held_out_losses(given, *_penalise(groups, [{**pulls, name: ridge} for ridge in ridges], mean))
     best = min(found, key=lambda losses: float(losses.sum()))
-    for ridge, losses in zip(reversed(ridges), reversed(found), strict=True):
+    for ridge, losses in zip(ridges[::-1], found[::-1], strict=True):
         worse = losses - best
         if worse.sum() <= np.sqrt(len(worse)) * worse.std(ddof=1):
             return ridge, losses
@@ -110,17 +110,30 @@ def _pays(before: Floats, after: Floats) -> bool:
     return bool(gain.sum() > RULES.group_share * before.sum() and gain.sum() > RULES.group_t * spread)
 
 
-def _penalise(groups: Mapping[str, Whole], pulls: Mapping[str, float], mean: Floats) -> tuple[Whole, Floats]:
-    """The columns of the groups that have a pull, and how hard each is pulled: alike within a group."""
-    columns = np.concatenate([np.empty(0, int), *(groups[name] for name in pulls)])
-    penalty = [np.full(len(groups[name]), pull * mean[groups[name]].mean() + 1e-9) for name, pull in pulls.items()]
-    return columns, np.concatenate([np.empty(0), *penalty])
+def _penalise(
+    groups: Mapping[str, Whole], choices: Sequence[Mapping[str, float]], mean: Floats
+) -> tuple[Whole, Floats]:
+    """The columns of the groups that have a pull, and how hard each is pulled: alike within a group.
+
+    Args:
+        groups: The columns of each group.
+        choices: Pulls of the same groups (R,).
+        mean: The average curvature of each column.
+
+    Returns:
+        Columns (K,) and pulls (R, K).
+    """
+    names = list(choices[0])
+    columns = np.concatenate([np.empty(0, int), *(groups[name] for name in names)])
+    sizes = np.array([len(groups[name]) for name in names], int)
+    held = [[pulls[name] * mean[groups[name]].mean() + 1e-9 for name in names] for pulls in choices]
+    return columns, np.repeat(np.array(held), sizes, axis=1)
 
 
-def _held_out_losses(given: Sums, columns: Whole, penalty: Floats) -> Floats:
-    """The squared error of each part with weights from all others (P,)."""
-    curve, pull = given.curve[:, columns][:, :, columns], given.pull[:, columns]
-    rest = curve.sum(axis=0) - curve + np.diag(penalty)
-    weights = np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
-    bent = np.einsum("pi,pij,pj->p", weights, curve, weights)
-    return np.asarray(given.size - 2.0 * (weights * pull).sum(axis=1) + bent)
+def _held_out_losses(given: Sums, columns: Whole, penalties: Floats) -> Floats:
+    """The squared error of each part with weights from all others, under each penalty (R, K): (R, P)."""
+    curve, pull = given.curve[:, columns[:, None], columns], given.pull[:, columns]
+    rest = curve.sum(axis=0) - curve + penalties[:, None, :, None] * np.eye(len(columns))
+    weights = np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[..., 0]
+    bent = (weights * (curve @ weights[..., None])[..., 0]).sum(axis=-1)
+    return np.asarray(given.size - 2.0 * (weights * pull).sum(axis=-1) + bent)

@@ -8,7 +8,7 @@ import numpy as np
 
 from proxytune.diagnosis.horizon.window_slopes import FITTED_S
 from proxytune.diagnosis.horizon.windows import Ratio, Rmse, blocks_of, cut, pose_errors, ratio, rmse
-from proxytune.diagnosis.measured.drives import Drives
+from proxytune.diagnosis.measured.drives import Drives, Floats
 from proxytune.diagnosis.naming.findings import Findings
 from proxytune.diagnosis.remainder.lookalike import Lookalike, lookalike
 from proxytune.diagnosis.remainder.remainder import Remainder, remainder
@@ -90,8 +90,10 @@ def _names_are_doubtful(found: Findings, beside: Remainder) -> bool:
     if not found.adopted or not len(beside.held_out):
         return False
     drives = found.model.drives
-    alone = remainder(drives, found.declared.theta)
-    windows = cut(drives, FITTED_S)
-    blocks = blocks_of(drives, windows)
-    compared = ratio(alone.held_out, beside.held_out, blocks)
-    return alone.used and compared.value < RULES.doubtful_names and compared.below
+    blocks = blocks_of(drives, cut(drives, FITTED_S))
+
+    def does_better(alone: Floats) -> bool:
+        compared = ratio(alone, beside.held_out, blocks)
+        return compared.value < RULES.doubtful_names and compared.below
+
+    return remainder(drives, found.declared.theta, does_better).used

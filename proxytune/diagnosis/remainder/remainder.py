@@ -1,6 +1,6 @@
 """The learnt remainder: what no named effect explains, as curves over features; used only if shown to help."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -46,12 +46,14 @@ class Remainder:
     held_out: Floats = field(default_factory=lambda: np.empty(0))
 
 
-def remainder(drives: Drives, theta: Theta) -> Remainder:
+def remainder(drives: Drives, theta: Theta, promises: Callable[[Floats], bool] = lambda _: True) -> Remainder:
     """Fit what a model leaves over of its windows, and say whether that helps.
 
     Args:
         drives: What the model was fitted to.
         theta: The model.
+        promises: Whether curves with these held-out squares (M,) are of use to who asks; if not, they are not guarded
+            and not used.
     """
     windows = cut(drives, FITTED_S)
     blocks = len(np.unique(drives.block[windows.begin]))
@@ -61,10 +63,12 @@ def remainder(drives: Drives, theta: Theta) -> Remainder:
     whole, folds = _fit_curves(drives, theta)
     if not whole.gains:
         return Remainder(held_out=before)
-    guard = _guard(drives, theta, folds)
+    after = _cross_validate(drives, theta, folds, windows)
+    if not promises(after):
+        return Remainder(held_out=after)
+    guard = _guard(drives, theta, folds, {FITTED_S: (before, after)})
     total = sum(whole.gains.values())
     share = {GROUPS[group].title: gain / total for group, gain in whole.gains.items()}
-    after = _cross_validate(drives, theta, folds, windows)
     return Remainder(whole.theta, share, guard, _helps(guard), after)
 
 
@@ -118,14 +122,19 @@ def _theta(offer: Learnt, choice: Choice) -> dict[str, float]:
     return learnt_theta(Learnt(offer.seen, curves))
 
 
-def _guard(drives: Drives, theta: Theta, folds: list[_CurveFit]) -> dict[float, Ratio]:
+def _guard(
+    drives: Drives, theta: Theta, folds: list[_CurveFit], known: Mapping[float, tuple[Floats, Floats]]
+) -> dict[float, Ratio]:
+    """The ratios of held-out errors with and without curves, by horizon; squares of some are known already."""
     found = {}
     for horizon_s in HORIZONS_S:
         windows = cut(drives, horizon_s)
         blocks = blocks_of(drives, windows)
         if len(np.unique(blocks)) >= RULES.remainder_parts:
-            before = pose_errors(drives, theta, windows)[:, 0] ** 2
-            after = _cross_validate(drives, theta, folds, windows)
+            before, after = known.get(horizon_s) or (
+                pose_errors(drives, theta, windows)[:, 0] ** 2,
+                _cross_validate(drives, theta, folds, windows),
+            )
             found[horizon_s] = ratio(after, before, blocks)
     return found
 

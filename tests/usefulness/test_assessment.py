@@ -42,13 +42,13 @@ def test_every_measure_has_an_interval_around_it():
 
 
 def test_episodes_are_drawn_once_for_all_intervals_though_one_is_missing(monkeypatch):
-    sides, drawn, draw = {"proxy": table(1), "target": table(2), "metrics": M}, [], resampling.bootstrap_means
+    sides, drawn, draw = {"proxy": table(1), "target": table(2), "metrics": M}, [], resampling._means_of_draws
     sides["target"].values[3, 2] = np.nan
-    monkeypatch.setattr(resampling, "bootstrap_means", lambda *given, **how: drawn.append(how) or draw(*given, **how))
+    monkeypatch.setattr(resampling, "_means_of_draws", lambda one, *rest: drawn.append(one) or draw(one, *rest))
     found = assess(**sides, resamples=200, seed=5)
-    assert drawn == [{"resamples": 200, "seed": 5}]
+    assert drawn == [sides["target"], sides["proxy"]]
+    assert found.intervals is not None
     assert found.prpv_interval == bootstrap_prpv(**sides, resamples=200, seed=5)
-    assert found.prpv_interval.resamples == 200
 
 
 def test_a_constant_metric_has_no_interval_and_a_note():

@@ -8,10 +8,9 @@ from proxytune.diagnosis.horizon.floor import pose_noise
 from proxytune.diagnosis.horizon.polish import HORIZONS_S, Polish, polish_fit
 from proxytune.diagnosis.horizon_error import HorizonError, KeptAside, horizon_error
 from proxytune.diagnosis.manoeuvres import next_manoeuvre
-from proxytune.diagnosis.measured.clocks import Clocks, put_in_step, read_clocks
-from proxytune.diagnosis.measured.drives import gather
+from proxytune.diagnosis.measured.clocks import read_clocks
 from proxytune.diagnosis.measured.rests import cut_out_long_rests
-from proxytune.diagnosis.measured.split import Parts, all_drives, split
+from proxytune.diagnosis.measured.split import Parts, all_drives, cut_into_blocks, split
 from proxytune.diagnosis.model.fitting import Fit
 from proxytune.diagnosis.model.intervals import intervals
 from proxytune.diagnosis.model.plausible import check_motion, check_units
@@ -76,7 +75,8 @@ def diagnose(
     report("learning what no named effect explains")
     learning = learn(found, parts.tested, HORIZONS_S)
     report("testing on drives kept aside")
-    tested = _gather_tested(test or log, parts, found, clocks[-1])
+    whole = all_drives(test or log, robot, clocks[-1])
+    tested = KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
     errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h, learning.theta)) is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
@@ -99,7 +99,7 @@ def diagnose(
         parts=parts,
         found=found,
         clocks=clocks,
-        unlike=two_robots(all_drives(log, robot, own), found.model),
+        unlike=two_robots(cut_into_blocks(whole if test is None else all_drives(log, robot, own)), found.model),
         drive_names=tuple(episode.name for episode in log.episodes),
         learning=learning,
     )
@@ -150,11 +150,6 @@ def _polish_models(found: Findings) -> tuple[Findings, tuple[Polish | None, Poli
 def _list_invisible(found: Findings, declared: Iterable[str]) -> tuple[str, ...]:
     seen = {effect.effect for effect in (*found.adopted, *(dropped.effect for dropped in found.immaterial))}
     return invisible_effects(found.model, set(map(effect_of, declared)) | seen)
-
-
-def _gather_tested(log: Log, parts: Parts, found: Findings, clocks: Clocks) -> KeptAside:
-    whole = put_in_step(gather(log, parts.tested.robot, log.episodes), clocks, range(len(log.episodes)))
-    return KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
 
 
 def _give_verdict(found: Findings, learning: Learning, error: HorizonError) -> str:

@@ -1,17 +1,19 @@
 """Rows of samples.csv, commands.csv and frames.csv: read strictly, every complaint with file, line and column."""
 
-import csv
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from proxytune.errors import LogError
+from proxytune.logs.cells import Block, read_cells
 from proxytune.logs.log import Floats, Whole
-from proxytune.settings import nearest, read_text
+from proxytune.settings import nearest
 
 LARGEST = 1e50
 """Beyond this the square of a number's square is not finite."""
@@ -81,23 +83,19 @@ def read_rows(path: Path, layout: Layout) -> Rows:
     Raises:
         LogError: If it is not such a table.
     """
-    lines, cells = _read_cells(path)
-    header = cells[0]
+    header, blocks = read_cells(path)
     _check_header(path, header, layout)
-    if len(cells) == 1:
+    parts = [_part(path, header, layout, block) for block in blocks]
+    if not parts:
         raise LogError(f"{path}: has no rows; add one per sample")
-    for line, row in zip(lines, cells, strict=True):
-        if len(row) != len(header):
-            counts = f"has {len(row)} cells, but the first line names {len(header)} columns"
-            raise LogError(f"{path}: line {line}: {counts}")
-    table = pd.DataFrame(cells[1:], columns=header, dtype=str)
-    labels = table["episode"].str.strip()
-    changes = np.flatnonzero(labels.ne(labels.shift()).to_numpy())
-    names = tuple(str(label) for label in labels.iloc[changes])
-    rows = Rows(path, np.array(lines[1:]), names, changes, {})
+    labels = np.concatenate([part.labels for part in parts])
+    changes = np.flatnonzero(np.append(True, labels[1:] != labels[:-1]))
+    names = tuple(str(label) for label in labels[changes])
+    rows = Rows(path, np.concatenate([part.lines for part in parts]), names, changes, {})
     _check_episodes(rows, layout.fewest)
-    measures = [name for name in header if name != "episode"]
-    rows = replace(rows, values={name: _numbers(rows, table[name], layout.may_lack) for name in measures})
+    _check_numbers(path, parts, layout)
+    values = {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values}
+    rows = replace(rows, values=values)
     _check_times(rows)
     return rows
 
@@ -113,22 +111,38 @@ def check_known_episodes(rows: Rows, names: Sequence[str]) -> None:
             raise rows.error(int(first), "episode", f"'{name}' is not in samples.csv; add its poses, or leave it out")
 
 
-def _read_cells(path: Path) -> tuple[list[int], list[list[str]]]:
-    """Every line that is not blank, with its number; the first has the columns."""
-    try:
-        text = read_text(path, "utf-8-sig")
-        rows = list(csv.reader(text.splitlines(), strict=True))
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file; a log has its samples beside log.toml") from None
-    except OSError as problem:
-        raise LogError(f"{path}: cannot be read ({problem.strerror})") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise LogError(f"{path}: is not a CSV file; save it as comma-separated text (UTF-8)") from None
-    lines = [line for line, row in enumerate(rows, start=1) if any(row)]
-    if not lines:
-        raise LogError(f"{path}: is empty; its first line must name the columns, episode and time first")
-    header = [cell.strip() for cell in rows[lines[0] - 1]]
-    return lines, [header, *(rows[line - 1] for line in lines[1:])]
+class _Part(NamedTuple):
+    """Some of the rows.
+
+    Attributes:
+        lines: Line of each row in the file (N,).
+        labels: Its episode (N,), texts.
+        values: Columns by name (N,), NaN where a cell is empty or no number.
+        wrong: Line and text of the first cell of a column that is neither a number nor may be empty.
+    """
+
+    lines: Whole
+    labels: NDArray[np.object_]
+    values: Mapping[str, Floats]
+    wrong: Mapping[str, tuple[int, str]]
+
+
+def _part(path: Path, header: Sequence[str], layout: Layout, block: Block) -> _Part:
+    for line, row in zip(*block, strict=True):
+        if len(row) != len(header):
+            counts = f"has {len(row)} cells, but the first line names {len(header)} columns"
+            raise LogError(f"{path}: line {line}: {counts}")
+    columns = dict(zip(header, zip(*block.cells, strict=True), strict=True))
+    # One text for all rows of an episode, not one for each.
+    labels = np.array([sys.intern(cell.strip()) for cell in columns.pop("episode")], dtype=object)
+    texts = {name: np.array([cell.strip() for cell in cells], dtype=object) for name, cells in columns.items()}
+    values = {name: pd.to_numeric(own, errors="coerce").astype(np.float64) for name, own in texts.items()}
+    odd = {name: ~(np.abs(own) < LARGEST) for name, own in values.items()}
+    for name in set(layout.may_lack) & set(odd):
+        odd[name] &= texts[name] != ""
+    firsts = {name: int(np.argmax(own)) for name, own in odd.items() if own.any()}
+    wrong = {name: (block.lines[row], str(texts[name][row])) for name, row in firsts.items()}
+    return _Part(np.array(block.lines), labels, values, wrong)
 
 
 def _check_header(path: Path, header: Sequence[str], layout: Layout) -> None:
@@ -161,19 +175,14 @@ def _check_episodes(samples: Rows, fewest: int) -> None:
         raise samples.error(int(samples.firsts[single]), "episode", problem)
 
 
-def _numbers(samples: Rows, cells: pd.Series, may_lack_any: Sequence[str]) -> Floats:
-    """A column's values, NaN where a pose's or wheel's cell is empty."""
-    texts = cells.str.strip()
-    values = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
-    may_lack = cells.name in may_lack_any
-    wrong = ~(np.abs(values) < LARGEST)
-    if may_lack:
-        wrong &= (texts != "").to_numpy()
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        rule = "must be a finite number, or empty where nothing was measured" if may_lack else "must be a finite number"
-        raise samples.error(row, str(cells.name), f"{rule}, got '{texts.iloc[row]}'")
-    return values
+def _check_numbers(path: Path, parts: Sequence[_Part], layout: Layout) -> None:
+    """Refuse a cell that is no number, the first of the first column that has any."""
+    for name in parts[0].values:
+        wrong = next((part.wrong[name] for part in parts if name in part.wrong), None)
+        if wrong:
+            allowed = ", or empty where nothing was measured" if name in layout.may_lack else ""
+            line, text = wrong
+            raise LogError(f"{path}: line {line}, column '{name}': must be a finite number{allowed}, got '{text}'")
 
 
 def _check_times(rows: Rows) -> None:

@@ -14,7 +14,7 @@ from proxytune.usefulness.noise import NoiseFloor, noise_floor
 from proxytune.usefulness.ppv import Ppv, ppv
 from proxytune.usefulness.prpv import Prpv, prpv
 from proxytune.usefulness.rates import SuccessRates, success_rates
-from proxytune.usefulness.resampling import PrpvInterval, bootstrap_prpv
+from proxytune.usefulness.resampling import PrpvInterval, means_if_repeated, prpv_interval
 
 FEW_EPISODES = 5
 ENOUGH_EPISODES = 10
@@ -117,15 +117,16 @@ def assess(
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
     one, other = inputs.proxy, inputs.target
     error = ppv(proxy=one, target=other, metrics=metrics, beta=beta)
+    means = means_if_repeated(inputs, resamples=resamples, seed=seed)
     return Assessment(
         inputs=inputs,
         prpv=prpv(proxy=one, target=other, metrics=metrics),
-        prpv_interval=bootstrap_prpv(proxy=one, target=other, metrics=metrics, resamples=resamples, seed=seed),
+        prpv_interval=prpv_interval(inputs, means),
         ppv=error,
         srcc=srcc(proxy=one, target=other, metrics=metrics),
         kendall_tau=kendall_tau(proxy=one, target=other, metrics=metrics),
         mmrv=mmrv(proxy=one, target=other, metrics=metrics),
-        intervals=intervals(inputs=inputs, error=error, resamples=resamples, seed=seed),
+        intervals=intervals(inputs=inputs, error=error, means=means),
         noise_floor=floor or noise_floor(target=other, metrics=metrics, seed=seed),
         chance=chance(proxy=one, target=other, metrics=metrics, permutations=resamples, seed=seed),
         seed=seed,

@@ -10,7 +10,7 @@ from proxytune.usefulness.comparison import Comparison
 from proxytune.usefulness.correlation import kendall_of_means, pearson_of_means
 from proxytune.usefulness.mmrv import mmrv_of_means
 from proxytune.usefulness.ppv import Ppv, ppv_of_means
-from proxytune.usefulness.resampling import bootstrap_means, in_blocks, interval, why_not_repeated
+from proxytune.usefulness.resampling import Means, in_blocks, interval
 
 Ends = tuple[float, float]
 UNDEFINED_SHARE = 0.05
@@ -27,18 +27,16 @@ class Intervals:
     mmrv: Mapping[str, Ends | None]
 
 
-def intervals(*, inputs: Comparison, error: Ppv, resamples: int, seed: int) -> Intervals | None:
-    """Resample episodes for every measure at once; None where episodes are not repeated.
+def intervals(*, inputs: Comparison, error: Ppv, means: Means | None) -> Intervals | None:
+    """The interval of every measure at once; None where episodes are not repeated.
 
     Args:
         inputs: What is compared.
         error: PPV, with the weights that it has.
-        resamples: How many to draw.
-        seed: Seed of the resampling.
+        means: Mean scores of resampled episodes, None where there are none.
     """
-    if why_not_repeated(inputs):
+    if means is None:
         return None
-    means = bootstrap_means(inputs, resamples=resamples, seed=seed)
     weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])
     each = inputs.target.means.size
     return Intervals(

@@ -133,7 +133,8 @@ def split_halves(driven: Choice, rng: np.random.Generator, splits: int) -> tuple
         splits: How many times.
     """
     order = np.where(driven[:, None, :], rng.random((len(driven), splits, driven.shape[1])), np.inf)
-    first = order.argsort(axis=-1).argsort(axis=-1) < (driven.sum(axis=1) // 2)[:, None, None]
+    half = (driven.sum(axis=1) // 2)[:, None, None]
+    first = order < np.take_along_axis(np.sort(order, axis=-1), half, axis=-1)
     return first, driven[:, None, :] & ~first
 
 

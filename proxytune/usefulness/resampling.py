@@ -15,6 +15,9 @@ CONFIDENCE = 0.95
 BLOCK = 4_000_000
 """Most numbers held at once by a measure over many resamples."""
 
+Means = tuple[Array, Array]
+"""Mean scores of resampled episodes, in the proxy and on the target, each of shape (resamples, agents, metrics)."""
+
 
 @dataclass(frozen=True)
 class PrpvInterval:
@@ -62,7 +65,12 @@ def too_few(table: ScoreTable, name: str) -> str:
     return f"{who} has one episode {name}, which says nothing about noise; score at least two"
 
 
-def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> tuple[Array, Array]:
+def means_if_repeated(inputs: Comparison, *, resamples: int, seed: int) -> Means | None:
+    """Mean scores of resampled episodes, None where episodes are not repeated."""
+    return None if why_not_repeated(inputs) else bootstrap_means(inputs, resamples=resamples, seed=seed)
+
+
+def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:
     """Mean scores of resampled episodes, in the proxy and on the target.
 
     Where all agents drove the same episodes, all get the same resample of their starts, each with all its repeats;
@@ -165,11 +173,14 @@ def bootstrap_prpv(
         ScoresError: As in prpv.
     """
     inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    return prpv_interval(inputs, means_if_repeated(inputs, resamples=resamples, seed=seed))
+
+
+def prpv_interval(inputs: Comparison, means: Means | None) -> PrpvInterval:
+    """The interval of PRPV from mean scores of resampled episodes; without one where there are none."""
     value = round(float(prpv_of_means(*inputs.means, inputs.metrics)))
-    reason = why_not_repeated(inputs)
-    if reason:
-        return PrpvInterval(value, None, None, None, 0, inputs, reason)
-    means = bootstrap_means(inputs, resamples=resamples, seed=seed)
+    if means is None:
+        return PrpvInterval(value, None, None, None, 0, inputs, why_not_repeated(inputs))
     values = in_blocks(lambda p, t: prpv_of_means(p, t, inputs.metrics), *means)
     low, high = interval(values)
-    return PrpvInterval(value, float(values.mean()), min(low, value), max(high, value), resamples, inputs)
+    return PrpvInterval(value, float(values.mean()), min(low, value), max(high, value), len(values), inputs)

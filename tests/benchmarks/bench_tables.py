@@ -1,4 +1,7 @@
-"""What large tables cost `score` in all: `python tests/benchmarks/bench_tables.py AGENTS EPISODES [PROXIES]`."""
+"""What large tables cost `score` in all: `python tests/benchmarks/bench_tables.py AGENTS EPISODES [PROXIES [MISSING]]`.
+
+MISSING is of how many files one episode is missing, the target's first: agents are then resampled each by itself.
+"""
 
 import json
 import resource
@@ -29,7 +32,7 @@ def write_scores(path: Path, skills: np.ndarray, episodes: int, random: np.rando
 
 def main() -> None:
     """Score generated tables as the command does, and print processor time and peak memory."""
-    agents, episodes, proxies = (*map(int, sys.argv[1:]), 1)[:3]
+    agents, episodes, proxies, missing = (*map(int, sys.argv[1:]), *(1, 0)[len(sys.argv) - 3 :])
     random = np.random.default_rng(0)
     skills = random.standard_normal((agents, len(METRICS)))
     with tempfile.TemporaryDirectory() as folder:
@@ -37,6 +40,8 @@ def main() -> None:
         for place, path in enumerate(files):
             shift = 0.3 * random.standard_normal(skills.shape) if place else 0.0
             write_scores(path, skills + shift, episodes, random)
+            if place < missing:
+                path.write_text(path.read_text().rpartition("A")[0])
         target, *others = map(str, files)
         sides = ["--target", target, *(word for name in others for word in ("--proxy", name))]
         begin, out = time.process_time(), StringIO()
@@ -46,7 +51,8 @@ def main() -> None:
     document = json.loads(out.getvalue())
     found = [one["prpv"] for one in document.get("proxies", [document])]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    print(f"{agents} agents × {episodes} episodes, {proxies} proxies: {spent:.1f} s, {peak:.0f} MiB; PRPV {found[:3]}")
+    compared = f"{agents} agents × {episodes} episodes, {proxies} proxies, {missing} tables incomplete"
+    print(f"{compared}: {spent:.1f} s, {peak:.0f} MiB; PRPV {found[:3]}")
 
 
 if __name__ == "__main__":

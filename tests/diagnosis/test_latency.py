@@ -10,7 +10,14 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import drives_of, planted_log, with_poses
 
-from proxytune.diagnosis.measured.latency import likeliest_latency, measured_speeds, reaction, reaction_at
+from proxytune.diagnosis.measured import latency
+from proxytune.diagnosis.measured.latency import (
+    likeliest_latency,
+    measured_speeds,
+    reaction,
+    reaction_at,
+    squares_by_latency,
+)
 
 
 def answered(theta, change=lambda poses: poses):
@@ -67,3 +74,19 @@ def test_squares_that_fall_to_the_end_of_what_was_tried_tell_none():
     latencies = np.arange(-4, 5) * 0.5
     for end in (-2.0, 2.0, 7.0):
         assert likeliest_latency((latencies - end) ** 2 * np.ones((6, 1)), latencies).deviation == np.inf
+
+
+def test_a_few_drives_at_a_time_give_the_same_latency_to_the_bit(monkeypatch):
+    drives = drives_of(planted_log({"delay": 0.1, "motor_lag.time_constant": 0.3}, episodes=5, seconds=20.0))
+    few = drives.only(drives.episode != 2)
+    speeds, latencies, ends = measured_speeds(few), np.arange(-10, 11) * 0.05, np.full(5, 1200)
+
+    def measured():
+        best = reaction(few, speeds, 1.0)
+        return best, squares_by_latency(few, speeds, best, latencies, ends)
+
+    whole, squares = measured()
+    monkeypatch.setattr(latency, "AT_ONCE", 2 * few.duties.shape[1])
+    parts, again = measured()
+    for one, other in zip((*whole, squares), (*parts, again), strict=True):
+        assert np.array_equal(one, other)

@@ -11,6 +11,7 @@ sys.path.append(str(Path(__file__).parent))
 
 from planted import TRUTH, drives_of, planted_drives, planted_log
 
+from proxytune.diagnosis.horizon import windows as windows_module
 from proxytune.diagnosis.horizon.windows import SHORTEST, cut, pose_errors, ratio, rmse, select_windows
 
 
@@ -138,3 +139,23 @@ def test_a_ratio_of_few_blocks_or_of_errors_that_are_the_same_shows_nothing():
     assert not ratio(squares, squares, blocks).above
     assert not ratio(np.append(squares, 0.0), np.append(squares, 0.0), np.arange(9)).below
     assert not ratio(np.array([4.0, 9.0, 1.0]), np.array([1.0, 1.0, 0.9]), np.arange(3)).above
+
+
+def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(drives, monkeypatch):
+    theta = {**TRUTH, "dead_band.width": 0.1, "floor_slope.y": 0.02, "motor_lag.time_constant": 0.3}
+    gone = drives.only((drives.episode != 3) & (np.arange(len(drives.episode)) != 150))
+    windows = cut(gone, 2.0)
+    every_other = select_windows(windows, np.arange(len(windows.begin)) % 2 == 0)
+    whole = pose_errors(gone, theta, every_other)
+    monkeypatch.setattr(windows_module, "AT_ONCE", gone.duties.shape[1])
+    assert np.array_equal(pose_errors(gone, theta, every_other), whole)
+
+
+def test_no_more_episodes_are_replayed_at_a_time_than_memory_is_to_take(drives, monkeypatch):
+    sizes, replay = [], windows_module.window_paths
+    monkeypatch.setattr(
+        windows_module, "window_paths", lambda some, *rest: sizes.append(len(some.duties)) or replay(some, *rest)
+    )
+    monkeypatch.setattr(windows_module, "AT_ONCE", 2 * drives.duties.shape[1])
+    pose_errors(drives, TRUTH, cut(drives, 2.0))
+    assert sizes == [2, 2, 2]

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import assess, floor_of_repeats, kendall_tau, mmrv, ppv, prpv, srcc
+from proxytune.usefulness import (
+    assess,
+    bootstrap_prpv,
+    floor_of_repeats,
+    kendall_tau,
+    mmrv,
+    ppv,
+    prpv,
+    resampling,
+    srcc,
+)
 
 M = (Metric("m"), Metric("n", "min"))
 
@@ -29,6 +39,16 @@ def test_every_measure_has_an_interval_around_it():
     for name in ("srcc", "kendall_tau", "mmrv"):
         for metric, (low, high) in getattr(found.intervals, name).items():
             assert low <= getattr(found, name).value[metric] <= high, (name, metric)
+
+
+def test_episodes_are_drawn_once_for_all_intervals_though_one_is_missing(monkeypatch):
+    sides, drawn, draw = {"proxy": table(1), "target": table(2), "metrics": M}, [], resampling._means_of_draws
+    sides["target"].values[3, 2] = np.nan
+    monkeypatch.setattr(resampling, "_means_of_draws", lambda one, *rest: drawn.append(one) or draw(one, *rest))
+    found = assess(**sides, resamples=200, seed=5)
+    assert drawn == [sides["target"], sides["proxy"]]
+    assert found.intervals is not None
+    assert found.prpv_interval == bootstrap_prpv(**sides, resamples=200, seed=5)
 
 
 def test_a_constant_metric_has_no_interval_and_a_note():

@@ -1,5 +1,6 @@
 """Windows of prediction: the errors of a model that starts each window from the measured pose."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,10 @@ from proxytune.space import Theta
 
 SHORTEST = 0.9
 """Windows that cover less of the horizon are left out: poses seldom end exactly at it, but a stub is no window."""
+
+
+AT_ONCE = 300_000
+"""About so many ticks of episodes are replayed together: memory is not to grow with the number of drives."""
 
 
 class Windows(NamedTuple):
@@ -62,7 +67,26 @@ def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
 
 def predicted_motion(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """The model's motion since each window's beginning (M, 3): [m], [m], [rad]."""
+    return np.concatenate([_replayed(some, theta, own) for some, own in _batches(drives, windows)])
+
+
+def _replayed(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     return motion_in(drives, window_paths(drives, theta, windows.begin, length_of(drives, windows)), windows)
+
+
+def _batches(drives: Drives, windows: Windows) -> Iterator[tuple[Drives, Windows]]:
+    """Windows of a few episodes at a time, with the drives that they are cut from; of few drives all at once."""
+    episodes, ticks = drives.duties.shape[:2]
+    count = max(1, AT_ONCE // ticks)
+    if count >= episodes:
+        yield drives, windows
+        return
+    for first in range(0, episodes, count):
+        some = np.arange(first, min(first + count, episodes))
+        own = select_windows(windows, np.isin(drives.episode[windows.begin], some))
+        if len(own.begin):
+            before = int(np.searchsorted(drives.episode, first))
+            yield drives.some(some), Windows(own.begin - before, own.window, own.increment - before)
 
 
 def length_of(drives: Drives, windows: Windows) -> int:

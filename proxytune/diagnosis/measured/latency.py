@@ -5,6 +5,7 @@ constant. A lag only ever makes motion later and rounder, a shift alone moves it
 what is left of the latency is the pure one. Delay and the offset between two clocks are both pure latency: one number.
 """
 
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,9 @@ STEP_S = 0.05
 ROUGH_STEP_S = 0.1
 THINNED = 2
 """The step of the first look, which one span in so many is enough for."""
+
+AT_ONCE = 300_000
+"""About so many ticks go through the lag together: memory is not to grow with the number of drives."""
 
 
 class Speeds(NamedTuple):
@@ -72,6 +76,10 @@ class Latency(NamedTuple):
     deviation: float
 
 
+Ends = tuple[tuple[Whole, Whole], tuple[Whole, Whole]]
+"""Episode and tick at which spans begin, and at which they end."""
+
+
 def measured_speeds(drives: Drives) -> Speeds:
     """Speeds over spans of SPAN_S one after another, each within an unbroken run of poses."""
     count = max(1, round(SPAN_S * drives.tick_hz / float(np.median(drives.last - drives.first))))
@@ -91,15 +99,13 @@ def reaction(drives: Drives, speeds: Speeds, reach_s: float) -> Reaction:
     """The best reaction with a latency of at most `reach_s` either way: a rough look at all, then a close one."""
     commanded = _CommandedSpeeds(drives, reach_s + 1.0)
     few = Speeds(*(part[::THINNED] for part in speeds))
-    looks = [
-        (commanded.misfit(few, float(latency), constant), float(latency), constant)
-        for constant in TIME_CONSTANTS_S
-        for latency in np.arange(-reach_s, reach_s + 1e-9, ROUGH_STEP_S)
-    ]
-    _, latency, constant = min(looks)
+    latencies = np.arange(-reach_s, reach_s + 1e-9, ROUGH_STEP_S).tolist()
+    looks = [look for constant in TIME_CONSTANTS_S for look in commanded.reactions(few, latencies, constant)]
+    _, latency, constant = min((_misfit(look), look.latency_s, look.time_constant_s) for look in looks)
 
     def left(point: Floats) -> float:
-        return commanded.misfit(speeds, float(np.clip(point[0], -reach_s, reach_s)), _constant(point[1]))
+        latency_s = float(np.clip(point[0], -reach_s, reach_s))
+        return _misfit(commanded.reaction(speeds, latency_s, _constant(point[1])))
 
     root = float(np.sqrt(constant))
     corners = np.array([(latency, root), (latency + 0.06, root), (latency, root + 0.15)])
@@ -117,7 +123,7 @@ def reaction_at(drives: Drives, speeds: Speeds, latency_s: float) -> Reaction:
     commanded = _CommandedSpeeds(drives, abs(latency_s))
     top = float(np.sqrt(LONGEST_TIME_CONSTANT_S))
     found = minimize_scalar(
-        lambda root: commanded.misfit(speeds, latency_s, root**2),
+        lambda root: _misfit(commanded.reaction(speeds, latency_s, root**2)),
         bounds=(0.0, top),
         method="bounded",
         options={"xatol": 5e-3},
@@ -131,51 +137,66 @@ def _constant(root: float) -> float:
 
 
 class _CommandedSpeeds:
-    """The speeds that commands ask for, at any latency and motor lag; the motion of the last lag is kept."""
+    """The speeds that commands ask for, at any latency and motor lag."""
 
     def __init__(self, drives: Drives, reach_s: float) -> None:
         self.drives = drives
         self.pad = int(np.ceil(reach_s * drives.tick_hz)) + 2
-        before = np.repeat(drives.rest[:, None], self.pad, axis=1)
-        after = np.repeat(drives.duties[:, -1:], self.pad, axis=1)
-        self.duties = np.concatenate((before, drives.duties, after), axis=1)
-        self.gone: dict[float, Floats] = {}
 
-    def speeds(self, speeds: Speeds, latency_s: float, constant_s: float) -> Floats:
-        """Mean speeds over the same spans (M, 2), so much later, of motors with this time constant."""
-        gone = self._gone(constant_s)
-        late = self.pad - latency_s * self.drives.tick_hz
-        shift, part = int(np.floor(late)), late - np.floor(late)
-        ends = [(1.0 - part) * gone[e, t + shift] + part * gone[e, t + shift + 1] for e, t in _ends(speeds)]
-        return np.asarray((ends[1] - ends[0]) / (speeds.last - speeds.first)[:, None])
+    def speeds(self, speeds: Speeds, latencies_s: Sequence[float], constant_s: float) -> Floats:
+        """Mean speeds over the same spans (latencies, M, 2), so much later, of motors with this time constant."""
+        asked = np.empty((len(latencies_s), len(speeds.first), 2))
+        for own, ends, gone in self._batches(speeds, constant_s):
+            for number, latency_s in enumerate(latencies_s):
+                late = self.pad - latency_s * self.drives.tick_hz
+                shift, part = int(np.floor(late)), late - np.floor(late)
+                first, last = ((1.0 - part) * gone[e, t + shift] + part * gone[e, t + shift + 1] for e, t in ends)
+                asked[number, own] = (last - first) / (speeds.last - speeds.first)[own, None]
+        return asked
 
-    def _gone(self, constant_s: float) -> Floats:
+    def _batches(self, speeds: Speeds, constant_s: float) -> Iterator[tuple[slice, Ends, Floats]]:
+        """Spans of a few episodes, where these begin and end, and how far their commands move the robot."""
+        duties = self.drives.duties
+        count = max(1, AT_ONCE // duties.shape[1])
+        for begin in range(0, len(duties), count):
+            own = slice(*np.searchsorted(speeds.episode, (begin, begin + count)))
+            if own.start < own.stop:
+                episode = speeds.episode[own] - begin
+                ends = (episode, speeds.first[own]), (episode, speeds.last[own])
+                yield own, ends, self._gone(slice(begin, begin + count), constant_s)
+
+    def _gone(self, episodes: slice, constant_s: float) -> Floats:
         """How far the commands would have moved the robot by each tick: way [m], turn [rad], times ticks a second."""
-        if constant_s not in self.gone:
-            kept = float(np.exp(-1.0 / (constant_s * self.drives.tick_hz))) if constant_s > 1e-4 else 0.0
-            wheels, _ = lfilter([1.0 - kept], [1.0, -kept], self.duties, axis=1, zi=kept * self.duties[:, :1])
-            figures = self.drives.robot.figures
-            yaw = (wheels[..., 1] - wheels[..., 0]) / figures["effective_baseline"]
-            twists = figures["full_speed"] * np.stack((wheels.mean(axis=-1), yaw), axis=-1)
-            gone = np.concatenate((np.zeros_like(twists[:, :1]), np.cumsum(twists, axis=1)), axis=1)
-            self.gone = {constant_s: gone}
-        return self.gone[constant_s]
+        given, figures = self.drives.duties[episodes], self.drives.robot.figures
+        before = np.repeat(self.drives.rest[episodes, None], self.pad, axis=1)
+        duties = np.concatenate((before, given, np.repeat(given[:, -1:], self.pad, axis=1)), axis=1)
+        kept = float(np.exp(-1.0 / (constant_s * self.drives.tick_hz))) if constant_s > 1e-4 else 0.0
+        wheels, _ = lfilter([1.0 - kept], [1.0, -kept], duties, axis=1, zi=kept * duties[:, :1])
+        yaw = (wheels[..., 1] - wheels[..., 0]) / figures["effective_baseline"]
+        twists = figures["full_speed"] * np.stack((wheels.mean(axis=-1), yaw), axis=-1)
+        return np.concatenate((np.zeros_like(twists[:, :1]), np.cumsum(twists, axis=1)), axis=1)
 
-    def misfit(self, speeds: Speeds, latency_s: float, constant_s: float) -> float:
-        """What the best gains leave of the speeds, as a share of their variances."""
-        return float(self.reaction(speeds, latency_s, constant_s).squares.mean())
+    def reactions(self, speeds: Speeds, latencies_s: Sequence[float], constant_s: float) -> list[Reaction]:
+        """The reaction with the best gains at each latency."""
+        asked = zip(latencies_s, self.speeds(speeds, latencies_s, constant_s), strict=True)
+        return [_with_best_gains(speeds, one, latency_s, constant_s) for latency_s, one in asked]
 
     def reaction(self, speeds: Speeds, latency_s: float, constant_s: float) -> Reaction:
-        """The reaction with the best gains."""
-        asked = self.speeds(speeds, latency_s, constant_s)
-        gains = np.linalg.pinv(asked.T @ asked, hermitian=True) @ (asked.T @ speeds.values)
-        rest = speeds.values - asked @ gains
-        size = speeds.values.std(axis=0) + 1e-9
-        return Reaction(latency_s, constant_s, gains, rest.std(axis=0) + 1e-9, ((rest / size) ** 2).sum(axis=1))
+        """The reaction with the best gains at one latency."""
+        (found,) = self.reactions(speeds, (latency_s,), constant_s)
+        return found
 
 
-def _ends(speeds: Speeds) -> tuple[tuple[Whole, Whole], tuple[Whole, Whole]]:
-    return (speeds.episode, speeds.first), (speeds.episode, speeds.last)
+def _with_best_gains(speeds: Speeds, asked: Floats, latency_s: float, constant_s: float) -> Reaction:
+    gains = np.linalg.pinv(asked.T @ asked, hermitian=True) @ (asked.T @ speeds.values)
+    rest = speeds.values - asked @ gains
+    size = speeds.values.std(axis=0) + 1e-9
+    return Reaction(latency_s, constant_s, gains, rest.std(axis=0) + 1e-9, ((rest / size) ** 2).sum(axis=1))
+
+
+def _misfit(found: Reaction) -> float:
+    """What a reaction leaves of the speeds, as a share of their variances."""
+    return float(found.squares.mean())
 
 
 def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencies: Floats, ends: Whole) -> Floats:
@@ -184,16 +205,17 @@ def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencie
     Where the commands had ended, at tick `ends` (E,), nothing speaks for or against a latency.
     """
     commanded = _CommandedSpeeds(drives, float(np.abs(latencies).max()))
-    usual = _squares(commanded, speeds, robot, robot.latency_s)
+    asked = commanded.speeds(speeds, [robot.latency_s, *latencies.tolist()], robot.time_constant_s)
+    usual = _squares(speeds, robot, asked[0])
     left = np.empty((len(speeds.episode), len(latencies)))
     for number, latency in enumerate(latencies):
         known = speeds.last - latency * drives.tick_hz <= ends[speeds.episode]
-        left[:, number] = np.where(known, _squares(commanded, speeds, robot, float(latency)), usual)
+        left[:, number] = np.where(known, _squares(speeds, robot, asked[number + 1]), usual)
     return left
 
 
-def _squares(commanded: _CommandedSpeeds, speeds: Speeds, robot: Reaction, latency_s: float) -> Floats:
-    rest = (speeds.values - commanded.speeds(speeds, latency_s, robot.time_constant_s) @ robot.gains) / robot.spread
+def _squares(speeds: Speeds, robot: Reaction, asked: Floats) -> Floats:
+    rest = (speeds.values - asked @ robot.gains) / robot.spread
     return np.asarray((rest**2).sum(axis=1))
 
 

@@ -84,8 +84,8 @@ def _choose_some(log: Log, chosen: Sequence[int], most_s: float) -> list[int]:
 
 
 def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:
-    """All of a log's drives, on one clock, in blocks."""
-    return cut_into_blocks(_gather_on_one_clock(log, robot, range(len(log.episodes)), (clocks,)))
+    """All of a log's drives, on one clock, each as one block."""
+    return _gather_on_one_clock(log, robot, range(len(log.episodes)), (clocks,))
 
 
 def _gather_on_one_clock(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:

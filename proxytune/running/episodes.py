@@ -16,7 +16,7 @@ from threadpoolctl import ThreadpoolController
 
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import EpisodeError, RunError
-from proxytune.extensions import describe, one_line, place_of
+from proxytune.extensions import describe, is_users, one_line, place_of
 from proxytune.running.apart import Lost
 from proxytune.running.workers import Rescue, working
 
@@ -98,9 +98,9 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     try:
         with _libraries(len(sys.modules)).limit(limits=1), _seeded(episode.seed):
             metrics = _checked(family, episode, family.run(episode), needed)
-    except KeyboardInterrupt:
-        raise
     except BaseException as problem:
+        if is_users(problem):
+            raise
         _check_machine(episode, problem)
         failure = one_line(_failure(problem))
     return Outcome(episode, metrics, failure, time.perf_counter() - start)

@@ -22,6 +22,10 @@ def _own_error() -> None:
     raise OwnError("of its\nown caf\udce9")
 
 
+def _interrupts() -> None:
+    raise KeyboardInterrupt("of its own")
+
+
 def _short_of_memory() -> None:
     """As a family tells of what its agent has raised."""
     raise EpisodeError("raised MemoryError at 1.20 s: no room") from MemoryError("no room")
@@ -34,6 +38,7 @@ def _short_of_files() -> None:
 ENDINGS = {
     "exits": lambda: sys.exit(0),
     "own error": _own_error,
+    "interrupts": _interrupts,
     "hangs": lambda: time.sleep(600.0),
     "leaves": lambda: os._exit(9),
     "aborts": lambda: os.kill(os.getpid(), signal.SIGABRT),

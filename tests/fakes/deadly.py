@@ -1,5 +1,6 @@
 """The family that is a formula, with agents that end their process, never end, or meet the limits of the machine."""
 
+import ctypes
 import os
 import signal
 import sys
@@ -35,7 +36,19 @@ def _short_of_files() -> None:
     raise EpisodeError("raised OSError at 1.20 s: too many") from OSError(24, "Too many open files")
 
 
+def _hangs_in_c() -> None:
+    """Keep the interpreter's lock, so that no Python runs in any thread."""
+    ctypes.PyDLL(None).sleep(600)
+
+
+def _raises() -> None:
+    raise ValueError("of\nits own")
+
+
 ENDINGS = {
+    "lingers": lambda: time.sleep(1.3),
+    "raises": _raises,
+    "hangs in C": _hangs_in_c,
     "exits": lambda: sys.exit(0),
     "own error": _own_error,
     "interrupts": _interrupts,

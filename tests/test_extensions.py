@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from proxytune.cli.terminal.interruption import signals_as_interruptions
 from proxytune.driving.agents import AGENTS
 from proxytune.driving.agents.loading import load_agent
 from proxytune.errors import ExtensionError
@@ -125,6 +126,16 @@ def test_what_cannot_be_used_is_told_in_one_line(write, case):
     with pytest.raises(ExtensionError, match=expected) as told:
         load(name, kind="agent", beside=folder, needs=("begin", "act", "end"), shipped=dict.fromkeys(SHIPPED))
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["pressed:x", "mine:factory"])
+def test_a_keyboard_interrupt_of_a_users_code_is_told_on_the_command_line_and_else_the_users_own(write, name):
+    folder = write("study", pressed="raise KeyboardInterrupt\n", mine="def factory(): raise KeyboardInterrupt\n")
+    with pytest.raises(KeyboardInterrupt):
+        make(name, kind="agent", beside=folder, needs=("act",))
+    told = r"raised KeyboardInterrupt \((pressed|mine).py, line 1\); correct it"
+    with signals_as_interruptions(), pytest.raises(ExtensionError, match=told):
+        make(name, kind="agent", beside=folder, needs=("act",))
 
 
 def test_a_class_or_factory_is_called_and_what_has_the_members_is_taken_as_it_is(write):

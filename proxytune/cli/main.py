@@ -9,13 +9,13 @@ from pathlib import Path
 import proxytune
 from proxytune.cli.commands import COMMANDS
 from proxytune.cli.examples import epilog
-from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED, Terminated, sigterm_as_interrupt
+from proxytune.cli.terminal.interruption import signals_as_interruptions
 from proxytune.cli.terminal.own_output import print_answer, prints_to_stderr
-from proxytune.cli.terminal.trouble import stopped_by
+from proxytune.cli.terminal.trouble import FAILED, stopped_by
 from proxytune.cli.terminal.trusting import only_trusted_code
 from proxytune.errors import InputError, ProxytuneError
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2
+DONE, BAD_INPUT = 0, 2
 FORMATS = ("png", "svg", "pdf")
 
 
@@ -82,22 +82,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = sys.argv[1:] if argv is None else argv
     arguments = parser(words).parse_args(words, argparse.Namespace(words=words))
+    with signals_as_interruptions():
+        return _run(arguments)
+
+
+def _run(arguments: argparse.Namespace) -> int:
     command = COMMANDS[arguments.command]
     try:
-        trusting = only_trusted_code(getattr(arguments, "trust", False))
-        with sigterm_as_interrupt(), trusting, _figures(getattr(arguments, "format", ())):
+        with only_trusted_code(getattr(arguments, "trust", False)), _figures(getattr(arguments, "format", ())):
             with prints_to_stderr():
                 answer = command.load().run(arguments)
             print_answer(answer, as_json=arguments.json)
     except ProxytuneError as problem:
         _complain(arguments.command, str(problem))
         return BAD_INPUT if isinstance(problem, InputError) else FAILED
-    except (SystemExit, MemoryError, OSError) as problem:
-        _complain(arguments.command, f"{stopped_by(problem)}; {command.left}")
-        return FAILED
-    except KeyboardInterrupt as problem:
-        word, status = ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
-        _complain(arguments.command, f"{word}; {command.left}")
+    except (KeyboardInterrupt, SystemExit, MemoryError, OSError) as problem:
+        what, status = stopped_by(problem)
+        _complain(arguments.command, f"{what}; {command.left}")
         return status
     return DONE
 

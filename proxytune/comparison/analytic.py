@@ -54,6 +54,10 @@ class Objective(Protocol):
         """The noisy score that an engine is told, the same whenever it is asked for; None where the trial fails."""
         ...
 
+    def failure(self, values: Values, seed: int) -> str:
+        """Why there is no score; empty where there is one."""
+        ...
+
     def outcome(self, values: Values, seed: int) -> Values | None:
         """What that score is computed from; None where the trial fails, or a score has no such parts."""
         ...
@@ -108,6 +112,10 @@ class Analytic:
         bits = np.frombuffer(np.array(values, dtype=float).tobytes(), dtype=np.uint32)
         noise = np.random.default_rng([seed, 2, *bits.tolist()]).integers(-NOISE, NOISE, endpoint=True)
         return max(0.0, self.regret(values, seed) + NOISE + float(noise))
+
+    def failure(self, values: Values, seed: int) -> str:
+        """A formula never fails."""
+        return ""
 
     def outcome(self, values: Values, seed: int) -> None:
         """A formula has no parts."""

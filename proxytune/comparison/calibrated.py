@@ -59,6 +59,10 @@ class Calibrated:
         """PRPV of these."""
         return float(_prpv(self.means(values, seed), self.target(seed)))
 
+    def failure(self, values: Values, seed: int) -> str:
+        """None of them fails."""
+        return ""
+
     def outcome(self, values: Values, seed: int) -> Values:
         """Every agent's mean metrics."""
         return tuple(self.means(values, seed).tolist())

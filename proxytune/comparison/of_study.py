@@ -8,7 +8,7 @@ from proxytune.search.goal import Goal
 from proxytune.search.proposer import Values
 from proxytune.seeds import fresh_seed
 from proxytune.space import Space
-from proxytune.study.evaluation import plan
+from proxytune.study.evaluation import Evaluation, plan
 from proxytune.study.knowledge import goal_of
 from proxytune.study.outputs import outputs_of
 from proxytune.study.stages.preflight import run_preflight
@@ -57,7 +57,11 @@ class StudyObjective:
 
     def score(self, values: Values, seed: int) -> float | None:
         """What the study makes small, with the placement noise of this seed; None where an agent has no score."""
-        return self._seeded(seed).evaluate(self.space.theta(values), f"seed {seed}").score
+        return self._evaluate(values, seed).score
+
+    def failure(self, values: Values, seed: int) -> str:
+        """Which agent failed, and why; empty where there is a score."""
+        return self._evaluate(values, seed).failure
 
     def outcome(self, values: Values, seed: int) -> Values | None:
         """Every agent's mean metrics; None where an agent has no episode that worked."""
@@ -87,6 +91,9 @@ class StudyObjective:
 
     def error(self, values: Values, seed: int) -> None:
         """Not known: a study's target is what was measured."""
+
+    def _evaluate(self, values: Values, seed: int) -> Evaluation:
+        return self._seeded(seed).evaluate(self.space.theta(values), f"seed {seed}")
 
     def _above(self, score: float | None) -> float | None:
         return None if score is None else score - self.floor

@@ -69,6 +69,10 @@ class TruthObjective:
         """PRPV, with the placement noise of this seed; None where an agent has no episode that worked."""
         return self._of(seed).score(values, seed)
 
+    def failure(self, values: Values, seed: int) -> str:
+        """Which agent failed, and why; empty where there is a score."""
+        return self._of(seed).failure(values, seed)
+
     def fresh_score(self, values: Values, seed: int) -> float | None:
         """PRPV of episodes that no engine has seen."""
         return self._of(seed).fresh_score(values, seed)

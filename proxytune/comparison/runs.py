@@ -7,6 +7,7 @@ from typing import Any
 
 from proxytune.comparison.analytic import Objective
 from proxytune.comparison.judgement import Judgement, judge, judgement_from
+from proxytune.errors import RunError
 from proxytune.search.engines.engine import Engine
 from proxytune.search.engines.registry import make_proposer
 from proxytune.search.loop import Propose, Search
@@ -56,15 +57,20 @@ def run_engine(objective: Objective, key: RunKey, engine: Engine) -> Run:
 
     Raises:
         InputError: If there is no such engine, or it needs a library that is not installed.
-        RunError: If no trial has a score.
+        RunError: If no trial has a score, with why the first has none.
     """
     learns = engine.learns_from == "outputs"
     goal = objective.goal(key.seed) if learns else None
     proposer = make_proposer(engine, key.initial, goal)
     visits = Visits(objective, key)
-    Search(objective.space, proposer, key.seed, key.budget, key.initial).run(visits)
-    points = tuple(trial.values for trial in visits.trials())
-    judgement = judge(objective, points, key.seed, by_outputs=learns)
+    try:
+        Search(objective.space, proposer, key.seed, key.budget, key.initial).run(visits)
+        points = tuple(trial.values for trial in visits.trials())
+        judgement = judge(objective, points, key.seed, by_outputs=learns)
+    except RunError as problem:
+        if why := visits.first_failure():
+            raise RunError(f"{problem}; seed {key.seed}, the first θ: {why}") from None
+        raise
     return Run(key, points, visits.seconds / max(1, key.budget - key.initial), judgement)
 
 
@@ -83,6 +89,12 @@ class Visits:
     def trials(self) -> Sequence[Trial]:
         """The visits so far, in order."""
         return list(self._trials)
+
+    def first_failure(self) -> str:
+        """Why the first visit has no score, where none has; else empty."""
+        if any(trial.score is not None for trial in self._trials):
+            return ""
+        return "".join(self._objective.failure(trial.values, self._key.seed) for trial in self._trials[:1])
 
     def ended(self) -> str:
         """Why no further point is visited; empty while one is."""

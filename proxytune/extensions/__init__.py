@@ -9,6 +9,7 @@ the group `proxytune` that is called `KIND.NAME`, as in
 """
 
 from proxytune.extensions.door import ask, describe, load, make, one_line, place_of, require
+from proxytune.extensions.interrupting import is_users
 from proxytune.extensions.plugins import GROUP, plugins
 
-__all__ = ["GROUP", "ask", "describe", "load", "make", "one_line", "place_of", "plugins", "require"]
+__all__ = ["GROUP", "ask", "describe", "is_users", "load", "make", "one_line", "place_of", "plugins", "require"]

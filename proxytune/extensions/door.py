@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from proxytune.errors import ExtensionError, ProxytuneError
 from proxytune.extensions.beside import import_beside
+from proxytune.extensions.interrupting import is_users
 from proxytune.extensions.plugins import plugins
 from proxytune.extensions.trust import check_permitted
 from proxytune.settings import nearest
@@ -87,9 +88,11 @@ def ask(what: str, question: Callable[[], Answer], where: str = "") -> Answer:
     """
     try:
         return question()
-    except (ProxytuneError, KeyboardInterrupt):
+    except ProxytuneError:
         raise
     except BaseException as problem:
+        if is_users(problem):
+            raise
         raise ExtensionError(f"{what} raised {describe(problem)}{place_of(problem)}{where}; correct it") from problem
 
 
@@ -150,9 +153,11 @@ def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleT
         check_permitted(module, Path.cwd())
     try:
         return importlib.import_module(module) if beside is None else import_beside(module, beside)
-    except (ProxytuneError, KeyboardInterrupt):
+    except ProxytuneError:
         raise
     except BaseException as problem:
+        if is_users(problem):
+            raise
         if isinstance(problem, ModuleNotFoundError) and f"{module}.".startswith(f"{problem.name}."):
             where = "installed" if beside is None else f"in {beside.absolute()} or installed"
             raise ExtensionError(f"{kind} '{name}': no module '{problem.name}' {where}; check the name") from None
@@ -167,9 +172,9 @@ def _plugin(name: str, kind: str, installed: Mapping[str, Any], shipped: Mapping
         raise ExtensionError(f"{kind} '{name}' is unknown (your own is written module:attribute); {hint}")
     try:
         return installed[name].load()
-    except KeyboardInterrupt:
-        raise
     except BaseException as problem:
+        if is_users(problem):
+            raise
         raise ExtensionError(
             f"{kind} '{name}': its plug-in {installed[name].value} raised {describe(problem)}; correct or uninstall it"
         ) from problem

@@ -1,6 +1,5 @@
 """Running episodes, and catching what fails."""
 
-import errno
 import functools
 import math
 import random
@@ -16,11 +15,11 @@ from threadpoolctl import ThreadpoolController
 
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import EpisodeError, RunError
-from proxytune.extensions import describe, one_line, place_of
+from proxytune.extensions import describe, is_users, one_line, place_of
 from proxytune.running.apart import Lost
+from proxytune.running.machine import check_machine
 from proxytune.running.workers import Rescue, working
 
-OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)
 ENDED, ENDLESS = "it ended its process", "it took longer than"
 """How failures begin of episodes that end their process, and of those that do not end themselves."""
 
@@ -98,10 +97,11 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     try:
         with _libraries(len(sys.modules)).limit(limits=1), _seeded(episode.seed):
             metrics = _checked(family, episode, family.run(episode), needed)
-    except KeyboardInterrupt:
-        raise
     except BaseException as problem:
-        _check_machine(episode, problem)
+        if is_users(problem):
+            raise
+        who = f"agent '{episode.agent}' from start {episode.start}"
+        check_machine(who, problem, "with more room or without that agent")
         failure = one_line(_failure(problem))
     return Outcome(episode, metrics, failure, time.perf_counter() - start)
 
@@ -113,21 +113,6 @@ def _failure(problem: BaseException) -> str:
     # What is no Exception, as of sys.exit, goes through every family, so it may be the agent's.
     whose = "the domain family" if isinstance(problem, Exception) else "the agent or the domain family"
     return f"{whose} raised {describe(problem)}{place_of(problem)}"
-
-
-def _check_machine(episode: Episode, problem: BaseException | None) -> None:
-    """Refuse to call an episode failed of what the machine lacked, whoever caught that first.
-
-    Raises:
-        RunError: With the agent, and what the machine lacked.
-    """
-    while problem is not None:
-        if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:
-            raise RunError(
-                f"agent '{episode.agent}' from start {episode.start}: the machine failed ({describe(problem)})"
-                f"{place_of(problem)}; run again to continue, with more room or without that agent"
-            ) from None
-        problem = problem.__cause__ or problem.__context__
 
 
 @contextmanager

@@ -36,12 +36,14 @@ class Rescue(Generic[Piece, Result]):
         timeout_s: How long a piece may take [s]; then all are done in other processes.
         suspect: Whether a piece is done in a process apart at once, because the like of it has ended one before.
         begins: Told of each piece that begins in this very process, which it may end.
+        apart: Whether no piece is done in this process, as one may end it.
     """
 
     lost: Callable[[Piece, Lost], Result]
     timeout_s: float | None = None
     suspect: Callable[[Piece], bool] = lambda _: False
     begins: Callable[[Piece], None] = lambda _: None
+    apart: bool = False
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,8 @@ def _results(
 ) -> Generator[Result, None, None]:
     if jobs > 1 or _elsewhere.get():
         return _spread(work, pieces, jobs, rescue)
-    return _here(work, pieces, rescue) if rescue.timeout_s is None else _apart(work, pieces, rescue)
+    apart = rescue.apart or rescue.timeout_s is not None
+    return _apart(work, pieces, rescue) if apart else _here(work, pieces, rescue)
 
 
 def _here(

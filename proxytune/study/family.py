@@ -9,7 +9,7 @@ from typing import Any, TypeVar, cast
 
 from proxytune.domain import DomainFamily
 from proxytune.errors import ExtensionError, InputError, ProxytuneError
-from proxytune.extensions import ask, describe, load, place_of
+from proxytune.extensions import ask, describe, is_users, load, place_of
 from proxytune.settings import nearest
 from proxytune.space import Parameter
 from proxytune.study.settings import StudySettings
@@ -77,9 +77,11 @@ def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Valu
     """What a user's code answers; one line of what it raises instead."""
     try:
         return ask()
-    except (ProxytuneError, KeyboardInterrupt):
+    except ProxytuneError:
         raise
     except BaseException as problem:
+        if is_users(problem):
+            raise
         raise settings.error("family", f"{what} raised {describe(problem)}{place_of(problem)}; correct it") from problem
 
 

@@ -15,7 +15,8 @@ from proxytune.learning.plv import SampleNeeds, sample_needs
 from proxytune.learning.settings import NONE, TeachingSettings
 from proxytune.learning.spending import Examination, Scores, Spending, curves_of, first_examinations, next_examinations
 from proxytune.running.progress import Watcher
-from proxytune.teaching.points import Point, TeachingSetup, prepare_shared, score_points
+from proxytune.teaching.points import Point, TeachingSetup
+from proxytune.teaching.spreading import prepare_shared, score_points
 
 BATCH = 12
 """So many examinations are chosen at once, however many processes there are."""
@@ -86,9 +87,7 @@ def _examine(
     points = {one: Point(one.curve, proxies[one.curve], one.repetition, one.samples) for one in batch}
     missing = [point for point in points.values() if not setup.is_cached(point)]
     watcher.begin("demonstrations", len(points) - len(missing))
-    with prepare_shared(setup, missing, jobs) as made:
-        for _ in made:
-            pass
+    prepare_shared(setup, missing, jobs)
     watcher.begin("learning", 0)
     with score_points(setup, missing, jobs) as scored:
         for point, score in scored:

@@ -96,6 +96,7 @@ def load_setup(settings: StudySettings) -> TeachingSetup:
         seed=settings.seed,
         starts=settings.starts,
         cache=Cache(settings.home / CACHE),
+        timeout_s=settings.episode_timeout_s,
     )
 
 

@@ -25,6 +25,7 @@ from proxytune.teaching.box import WIDTH, distribution
 from proxytune.teaching.examining import count_examinations, examine_curves
 from proxytune.teaching.experiment import Experiment, TeacherResult, judge_curves
 from proxytune.teaching.points import Point, TeachingSetup
+from proxytune.teaching.spreading import prepare_points
 
 BEST, SINGLE, BOX, BY_PRPV = "best p(θ)", "best single θ", "all of the box", "lowest PRPV"
 CLOUD = 4096
@@ -98,7 +99,7 @@ def confirm(
 def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:
     """Why a proxy cannot teach, empty if it can: nobody has driven in it before, and its expert may leave the road."""
     try:
-        setup.prepare(Point(name, proxy, 0, 0))
+        prepare_points(setup, [Point(name, proxy, 0, 0)], jobs=1)
     except LearnerError as problem:
         return str(problem)
     return ""

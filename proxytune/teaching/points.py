@@ -1,24 +1,24 @@
 """The pieces of a learning experiment, each cached by all that determines it: samples, weights, scores."""
 
 import functools
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from proxytune.domain import Classroom, make_episode
+from proxytune.domain import Classroom, OnPolicyClassroom, make_episode
 from proxytune.errors import EpisodeError, LearnerError
 from proxytune.learning.cache import Arrays, Cache, digest
 from proxytune.learning.examination import examine
 from proxytune.learning.learner import Learner, policy_of
 from proxytune.learning.lessons import Distribution
-from proxytune.learning.settings import LEARNER, TeachingSettings
-from proxytune.running.workers import working
+from proxytune.learning.settings import TeachingSettings
 from proxytune.seeds import exam_seed, proxy_lessons_seed, target_lessons_seed
 from proxytune.teaching.stages import Lessons, Stage, Trainee, equal_rounds
+from proxytune.teaching.supervision import Supervised, watching
 
 PUPIL = "pupil"
 """Who drives in an examination, in place of an agent."""
@@ -57,6 +57,7 @@ class TeachingSetup:
         seed: The study's.
         starts: Number of starts in an examination.
         cache: Where samples, weights and scores are kept.
+        timeout_s: How long an episode of a lesson or an examination may take [s]; None for as long as it takes.
     """
 
     proxy: Classroom
@@ -67,6 +68,7 @@ class TeachingSetup:
     seed: int
     starts: int
     cache: Cache
+    timeout_s: float | None = None
 
     @functools.cached_property
     def identities(self) -> tuple[str, str]:
@@ -116,12 +118,14 @@ class TeachingSetup:
     def _proxy_lessons(self, proxy: Distribution, repetition: int) -> Lessons:
         by, count = self.settings.proxy_lessons, self.settings.proxy_samples
         seed, ends = proxy_lessons_seed(self.seed, repetition), equal_rounds(count, PROXY_ROUNDS)
-        return Lessons(self.proxy, self.identities[0], proxy, seed, self.settings.lesson_s, ends, by)
+        room = cast(OnPolicyClassroom, Supervised(self.proxy, "proxy", self.timeout_s))
+        return Lessons(room, self.identities[0], proxy, seed, self.settings.lesson_s, ends, by)
 
     def _target_lessons(self, repetition: int) -> Lessons:
         by, ends = self.settings.target_lessons, self.settings.target_samples[1:]
         seed, nominal = target_lessons_seed(self.seed, repetition), Distribution({})
-        return Lessons(self.target, self.identities[1], nominal, seed, self.settings.lesson_s, ends, by)
+        room = cast(OnPolicyClassroom, Supervised(self.target, "target", self.timeout_s))
+        return Lessons(room, self.identities[1], nominal, seed, self.settings.lesson_s, ends, by)
 
     def _examine(self, point: Point) -> Arrays:
         weights = self._stage(point).weights(point.count)
@@ -129,7 +133,9 @@ class TeachingSetup:
             return {"scores": np.full(self.starts, np.nan)}
         seeds = [exam_seed(self.seed, start) for start in range(self.starts)]
         episodes = [make_episode({}, agent=PUPIL, start=start, seed=seed) for start, seed in enumerate(seeds)]
-        return {"scores": np.array(examine(self.target, episodes, policy_of(self.learner, weights)))}
+        room, policy = Supervised(self.target, "target", self.timeout_s), policy_of(self.learner, weights)
+        with watching("an examination"):
+            return {"scores": np.array(examine(cast(Classroom, room), episodes, policy))}
 
 
 @contextmanager
@@ -139,50 +145,3 @@ def _name_proxy_in_errors(point: Point) -> Iterator[None]:
         yield
     except (LearnerError, EpisodeError) as problem:
         raise type(problem)(f"{point.name}: {problem}") from None
-
-
-def prepare_shared(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> AbstractContextManager[Iterator[None]]:
-    """Make what several points share before they are scored, so that no two processes make the same."""
-    return working(setup.prepare, _shared(setup.settings, points), jobs)
-
-
-def _shared(settings: TeachingSettings, points: Sequence[Point]) -> list[Point]:
-    """Points whose preparation makes all that these share.
-
-    Where the learner drives in the target, its samples are shared by the points of one learning curve and repetition;
-    where the expert does, by all points of a repetition.
-    """
-    if settings.target_lessons == LEARNER:
-        falling = sorted(points, key=lambda point: -point.count)
-        return _first_of_each(falling, lambda point: replace(point, count=0))
-    last = settings.target_samples[-1]
-    repetitions = sorted({point.repetition for point in points})
-    targets = [Point("the target", None, repetition, last) for repetition in repetitions]
-    taught = [replace(point, count=0) for point in points if point.proxy is not None]
-    return targets + _first_of_each(taught, lambda point: point)
-
-
-def _first_of_each(points: Sequence[Point], kind: Callable[[Point], Point]) -> list[Point]:
-    """The first point of each kind."""
-    kinds: list[Point] = []
-    first = []
-    for point in points:
-        if kind(point) not in kinds:
-            kinds.append(kind(point))
-            first.append(point)
-    return first
-
-
-def score_points(
-    setup: TeachingSetup, points: Sequence[Point], jobs: int
-) -> AbstractContextManager[Iterator[tuple[Point, float]]]:
-    """Score the points in parallel, each yielded as soon as it is there.
-
-    Those that take longest begin first: otherwise one of them, begun last, would keep one process busy alone.
-    """
-    ordered = sorted(points, key=lambda point: -point.count)
-    return working(functools.partial(_score, setup.score), ordered, jobs)
-
-
-def _score(score: Callable[[Point], float], point: Point) -> tuple[Point, float]:
-    return point, score(point)

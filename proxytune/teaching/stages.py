@@ -12,6 +12,7 @@ from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.learning.rehearsal import mix_samples
 from proxytune.learning.settings import LEARNER
 from proxytune.seeds import round_seed
+from proxytune.teaching.supervision import watching
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,9 @@ class Stage:
         """The samples of a round."""
 
         def make() -> Arrays:
-            return self.lessons.collect(number, self._policy(number))._asdict()
+            policy = self._policy(number)
+            with watching("a lesson"):
+                return self.lessons.collect(number, policy)._asdict()
 
         return Demonstration(**self.trainee.cache.get("samples", self.round_facts(number), make))
 
@@ -162,7 +165,9 @@ class Stage:
         samples = self.samples(count)
         if self.before and self.rehearsal:
             samples = mix_samples(samples, self.before.samples(self.before.lessons.ends[-1]), self.rehearsal)
-        return self.trainee.learner.train(samples, self.weights(0), self.trainee.seed)
+        start = self.weights(0)
+        with watching("the learner's training"):
+            return self.trainee.learner.train(samples, start, self.trainee.seed)
 
 
 def equal_rounds(count: int, rounds: int) -> tuple[int, ...]:

@@ -2,12 +2,14 @@ import json
 from types import SimpleNamespace
 
 import pytest
+from processes import besides_progress
 
 from proxytune.cli.compare import _engines, read_runs
 from proxytune.cli.compare_objective import WithinRun
 from proxytune.cli.main import main, parser
 from proxytune.comparison.judgement import judging_code
 from proxytune.search.engines import registry as engines
+from proxytune.storage.store import Store
 
 FEW = ("--engines", "random,sobol", "--seeds", "2", "--budget", "7", "--initial", "5")
 
@@ -211,3 +213,26 @@ def test_within_a_run_its_episodes_are_told_and_the_bar_counts_runs():
     within.best(4.0)
     within.finished("pre-flight 1 of 2")
     assert shown == [("seed 3", 0), ("seed 3, episode 1", 0)]
+
+
+@pytest.mark.parametrize("engine", ["random", "gp"])
+def test_an_agent_that_fails_everywhere_is_named_with_its_start(make_study, tmp_path, capsys, engine):
+    folder = make_study(family='"deadly:deadly"', domain={"faults": '["agent1:*:exits"]'})
+    few = ("--engines", engine, "--seeds", "2", "--budget", "3", "--initial", "2")
+    assert compare(folder, *few, "--output", tmp_path / "out") == 1
+    told = besides_progress(capsys.readouterr().err)
+    failure = "agent 'agent1' failed from every start, first with: the agent or the domain family raised SystemExit: 0"
+    assert told.startswith("proxytune compare: no trial has a")
+    assert f"; seed 1, the first θ: {failure} (deadly.py, line " in told
+    assert told.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_an_agent_that_hangs_is_ended_in_a_comparison_too(make_study, tmp_path):
+    domain = {"faults": '["agent1:1:hangs"]'}
+    folder = make_study(family='"deadly:deadly"', domain=domain, starts="2", episode_timeout_s="1.0")
+    few = ("--engines", "sobol", "--seeds", "2", "--budget", "2", "--initial", "1")
+    assert compare(folder, *few, "--output", tmp_path / "out") == 0
+    with Store.read(tmp_path / "out") as store:
+        agents = store.under_way("").agents_that_failed("it took longer than 1 s")
+    assert agents == {"agent1"}

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,8 @@ from processes import besides_progress, finished_episodes, start, wait_for
 
 from proxytune.cli.compare import read_runs
 from proxytune.cli.main import COMMANDS, main
-from proxytune.cli.terminal.interruption import Terminated, sigterm_as_interrupt
+from proxytune.cli.terminal.interruption import Terminated, signals_as_interruptions
+from proxytune.extensions.interrupting import Interrupted
 
 sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
 
@@ -100,7 +102,7 @@ def wait_until_heeding(process):
 def test_sigterm_is_raised_once_and_cleaning_up_is_left_alone():
     before = signal.getsignal(signal.SIGTERM)
     cleaned = []
-    with pytest.raises(Terminated), sigterm_as_interrupt():
+    with pytest.raises(Terminated), signals_as_interruptions():
         try:
             os.kill(os.getpid(), signal.SIGTERM)
         finally:
@@ -108,6 +110,21 @@ def test_sigterm_is_raised_once_and_cleaning_up_is_left_alone():
             cleaned.append(True)
     assert cleaned
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+@pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN])
+def test_ctrl_c_is_told_apart_from_what_other_code_raises_unless_it_is_ignored(before, kept_handler):
+    signal.signal(signal.SIGINT, before)
+    with nullcontext() if before is signal.SIG_IGN else pytest.raises(Interrupted), signals_as_interruptions():
+        os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.fixture
+def kept_handler():
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def test_ctrl_c_while_libraries_are_loaded_is_one_line(tmp_path):

@@ -14,6 +14,7 @@ from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
+from proxytune.extensions.interrupting import Interrupted
 
 
 def proxytune(*words, cwd):
@@ -62,7 +63,7 @@ def test_a_mistake_is_one_line_on_standard_error(failing, capsys, problem, statu
 
 
 def test_an_interruption_says_whether_the_same_command_goes_on(failing, capsys, monkeypatch):
-    failing(KeyboardInterrupt())
+    failing(Interrupted())
     assert main(["list", "robots"]) == 130
     assert "nothing was written; run the same command to start again" in capsys.readouterr().err
     monkeypatch.setitem(COMMANDS, "list", COMMANDS["list"]._replace(resumes=True))

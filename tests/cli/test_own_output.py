@@ -70,6 +70,10 @@ TROUBLES = {
         SystemExit(0),
         "code that is not proxytune's ended the command (SystemExit: 0)",
     ),
+    "an interruption by code that is not ours": (
+        KeyboardInterrupt("mine"),
+        "code that is not proxytune's ended the command (KeyboardInterrupt: mine)",
+    ),
     "too little memory": (MemoryError("7.28 TiB"), "memory ran out (MemoryError: 7.28 TiB); ask for less"),
     "a refusal of the system": (OSError(36, "File name too long", "a\nb"), "the system refused something (OSError: "),
 }

@@ -1,12 +1,13 @@
 """`teach` prints table 1 and one JSON document; `study` with the objective "plv" looks for the best teacher."""
 
 import json
+import re
 import signal
 import time
 
 import numpy as np
 import pytest
-from processes import start
+from processes import besides_progress, start
 from taught import GRID, make_taught
 
 from proxytune.cli.main import main
@@ -222,3 +223,21 @@ def test_a_run_stopped_at_any_moment_comes_to_the_same_document_as_one_that_was_
         expected.append({key: document[key] for key in ("convergence", "without", "proxies")})
         assert not list((folder / "teaching").glob("*.npz.*"))
     assert expected[0] == expected[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_what_hangs_is_ended_in_one_line_and_the_corrected_command_goes_on(make_study, capsys, jobs):
+    small = {"grid": [0, 20, 40], "starts": "2", "jobs": jobs, "family": '"stuck:stuck"', "episode_timeout_s": "1.0"}
+    stuck = make_taught(make_study, called="stuck", domain={"faults": '["lesson:1:hangs"]'}, **small)
+    assert main(["teach", str(stuck)]) == 1
+    told = besides_progress(capsys.readouterr().err)
+    assert re.match(r"proxytune teach: .*: the expert's lesson in the (proxy|target) at .*start 1 took longer", told)
+    assert told.endswith("or raise episode_timeout_s, and run again to continue\n")
+    assert told.count("\n") == 1
+    whole = make_taught(make_study, called="whole", **small)
+    documents = []
+    for folder in (make_taught(make_study, called="stuck", **small), whole):
+        assert main(["teach", str(folder), "--json"]) == 0
+        documents.append(json.loads(capsys.readouterr().out)["proxies"])
+    assert documents[0] == documents[1]

@@ -1,5 +1,6 @@
 """The family that is a formula, with agents that end their process, never end, or meet the limits of the machine."""
 
+import ctypes
 import os
 import signal
 import sys
@@ -22,6 +23,10 @@ def _own_error() -> None:
     raise OwnError("of its\nown caf\udce9")
 
 
+def _interrupts() -> None:
+    raise KeyboardInterrupt("of its own")
+
+
 def _short_of_memory() -> None:
     """As a family tells of what its agent has raised."""
     raise EpisodeError("raised MemoryError at 1.20 s: no room") from MemoryError("no room")
@@ -31,9 +36,22 @@ def _short_of_files() -> None:
     raise EpisodeError("raised OSError at 1.20 s: too many") from OSError(24, "Too many open files")
 
 
+def _hangs_in_c() -> None:
+    """Keep the interpreter's lock, so that no Python runs in any thread."""
+    ctypes.PyDLL(None).sleep(600)
+
+
+def _raises() -> None:
+    raise ValueError("of\nits own")
+
+
 ENDINGS = {
+    "lingers": lambda: time.sleep(1.3),
+    "raises": _raises,
+    "hangs in C": _hangs_in_c,
     "exits": lambda: sys.exit(0),
     "own error": _own_error,
+    "interrupts": _interrupts,
     "hangs": lambda: time.sleep(600.0),
     "leaves": lambda: os._exit(9),
     "aborts": lambda: os.kill(os.getpid(), signal.SIGABRT),

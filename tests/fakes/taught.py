@@ -1,4 +1,14 @@
-"""Studies whose domain family is a schoolroom, and a twin to teach for."""
+"""Studies whose domain family is a schoolroom, and a twin to teach for; and the same without a study."""
+
+from dataclasses import replace
+
+from schoolroom import Matrix, Schoolroom
+from wobbly import Wobbly
+
+from proxytune.learning.cache import Cache
+from proxytune.learning.lessons import Distribution
+from proxytune.learning.settings import TeachingSettings
+from proxytune.teaching.points import TeachingSetup
 
 TEACHING = """
 [teaching]
@@ -29,3 +39,36 @@ def make_taught(make_study, *, grid=GRID, more="", **changes):
     path = folder / "study.toml"
     path.write_text(path.read_text() + TEACHING.format(grid=grid, more=more))
     return folder
+
+
+PROXY = Distribution({"trim": (0.1, 0.2)})
+
+
+def setup(folder, **changes):
+    """An experiment ready to run, small, with changes of it or of its amounts."""
+    amounts = {key: changes.pop(key) for key in ("proxy_samples", "lesson_s", "rehearsal") if key in changes}
+    settings = TeachingSettings(
+        target=folder / "twin.toml",
+        learner="schoolroom:Matrix",
+        proxy_samples=60,
+        target_samples=(0, 20, 40),
+        seeds=1,
+        lesson_s=2.0,
+        level=None,
+        tolerance=6.0,
+        budget=1,
+        narrow=False,
+        widths={},
+        proxies={"near": PROXY},
+    )
+    plain = TeachingSetup(
+        proxy=Schoolroom(Wobbly()),
+        target=Schoolroom(Wobbly(theta=(("trim", 0.12), ("delay", 0.21)))),
+        learner=Matrix(),
+        learner_identity="matrix",
+        settings=replace(settings, **amounts),
+        seed=1,
+        starts=3,
+        cache=Cache(folder),
+    )
+    return replace(plain, **changes)

@@ -12,6 +12,7 @@ import pytest
 from deadly import Deadly
 from processes import ENVIRONMENT
 
+from proxytune.cli.terminal.interruption import signals_as_interruptions
 from proxytune.domain import make_episode
 from proxytune.errors import RunError
 from proxytune.running.episodes import Watch, run_episode, running
@@ -39,13 +40,37 @@ def test_what_an_agent_raises_that_is_no_exception_fails_its_episode_alone(fault
     assert found[LAST].startswith(f"the agent or the domain family raised {raised} (deadly.py, line ")
 
 
-def test_ctrl_c_is_nobodys_failure():
-    class Interrupted(Deadly):
-        def run(self, episode):
-            raise KeyboardInterrupt
+class Pressed(Deadly):
+    """Ctrl-C is pressed during each episode; the agent may catch that, and raise a KeyboardInterrupt of its own."""
 
+    def run(self, episode):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            if self.faults:
+                raise KeyboardInterrupt from None
+            raise
+
+
+@pytest.mark.parametrize("place", [contextlib.nullcontext, signals_as_interruptions])
+@pytest.mark.parametrize("caught", [(), ("by the agent",)])
+def test_ctrl_c_is_nobodys_failure_in_python_and_on_the_command_line(place, caught):
+    with pytest.raises(KeyboardInterrupt), place():
+        run_episode(Pressed(faults=caught), EPISODES[0])
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_agent_that_raises_a_keyboard_interrupt_fails_in_that_episode_alone(jobs):
+    whole = run_all(())
+    with signals_as_interruptions():
+        found = run_all(("agent2:2:interrupts",), jobs)
+    assert but_last(found) == but_last(whole)
+    assert found[LAST].startswith("the agent or the domain family raised KeyboardInterrupt: of its own (deadly.py, ")
+
+
+def test_a_keyboard_interrupt_in_a_python_session_is_the_users():
     with pytest.raises(KeyboardInterrupt):
-        run_episode(Interrupted(), EPISODES[0])
+        run_all(("agent2:2:interrupts",))
 
 
 @pytest.mark.parametrize(("fault", "what"), [("memory", "MemoryError: no room"), ("files", "OSError: .*Too many open")])

@@ -50,8 +50,9 @@ def test_an_agent_that_hangs_fails_where_the_study_limits_its_time(make_study):
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_an_agent_that_exits_fails_and_the_study_goes_on(make_study, capsys, jobs):
-    assert main(["study", str(make_study(domain=domain("exits"), jobs=jobs, **FAMILY)), "--json"]) == 0
+@pytest.mark.parametrize("fault", ["exits", "interrupts"])
+def test_an_agent_that_exits_or_interrupts_fails_and_the_study_goes_on(make_study, capsys, jobs, fault):
+    assert main(["study", str(make_study(domain=domain(fault), jobs=jobs, **FAMILY)), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["episodes"]["failed"] == 2
 
 

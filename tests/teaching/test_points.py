@@ -1,17 +1,14 @@
 """What is cached of a learning experiment is found again only by what would make the very same."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import pytest
 from schoolroom import Matrix, Schoolroom
+from taught import PROXY, setup
 from wobbly import Wobbly
 
-from proxytune.learning.cache import Cache, digest
-from proxytune.learning.lessons import Distribution
-from proxytune.learning.settings import TeachingSettings
-from proxytune.teaching.points import Point, TeachingSetup
-
-PROXY = Distribution({"trim": (0.1, 0.2)})
+from proxytune.learning.cache import digest
+from proxytune.teaching.points import Point
 
 
 @dataclass(frozen=True)
@@ -20,35 +17,6 @@ class Timid(Matrix):
 
     def train(self, samples, start, seed):
         return {"matrix": 0.9 * super().train(samples, start, seed)["matrix"]}
-
-
-def setup(folder, **changes):
-    amounts = {key: changes.pop(key) for key in ("proxy_samples", "lesson_s", "rehearsal") if key in changes}
-    settings = TeachingSettings(
-        target=folder / "twin.toml",
-        learner="schoolroom:Matrix",
-        proxy_samples=60,
-        target_samples=(0, 20, 40),
-        seeds=1,
-        lesson_s=2.0,
-        level=None,
-        tolerance=6.0,
-        budget=1,
-        narrow=False,
-        widths={},
-        proxies={"near": PROXY},
-    )
-    plain = TeachingSetup(
-        proxy=Schoolroom(Wobbly()),
-        target=Schoolroom(Wobbly(theta=(("trim", 0.12), ("delay", 0.21)))),
-        learner=Matrix(),
-        learner_identity="matrix",
-        settings=replace(settings, **amounts),
-        seed=1,
-        starts=3,
-        cache=Cache(folder),
-    )
-    return replace(plain, **changes)
 
 
 CHANGES = {

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxytune.driving.agents import Command, Picture
 from proxytune.driving.cameras import Camera
 from proxytune.driving.drivetrain import Drivetrain
 from proxytune.driving.plant import Plant
 from proxytune.driving.robot import Robot
+from proxytune.driving.view import View
 from proxytune.effects import Chain, Setting, Signal
 from proxytune.errors import EpisodeError
 
@@ -105,34 +105,6 @@ class Course:
     ended: Callable[[float, float], bool]
 
 
-class View:
-    """The camera with its image effects: the newest picture at the camera's rate."""
-
-    def __init__(self, instance: Instance, start: Signal, seed: int) -> None:
-        self._camera, self._chain = instance.camera, instance.image
-        self._every = round(TICK_HZ / instance.robot.figures["camera_rate"])
-        first = self._camera.render(start[None])
-        self._shape = first.shape[1:]
-        self._memory = self._chain.begin(Setting(TICK_HZ, first.reshape(-1), instance.robot.figures, seed))
-        self._wanted = self._chain.looked_at(self._every, self._memory)
-        self._waiting = np.empty((0, 3))
-        self.picture: Picture = self._develop(first)
-
-    def pass_by(self, poses: Signal) -> None:
-        """Let the shutter see the poses of the next ticks."""
-        self._waiting = np.concatenate((self._waiting, poses))
-        while len(self._waiting) >= self._every:
-            seen, self._waiting = self._waiting[: self._every], self._waiting[self._every :]
-            self.picture = self._develop(self._camera.render(seen[-self._wanted :]))
-
-    def _develop(self, pictures: NDArray[np.uint8]) -> Picture:
-        signal = pictures.reshape(len(pictures), -1)
-        if self._chain.effects:
-            developed, self._memory = self._chain.newest(signal.astype(np.float32), self._memory)
-            return np.asarray(np.minimum(np.maximum(np.rint(developed), 0), 255).astype(np.uint8).reshape(self._shape))
-        return np.asarray(signal[-1].reshape(self._shape))
-
-
 class Rollout:
     """An episode under way, one command after the other: `drive` asks an agent for them, an environment its user.
 
@@ -147,7 +119,7 @@ class Rollout:
         self._drivetrain, self._plant, self._course = instance.drivetrain, plant, course
         self._hold = round(TICK_HZ / figures["control_rate"])
         self._memory = instance.drivetrain.begin(_setting(figures, course))
-        self._view = View(instance, course.start, course.seed)
+        self._view = View(instance.camera, instance.image, Setting(TICK_HZ, course.start, figures, course.seed))
         self.steps = round(course.seconds * figures["control_rate"])
         self.poses: Signal = course.start[None]
         self.crashed = False

@@ -19,6 +19,7 @@ SAME_CODE = (
     "ee96ad59ba57936cdcf90478c33d5866ddf0b6bf557f67d25d93075eeea66c2e",
     "e7afcd8bcf722c7c3dc69d1b72e8843321624c2cb35ad3d9e6fe148b13f82818",
     "d9b6c182f2597522d3a47ea224254bddca73ff07d8cf06026015417f1c4c1594",
+    "8665bf1429be4f790845550636c6be36488fd8abad2d7c7c04d92819a7ecd9c2",
 )
 """What code means that drives the same episodes, the oldest first: that one names them all."""
 

@@ -11,8 +11,9 @@ from proxytune.domain import Episode, Policy
 from proxytune.driving.agents import Command, Picture
 from proxytune.driving.agents.pupil import Pupil
 from proxytune.driving.drivetrain import Drivetrain, Progress
-from proxytune.driving.episode import TICK_HZ, Course, Instance, View, ask, check_command
+from proxytune.driving.episode import TICK_HZ, Course, Instance, ask, check_command
 from proxytune.driving.plants import Fleet
+from proxytune.driving.view import View
 from proxytune.effects import CATALOGUE, Effect, Setting, Signal
 from proxytune.effects.learnt.effect import Learnt
 from proxytune.errors import EpisodeError
@@ -110,7 +111,8 @@ class _Rollouts:
         self._drivetrain = side_by_side(instance.drivetrain, seeds)
         resting = Setting(TICK_HZ, np.zeros((len(courses), 2)), figures, 0, starts[:, 2:], starts[:, None, :2])
         self._memory: Any = self._drivetrain.begin(resting)
-        self._views = [View(instance, course.start, course.seed) for course in courses]
+        settings = [Setting(TICK_HZ, one.start, figures, one.seed) for one in courses]
+        self._views = [View(instance.camera, instance.image, setting) for setting in settings]
         self.under_way = list(range(len(courses)))
         self.new_pictures = True
         self.poses = [[start[None]] for start in starts]

@@ -1,7 +1,8 @@
 """The ways to draw what a camera sees, by name."""
 
 from proxytune.driving.bullet.renderer import BulletCamera
-from proxytune.driving.cameras import Camera, CameraFigures, GroundPlaneCamera
+from proxytune.driving.cameras import Camera, CameraFigures
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.texture import Floor
 
 CAMERAS = ("ground_plane", "renderer")

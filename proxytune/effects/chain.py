@@ -3,7 +3,8 @@
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+
+import numpy as np
 
 from proxytune.effects.effect import Effect, Memory, Recalling, Setting, Signal, Stage
 
@@ -48,27 +49,15 @@ class Chain:
             after.append(kept)
         return signal, tuple(after)
 
-    def newest(self, signal: Signal, memories: tuple[Memory, ...]) -> tuple[Signal, tuple[Memory, ...]]:
-        """The last sample (…, channels) of what the next chunk of whole numbers becomes.
+    def mean_weights(self, rate_hz: float) -> Signal | None:
+        """The weights of the last samples, the newest last, if all that the effects make is a mean of these.
 
-        An effect that makes it for less than the whole chunk has a method `newest` of its own.
+        Another mean than `apply`'s may be rounded otherwise, unless samples are whole numbers of 8 bits.
         """
-        newest = self._own("newest")
-        if newest:
-            sample, memory = newest(signal, memories[0])
-            return sample, (memory,)
-        filtered, memories = self.apply(signal, memories)
-        return filtered[..., -1, :], memories
-
-    def looked_at(self, chunk: int, memories: tuple[Memory, ...]) -> int:
-        """How many samples, at the end of each chunk of so many, `newest` looks at if no other method is called."""
-        looked_at = self._own("looked_at")
         if not self.effects:
-            return 1
-        return min(chunk, looked_at(memories[0])) if looked_at else chunk
-
-    def _own(self, method: str) -> Callable[..., Any] | None:
-        return getattr(self.effects[0], method, None) if len(self.effects) == 1 else None
+            return np.ones(1, dtype=np.float32)
+        own: Callable[[float], Signal] | None = getattr(self.effects[0], "mean_weights", None)
+        return own(rate_hz) if own and len(self.effects) == 1 else None
 
 
 def stage_chain(effects: Iterable[Effect], stage: Stage) -> Chain:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from proxytune.driving.agents import Agent, Picture
 from proxytune.driving.agents.loading import NEEDS
-from proxytune.driving.cameras import GroundPlaneCamera
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import Robot, read_robot

@@ -18,13 +18,14 @@ import pytest
 from proxytune.domain import Demonstration, make_episode
 from proxytune.driving.agents.pupil import Pupil
 from proxytune.driving.bullet.plant import BulletPlant
-from proxytune.driving.cameras import GroundPlaneCamera
 from proxytune.driving.drivetrain import Drivetrain
-from proxytune.driving.episode import View, drive
+from proxytune.driving.episode import drive
 from proxytune.driving.expert import Expert
 from proxytune.driving.family import lane_following
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.lane_following import LaneFollowing
 from proxytune.driving.planar import PlanarFleet, PlanarPlant
+from proxytune.driving.view import View
 from proxytune.learning.cache import Cache
 from proxytune.learning.cloning import BehaviourCloning
 from proxytune.learning.learner import policy_of

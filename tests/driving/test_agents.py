@@ -7,7 +7,7 @@ from proxytune.driving.agents import AGENTS, Agent, Laggy, LanePilot, Leaning, S
 from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.agents.perception import fit_lane, open_eye, white_pixels, yellow_pixels
 from proxytune.driving.agents.pilots import HALF_LANE_M, duties
-from proxytune.driving.cameras import GroundPlaneCamera
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 from proxytune.driving.robot import read_robot

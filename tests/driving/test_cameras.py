@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nominal_camera import CAMERA
 
-from proxytune.driving import cameras
-from proxytune.driving.cameras import CAMERA_CHANNELS, SKY, GroundPlaneCamera, ground_points, lens_rays
+from proxytune.driving import ground_plane
+from proxytune.driving.cameras import CAMERA_CHANNELS, SKY, ground_points, lens_rays
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import COLOURS, Floor, draw_floor
 from proxytune.effects import PARAMETERS
@@ -229,7 +230,7 @@ def test_blurred_copies_halve_the_aliasing_of_small_pictures(monkeypatch):
     """RMS error on the floor against 8 × 8 look-ups per pixel: 12.6 grey levels sharp, 5.4 with blurred copies."""
     poses, fine = loop_poses(12), replace(NOMINAL, columns=64 * 8, rows=48 * 8)
     blurred = GroundPlaneCamera(NOMINAL, FLOOR).render(poses).astype(float)
-    monkeypatch.setattr(cameras, "OCTAVES", 0)
+    monkeypatch.setattr(ground_plane, "OCTAVES", 0)
     sharp = GroundPlaneCamera(NOMINAL, FLOOR).render(poses).astype(float)
     truth = GroundPlaneCamera(fine, FLOOR).render(poses).reshape(12, 48, 8, 64, 8, 3).mean(axis=(2, 4))
     error = [np.sqrt(np.square(pictures - truth)[:, 14:].mean()) for pictures in (blurred, sharp)]

@@ -24,7 +24,8 @@ import pandas as pd
 import pytest
 from nominal_camera import CAMERA
 
-from proxytune.driving.cameras import GroundPlaneCamera, ground_points
+from proxytune.driving.cameras import ground_points
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
 

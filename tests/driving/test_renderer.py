@@ -9,7 +9,8 @@ from nominal_camera import CAMERA
 
 from proxytune.driving.bullet import renderer
 from proxytune.driving.bullet.renderer import BulletCamera
-from proxytune.driving.cameras import SKY, GroundPlaneCamera, ground_points
+from proxytune.driving.cameras import SKY, ground_points
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import Floor, draw_floor
 

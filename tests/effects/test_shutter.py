@@ -72,30 +72,21 @@ def test_a_scene_that_stands_still_hides_the_shutter(effect):
     np.testing.assert_allclose(run(effect, still), still, atol=1e-4)
 
 
-@given(st.floats(0.0, 0.9), st.lists(st.integers(1, 5), min_size=1, max_size=6))
+@given(st.floats(0.0, 0.9))
 @settings(max_examples=60, derandomize=True)
-def test_the_newest_blurred_picture_alone_is_that_of_the_whole_chunk_to_the_last_bit(blur, chunks):
-    pictures = np.random.default_rng(0).integers(0, 256, (sum(chunks), 12)).astype(np.float32)
-    chain = Chain((Blur(blur),))
-    whole = alone = cut = chain.begin(Setting(RATE_HZ, pictures[0], NOMINAL))
-    for chunk in np.split(pictures, np.cumsum(chunks)[:-1]):
-        developed, whole = chain.apply(chunk, whole)
-        newest, alone = chain.newest(chunk, alone)
-        np.testing.assert_array_equal(newest, developed[-1])
-        newest, cut = chain.newest(chunk[-chain.looked_at(len(chunk), cut) :], cut)
-        np.testing.assert_array_equal(newest, developed[-1])
+def test_the_mean_of_the_last_pictures_is_the_newest_blurred_one_to_the_last_bit(blur):
+    pictures = np.random.default_rng(0).integers(0, 256, (12, 12)).astype(np.float32)
+    weights = Chain((Blur(blur),)).mean_weights(RATE_HZ)
+    assert weights[0] > 0.0
+    np.testing.assert_array_equal(weights @ pictures[-len(weights) :], run(Blur(blur), pictures)[-1])
 
 
-def test_only_blur_alone_makes_do_with_less_than_a_chunk():
-    setting = Setting(RATE_HZ, np.zeros(ROWS * COLUMNS * 3), NOMINAL)
-    for effects, expected in (((Blur(0.1),), 3), ((Blur(0.9),), 4), ((CameraLatency(0.1),), 4), ((Blur(0.1),) * 2, 4)):
-        chain = Chain(effects)
-        assert chain.looked_at(4, chain.begin(setting)) == expected
+@pytest.mark.parametrize(("blur", "expected"), [(0.0, 1), (0.1, 2), (0.15, 3), (0.3, 4)])
+def test_a_mean_takes_no_picture_that_does_not_count(blur, expected):
+    assert len(Chain((Blur(blur),)).mean_weights(RATE_HZ)) == expected
 
 
-def test_blur_behind_another_effect_is_of_the_whole_chunk():
-    """Half grey levels do not add up exactly, so their order must stay what it was."""
-    pictures = np.random.default_rng(0).integers(0, 256, (7, 12)).astype(np.float32)
-    chain = Chain((CameraLatency(0.123), Blur(0.21)))
-    memory = chain.begin(Setting(RATE_HZ, pictures[0], NOMINAL))
-    np.testing.assert_array_equal(chain.newest(pictures, memory)[0], chain.apply(pictures, memory)[0][-1])
+def test_blur_alone_is_a_mean_and_no_effect_at_all_the_mean_of_one_picture():
+    assert Chain(()).mean_weights(RATE_HZ).tolist() == [1.0]
+    for effects in ((CameraLatency(0.1),), (Blur(0.1), Blur(0.1)), (CameraLatency(0.1), Blur(0.1))):
+        assert Chain(effects).mean_weights(RATE_HZ) is None

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image
 
-from proxytune.driving.cameras import GroundPlaneCamera
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.mounting import mounted_camera
 from proxytune.driving.road.lane import lane_point, lane_pose
 from proxytune.driving.road.reading import shipped_map

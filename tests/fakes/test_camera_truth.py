@@ -20,7 +20,8 @@ from camera_truth.tape import lay_tape, line_distances, straight_tape
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxytune.driving.cameras import CameraFigures, GroundPlaneCamera, lens_rays
+from proxytune.driving.cameras import CameraFigures, lens_rays
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.lane import lane_pose
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import COLOURS, draw_floor

@@ -65,16 +65,10 @@ class Blur:
             band[row, row : row + past + 1] = memory.weights
         return band @ joined, memory._replace(pictures=joined[..., length:, :])
 
-    def newest(self, signal: Signal, memory: Exposed) -> tuple[Signal, Exposed]:
-        """The average over the window that ends with the last picture: of whole numbers, exact in any order."""
-        past = memory.weights.size - 1
-        new = signal[..., -past - 1 :, :]
-        joined = np.concatenate((memory.pictures[..., new.shape[-2] - 1 :, :], new), axis=-2)
-        return memory.weights @ joined, Exposed(joined[..., 1:, :], memory.weights)
-
-    def looked_at(self, memory: Exposed) -> int:
-        """How many pictures `newest` averages."""
-        return memory.weights.size
+    def mean_weights(self, rate_hz: float) -> Signal:
+        """What each of the last pictures counts in the newest mean, the newest last: exact for pictures of 8 bits."""
+        weights = _window(self.blur * rate_hz)
+        return weights[int(np.argmax(weights > 0.0)) :]
 
 
 @dataclass(frozen=True)
@@ -169,6 +163,8 @@ def _show(signal: Signal, memory: Late) -> tuple[Signal, Late]:
 
 
 _QUANTUM = 2**16
+_NONE = 1e-9
+"""A window of fewer samples has weight on the newest alone; the arithmetic of the smallest numbers overflows."""
 
 
 def _window(samples: float) -> Signal:
@@ -177,7 +173,7 @@ def _window(samples: float) -> Signal:
     They are whole multiples of 2⁻¹⁶ that add up to 1: sums over 8-bit pictures are then exact in single precision, so
     that every processor gives the same picture, whatever the order in which it adds.
     """
-    if samples == 0.0:
+    if samples < _NONE:
         return np.ones(1, dtype=np.float32)
     whole = int(np.floor(samples + 1e-9))
     part = max(0.0, samples - whole)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from proxytune.diagnosis.camera.model.optics import LATENCY, READOUT
 from proxytune.diagnosis.camera.model.projection import State
 from proxytune.diagnosis.camera.model.views import Views
-from proxytune.driving.cameras import GroundPlaneCamera
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.texture import draw_floor
 from proxytune.effects import Setting, Stage, effects_from, stage_chain
 

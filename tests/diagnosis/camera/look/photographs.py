@@ -11,7 +11,8 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from proxytune.diagnosis.camera.look.light import squared_radius
-from proxytune.driving.cameras import GroundPlaneCamera, ground_points
+from proxytune.driving.cameras import ground_points
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import Floor, draw_floor
 

@@ -12,7 +12,7 @@ from pictured import ROBOT
 from viewed import OPTICS, everything, still, tracked, views_of
 
 from proxytune.diagnosis.camera.naming.search import cost_of, fit_everything, fit_set, name_camera_effects
-from proxytune.driving.cameras import GroundPlaneCamera
+from proxytune.driving.ground_plane import GroundPlaneCamera
 from proxytune.driving.road.lane import lane_length, lane_point
 from proxytune.driving.road.markings import Markings
 from proxytune.driving.road.reading import shipped_map

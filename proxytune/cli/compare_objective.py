@@ -66,6 +66,10 @@ class WithinRun:
     def finished(self, what: str) -> None:
         """Say nothing: a run is told of as a whole."""
 
+    def waiting(self, episode: str, seconds: float) -> None:
+        """Say it."""
+        self._bars.waiting(episode, seconds)
+
 
 @contextmanager
 def objective_of(arguments: argparse.Namespace, output: Path, engines: int) -> Iterator[Arena]:

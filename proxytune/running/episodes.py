@@ -6,7 +6,7 @@ import random
 import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from proxytune.errors import EpisodeError, RunError
 from proxytune.extensions import describe, is_users, one_line, place_of
 from proxytune.running.apart import Lost
 from proxytune.running.machine import check_machine
+from proxytune.running.patience import Patience
 from proxytune.running.workers import Rescue, working
 
 ENDED, ENDLESS = "it ended its process", "it took longer than"
@@ -32,16 +33,20 @@ class Watch:
         timeout_s: How long an episode may take [s]; one that takes longer has failed. None for as long as it takes.
         suspect: Whether an episode is run in a process of its own at once, as an earlier process ended during its like.
         begins: Told of each episode that begins in this very process, which it may end.
+        waits: Told again and again, where nothing limits it, which episode has been under way longest, if that is long,
+            and for how long [s]; from another thread.
     """
 
     timeout_s: float | None = None
     suspect: Callable[[Episode], bool] = lambda _: False
     begins: Callable[[Episode], None] = lambda _: None
+    waits: Callable[[str, float], None] = lambda what, seconds: None
 
 
 UNWATCHED = Watch()
 
 
+@contextmanager
 def running(
     family: DomainFamily,
     episodes: Sequence[Episode],
@@ -49,7 +54,7 @@ def running(
     skip: Callable[[Episode], bool] = lambda _: False,
     needed: Collection[str] = (),
     watch: Watch = UNWATCHED,
-) -> AbstractContextManager[Iterator[Outcome]]:
+) -> Iterator[Iterator[Outcome]]:
     """Run episodes and give each outcome as soon as it is there, in no particular order; see `working`.
 
     An episode that ends two processes, the second one its own, has failed, and so has one that takes too long.
@@ -59,7 +64,12 @@ def running(
     """
     work = functools.partial(run_episode, family, needed=tuple(needed))
     rescue = Rescue(functools.partial(_lost, watch), watch.timeout_s, watch.suspect, watch.begins)
-    return working(work, episodes, jobs, skip, rescue)
+    waits = watch.waits if watch.timeout_s is None else UNWATCHED.waits
+    with (
+        Patience(waits) as patience,
+        working(work, episodes, jobs, patience.begins_unless(skip), rescue) as outcomes,
+    ):
+        yield patience.until_there(outcomes)
 
 
 def _lost(watch: Watch, episode: Episode, lost: Lost) -> Outcome:

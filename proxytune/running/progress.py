@@ -39,6 +39,10 @@ class Watcher(Protocol):
         """A trial, a point or a run is finished; what became of it, in one line."""
         ...
 
+    def waiting(self, episode: str, seconds: float) -> None:
+        """An episode that nothing ends has been under way for so long, and still is; told by another thread."""
+        ...
+
 
 class Silent:
     """Watches without a word."""
@@ -55,6 +59,9 @@ class Silent:
     def finished(self, what: str) -> None:
         """Say nothing."""
 
+    def waiting(self, episode: str, seconds: float) -> None:
+        """Say nothing."""
+
 
 class Bars:
     """One bar on standard error, of episodes unless said otherwise: what is being done, time left and the best score.
@@ -63,7 +70,7 @@ class Bars:
     """
 
     def __init__(self, total: int, unit: str = "episodes") -> None:
-        self._lines, self._unit = Lines(), unit
+        self._lines, self._unit, self._patience_s = Lines(), unit, 0.0
         count, best = MofNCompleteColumn(table_column=WHOLE), TextColumn("{task.fields[best]}")
         self._progress = progress_bar(self._lines.console, count, unit=unit, last=best, speed_estimate_period=900.0)
         self._task = self._progress.add_task("", total=total, best="")
@@ -94,9 +101,16 @@ class Bars:
         if task.completed:
             self._lines.say(f"{what}; {task.completed:.0f} of at most {task.total:.0f} {self._unit}")
 
+    def waiting(self, episode: str, seconds: float) -> None:
+        """Say so, and then only what has waited twice as long: where all episodes are long, that is once."""
+        if seconds >= self._patience_s:
+            self._patience_s = 2.0 * seconds
+            minutes = f"{seconds / 60.0:.0f} min"
+            self._lines.put(f"{episode} has been under way for {minutes}; episode_timeout_s in study.toml would end it")
+
 
 class Lines:
-    """Plain lines on standard error, each after the seconds so far; on a terminal none, since a bar is there.
+    """Plain lines on standard error, each after the seconds so far; on a terminal few, since a bar is there.
 
     Attributes:
         console: Standard error.
@@ -109,9 +123,13 @@ class Lines:
     def say(self, line: str) -> None:
         """Write one line; a log that is followed shows it at once."""
         if not self.console.is_terminal:
-            self.console.print(
-                f"{time.monotonic() - self._began:.0f} s: {line}", highlight=False, markup=False, soft_wrap=True
-            )
+            self.put(line)
+
+    def put(self, line: str) -> None:
+        """Write one line on a terminal too, above its bar."""
+        self.console.print(
+            f"{time.monotonic() - self._began:.0f} s: {line}", highlight=False, markup=False, soft_wrap=True
+        )
 
 
 def progress_bar(

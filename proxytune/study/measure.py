@@ -40,7 +40,7 @@ def _drive(
     """The metrics of every episode; an agent's last one is told."""
     needed, left = needed_metrics(settings, family), Counter(episode.agent for episode in episodes)
     metrics: dict[Episode, Mapping[str, float]] = {}
-    watch = Watch(settings.episode_timeout_s)
+    watch = Watch(settings.episode_timeout_s, waits=watcher.waiting)
     with running(family, longest_first(episodes, {}), settings.jobs, needed=needed, watch=watch) as outcomes:
         for outcome in outcomes:
             if outcome.metrics is None:

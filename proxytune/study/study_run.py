@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property
 
 from proxytune.domain import Episode, Instance, Outcome, instance_of
@@ -130,7 +131,8 @@ class StudyRun:
         left, agents = under_way.left(), under_way.agents_that_failed(ENDED, ENDLESS)
         timeout_s = self.settings.episode_timeout_s
         with under_way.ended():
-            yield Watch(timeout_s, lambda one: one in left or one.agent in agents, under_way.begin)
+            watch = Watch(timeout_s, lambda one: one in left or one.agent in agents, under_way.begin)
+            yield replace(watch, waits=self.watcher.waiting)
 
     def _order(self, planned: Sequence[Episode], missing: Sequence[Episode], *, by_agent: bool) -> list[Episode]:
         """The longest first; or agent by agent as planned, and only within an agent the longest first."""

@@ -67,3 +67,18 @@ def test_no_color_leaves_the_bar_without_colours(monkeypatch):
     assert "\x1b[3" in shown(True, monkeypatch, colours="standard")
     monkeypatch.setenv("NO_COLOR", "1")
     assert "\x1b[3" not in shown(True, monkeypatch, colours="standard")
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_an_episode_that_waits_is_told_of_ever_more_rarely_on_a_terminal_too(monkeypatch, terminal):
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=terminal, width=60, color_system=None)
+    monkeypatch.setattr("proxytune.running.progress.Console", lambda stderr: console)
+    with Bars(5) as bars:
+        for seconds in (60.0, 66.0, 119.0, 121.0, 130.0, 245.0, 300.0):
+            bars.waiting("agent 'one' from start 3", seconds)
+        bars.waiting("agent 'two' from start 4", 70.0)
+    lines = [line for line in text.getvalue().splitlines() if "under way" in line]
+    told = [f"agent 'one' from start 3 has been under way for {minutes} min" for minutes in (1, 2, 4)]
+    assert [line.partition(" s: ")[2].partition(";")[0] for line in lines] == told
+    assert all(line.endswith("; episode_timeout_s in study.toml would end it") for line in lines)

@@ -43,6 +43,10 @@ class LivePage:
         """Something has ended."""
         self._watcher.finished(what)
 
+    def waiting(self, episode: str, seconds: float) -> None:
+        """An episode has been under way for long."""
+        self._watcher.waiting(episode, seconds)
+
     def write(self, doing: str) -> None:
         """Write the page, and say at the first time where it is."""
         # The run is worth more than its page, and the page of the end says what is wrong with the place.

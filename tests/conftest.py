@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from collections.abc import Callable
@@ -13,6 +14,8 @@ FAKES = Path(__file__).parent / "fakes"
 sys.path.append(str(FAKES))
 # Tests write the code that they run; those of trust take this back.
 os.environ["PROXYTUNE_TRUST"] = "1"
+# A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 STATE = tempfile.TemporaryDirectory()
 os.environ["XDG_STATE_HOME"] = STATE.name
 

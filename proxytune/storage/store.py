@@ -11,7 +11,8 @@ from proxytune.domain import Episode, Outcome
 from proxytune.errors import InputError
 from proxytune.space import Theta
 from proxytune.storage.checksums import chain, seal
-from proxytune.storage.database import connect, disconnect, not_ours, sqlite_errors_as_store_errors, transaction
+from proxytune.storage.complaints import not_ours, sqlite_errors_as_store_errors
+from proxytune.storage.database import connect, disconnect, transaction
 from proxytune.storage.records import (
     SweepRecord,
     TrialRecord,

@@ -7,8 +7,10 @@ from typing import Any
 
 from proxytune.api.diagnosing import DiagnosisReport
 from proxytune.api.recording import Wanted, recordable
+from proxytune.closing.comparison import compare_errors
 from proxytune.closing.opening import Loop
 from proxytune.closing.steps import Teller
+from proxytune.closing.wording import NEXT, floor_text, following, lacking, level_text
 from proxytune.diagnosis.camera.diagnose import camera_effects
 from proxytune.diagnosis.filming import film
 from proxytune.diagnosis.log_diagnosis import diagnose_log
@@ -18,6 +20,7 @@ from proxytune.driving.robot import Robot
 from proxytune.effects import Catalogue
 from proxytune.effects.catalogue import effect_of
 from proxytune.errors import RunError, SettingsError
+from proxytune.extensions import describe
 from proxytune.importing.opening import open_log
 from proxytune.logs import Log
 
@@ -77,14 +80,28 @@ def read_diagnosis(folder: Path) -> dict[str, Any]:
     """The diagnosis that was written.
 
     Raises:
-        RunError: If it cannot be read.
+        RunError: If it cannot be read, or lacks something that a loop reads of it.
     """
     path = folder / "diagnosis.json"
     try:
         document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
-        raise RunError(f"{path}: cannot be read ({problem}); remove it and run again") from None
+        _read_through(document)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as problem:
+        raise RunError(f"{path}: cannot be read ({describe(problem)}); remove it and run again") from None
     return document
+
+
+def _read_through(document: Mapping[str, Any]) -> None:
+    """Read all that a loop reads, so that what is spoilt shows before anything is made of it."""
+    json.dumps(document, allow_nan=False)
+    lacking(document)
+    for row in compare_errors(document):
+        for level in (row.before, row.after):
+            level_text(level, row.unit), floor_text(level, row.unit)
+    for told in (document, document["camera"] or document):
+        told["verdict"], told["effects"], told["extended"]
+    for studied, model in (("", "model.toml"), (f"{NEXT}diagnose", "")):
+        following(document, studied, model, {})
 
 
 def adds_something(document: Mapping[str, Any]) -> bool:

@@ -65,9 +65,18 @@ def read_pictures(home: Path) -> list[Picture]:
     path = pictures_file(home)
     try:
         texts = json.loads(path.read_text(encoding="utf-8"))
-        return [Picture(one["title"], path.with_name(one["file"]).read_bytes(), one["caption"]) for one in texts]
-    except (OSError, ValueError, KeyError, TypeError):
+        return [
+            Picture(_text(one["title"]), path.with_name(one["file"]).read_bytes(), _text(one["caption"]))
+            for one in texts
+        ]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise StoreError(f"{path}: cannot be read; remove it to draw the righted agent again") from None
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError("not a text")
+    return value
 
 
 def drive_both(closed: Closed, agent: str) -> BothEpisodes | None:

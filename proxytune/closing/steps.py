@@ -108,5 +108,5 @@ def _read(path: Path) -> dict[str, str]:
         return {str(name): str(inputs) for name, inputs in steps.items()}
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise StoreError(f"{path}: cannot be read; remove it to do every step again") from None

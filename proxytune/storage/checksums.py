@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from proxytune.storage.records import under_way_of
+
 COLUMNS: Mapping[str, str] = {
     "facts": "key, value",
     "instances": "identity, theta",
@@ -28,7 +30,13 @@ LINKED = (
     " state, score, measures, failed_episodes, failure, decided, bound, seconds"
 )
 """What a trial's digest covers."""
-SINGULAR = {"facts": "fact", "instances": "domain instance", "episodes": "episode", "sweeps": "sweep"}
+SINGULAR = {
+    "facts": "fact",
+    "instances": "domain instance",
+    "episodes": "episode",
+    "sweeps": "sweep",
+    "under_way": "note of the episode under way",
+}
 
 
 @dataclass(frozen=True)
@@ -124,6 +132,7 @@ def find_damage(connection: sqlite3.Connection) -> Damage:
     """What is not as it was written."""
     with readable_texts(connection):
         counts = {table: _broken_rows(connection, table) for table in COLUMNS}
+        counts["under_way"] = _unreadable_notes(connection)
         ends = {name: (count, digest) for name, count, digest in connection.execute("SELECT * FROM chains")}
         names = [name for (name,) in connection.execute("SELECT DISTINCT objective FROM trials")]
         ends = {**dict.fromkeys(names, (0, "")), **ends}
@@ -135,6 +144,24 @@ def find_damage(connection: sqlite3.Connection) -> Damage:
 def _broken_rows(connection: sqlite3.Connection, table: str) -> int:
     rows = connection.execute(f"SELECT checksum, {COLUMNS[table]} FROM {table}")
     return sum(row[0] != checksum(*row[1:]) for row in rows)
+
+
+def _unreadable_notes(connection: sqlite3.Connection) -> int:
+    """How many episodes are noted as under way that are none."""
+    count = 0
+    for row in _rows_under_way(connection):
+        try:
+            under_way_of(*row)
+        except (ValueError, RecursionError):
+            count += 1
+    return count
+
+
+def _rows_under_way(connection: sqlite3.Connection) -> list[tuple[Any, ...]]:
+    query = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = 'under_way'"
+    if not connection.execute(query).fetchone()[0]:
+        return []
+    return connection.execute("SELECT theta, agent, start, seed FROM under_way").fetchall()
 
 
 def _first_broken(connection: sqlite3.Connection, objective: str, count: int, end: str) -> int | None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from proxytune.errors import StoreError
 from proxytune.storage.checksums import COLUMNS, find_damage, prepare
-from proxytune.storage.formats import APPLICATION, FORMAT, convert, make_tables, version_of
+from proxytune.storage.complaints import corrupt, sqlite_errors_as_store_errors
+from proxytune.storage.formats import APPLICATION, FORMAT, UNDER_WAY, convert, make_tables, version_of
 from proxytune.storage.own_files import refuse_links
 
 PATIENCE_S = 30.0
@@ -96,7 +97,7 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     if (application, version, tables) == (0, 0, 0):
         if path.stat().st_size:
-            raise _corrupt(path, "it has no tables")
+            raise corrupt(path, "it has no tables")
         if not writable:
             raise StoreError(f"{path}: is empty; run the study first")
         make_tables(connection)
@@ -107,10 +108,10 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> None:
         raise StoreError(f"{path}: has format {version}, this proxytune reads up to {FORMAT}; install a newer one")
     _refuse_programs(connection, path)
     if _cut_off(connection, path):
-        raise _corrupt(path, "its end has been cut off")
+        raise corrupt(path, "its end has been cut off")
     (verdict,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
     if verdict != "ok":
-        raise _corrupt(path, str(verdict))
+        raise corrupt(path, str(verdict))
 
 
 def _refuse_programs(connection: sqlite3.Connection, path: Path) -> None:
@@ -153,10 +154,12 @@ def check_tables(connection: sqlite3.Connection, path: Path) -> None:
     """
     own = sqlite3.connect(":memory:", isolation_level=None)
     make_tables(own)
-    for table in (*COLUMNS, "trials", "chains"):
+    own.execute(UNDER_WAY)
+    for table in (*COLUMNS, "trials", "chains", "under_way"):
         query = f"SELECT name, type, pk, hidden FROM pragma_table_xinfo('{table}')"
-        if connection.execute(query).fetchall() != own.execute(query).fetchall():
-            raise _corrupt(path, f"its table '{table}' is not as proxytune makes it")
+        found, made = connection.execute(query).fetchall(), own.execute(query).fetchall()
+        if found != made and (found or table != "under_way"):
+            raise corrupt(path, f"its table '{table}' is not as proxytune makes it")
     own.close()
 
 
@@ -183,21 +186,6 @@ def _cut_off(connection: sqlite3.Connection, path: Path) -> bool:
 
 
 @contextmanager
-def sqlite_errors_as_store_errors(path: Path) -> Iterator[None]:
-    """Raise every error of SQLite as one line with a remedy.
-
-    Raises:
-        StoreError: In place of any sqlite3.Error, and of text that is none.
-    """
-    try:
-        yield
-    except sqlite3.Error as problem:
-        raise _explained(path, problem) from problem
-    except UnicodeDecodeError as problem:
-        raise _corrupt(path, "it has text that is no UTF-8") from problem
-
-
-@contextmanager
 def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.Connection]:
     """Have all that is written meanwhile be there at once, or nothing of it.
 
@@ -214,37 +202,3 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.
             with suppress(sqlite3.Error):
                 connection.execute("ROLLBACK")
             raise
-
-
-def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
-    code = getattr(problem, "sqlite_errorcode", None) or 0
-    match code & 0xFF:
-        case sqlite3.SQLITE_FULL:
-            return StoreError(f"{path}: the disk is full; make room and run again, everything finished is kept")
-        case sqlite3.SQLITE_IOERR:
-            return StoreError(
-                f"{path}: cannot be read or written ({problem}); is the disk full? Everything finished is kept"
-            )
-        case sqlite3.SQLITE_READONLY | sqlite3.SQLITE_CANTOPEN | sqlite3.SQLITE_PERM:
-            return StoreError(
-                f"{path}: cannot be written ({problem}); check the folder's permissions or copy the study"
-            )
-        case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_LOCKED:
-            return StoreError(f"{path}: another program holds it open for writing; close that and run again")
-        case sqlite3.SQLITE_NOTADB | sqlite3.SQLITE_CORRUPT:
-            return _corrupt(path, str(problem))
-        case _:
-            return StoreError(f"{path}: {problem}; if it is damaged, restore a copy or move it away")
-
-
-def _corrupt(path: Path, detail: str) -> StoreError:
-    return StoreError(
-        f"{path}: is damaged ({' '.join(detail.split())}); restore a copy, "
-        f"or keep what is whole: python -m proxytune repair {path.parent}"
-    )
-
-
-def not_ours(path: Path, problem: Exception) -> StoreError:
-    """What to say of a row that is whole, and none that proxytune writes."""
-    detail = " ".join(str(problem).split())[:120]
-    return StoreError(f"{path}: has a row that no proxytune wrote ({detail}); restore a copy, or move it away")

@@ -21,6 +21,8 @@ For plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_version`:
     sweeps     number, parameter, base (JSON), points (JSON), identity     the curves asked for, the last one last
                target_model                       the target's model.toml as it was; empty without POD
                replays                            identity of the instances whose episodes are POD's replays, or empty
+    under_way  place (1), identity, theta (JSON)  the episode that runs in the study's own process; no row between runs.
+               agent, start, seed                 The table is made when it is first needed
 
 Each row of facts, instances, episodes and sweeps has a `checksum` (checksums.py): who edits one by hand is told that it
 is damaged.
@@ -104,6 +106,10 @@ ALTER TABLE sweeps ADD COLUMN checksum INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE trials ADD COLUMN digest TEXT NOT NULL DEFAULT '';
 CREATE TABLE chains (objective TEXT PRIMARY KEY, trials INTEGER NOT NULL, digest TEXT NOT NULL) WITHOUT ROWID;
 """
+UNDER_WAY = """
+CREATE TABLE IF NOT EXISTS under_way (
+    place INTEGER PRIMARY KEY CHECK (place = 1), identity TEXT NOT NULL, theta TEXT NOT NULL, agent TEXT NOT NULL,
+    start INTEGER NOT NULL, seed INTEGER NOT NULL)"""
 STEPS = (FROM_1, FROM_2, FROM_3, FROM_4, FROM_5)
 """From each format to the next."""
 SCHEMA = f"{OF_5}{FROM_5}PRAGMA application_id = {APPLICATION};"

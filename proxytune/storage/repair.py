@@ -10,7 +10,8 @@ from typing import Any
 
 from proxytune.errors import InputError, StoreError
 from proxytune.storage.checksums import chain, checksum, link, readable_texts
-from proxytune.storage.database import check_whole, copy_of_earlier, open_file, sqlite_errors_as_store_errors
+from proxytune.storage.complaints import sqlite_errors_as_store_errors
+from proxytune.storage.database import check_whole, copy_of_earlier, open_file
 from proxytune.storage.formats import APPLICATION, FORMAT, make_tables, version_of
 from proxytune.storage.own_files import refuse_links
 from proxytune.storage.store import FILE_NAME

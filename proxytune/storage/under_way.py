@@ -1,8 +1,6 @@
 """The episode that runs in a study's own process: where the process ends with it, study.db still names it.
 
-It is in a table of its own, which is made when it is first needed:
-
-    under_way  place (1), identity, theta (JSON), agent, start, seed       the episode that runs; no row between runs
+It is in a table of its own (formats.py), which is made when it is first needed.
 """
 
 import json
@@ -12,12 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from proxytune.domain import Episode
-from proxytune.storage.database import sqlite_errors_as_store_errors
+from proxytune.storage.complaints import sqlite_errors_as_store_errors
+from proxytune.storage.formats import UNDER_WAY
+from proxytune.storage.records import under_way_of
 
-TABLE = """
-CREATE TABLE IF NOT EXISTS under_way (
-    place INTEGER PRIMARY KEY CHECK (place = 1), identity TEXT NOT NULL, theta TEXT NOT NULL, agent TEXT NOT NULL,
-    start INTEGER NOT NULL, seed INTEGER NOT NULL)"""
 COLUMNS = "identity, theta, agent, start, seed"
 
 
@@ -27,14 +23,14 @@ class UnderWay:
     def __init__(self, path: Path, connection: sqlite3.Connection, identity: str) -> None:
         self._path, self._connection, self._identity = path, connection, identity
         with sqlite_errors_as_store_errors(path):
-            connection.execute(TABLE)
+            connection.execute(UNDER_WAY)
 
     def left(self) -> list[Episode]:
         """The episode during which an earlier process ended, if one did; whether it ended of it is not known."""
         with sqlite_errors_as_store_errors(self._path):
             query = f"SELECT {COLUMNS} FROM under_way WHERE identity = ?"
             rows = self._connection.execute(query, (self._identity,)).fetchall()
-        return [Episode(tuple(json.loads(theta).items()), *which) for _, theta, *which in rows]
+        return [under_way_of(*row) for _, *row in rows]
 
     def agents_that_failed(self, *how: str) -> set[str]:
         """The agents with a failed episode, in any family, whose failure begins so."""

@@ -19,6 +19,7 @@ DAMAGES = {
     "an episode": ("UPDATE episodes SET metrics = '{}' WHERE instance = 4 AND agent = 'agent1' AND start = 1", 3, 1),
     "θ": ("UPDATE instances SET theta = '{' WHERE id = 2", 1, 18),
     "a fact": ("UPDATE facts SET value = 'x' WHERE key = 'seed'", 0, 0),
+    "a note": ("INSERT OR REPLACE INTO under_way VALUES (1, 'wobbly 1 ()', '{', 'agent1', 1, 1)", 7, 0),
     "an episode that is gone": ("DELETE FROM episodes WHERE instance = 3 AND agent = 'agent1' AND start = 1", 2, 1),
 }
 

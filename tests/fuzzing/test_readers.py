@@ -7,23 +7,32 @@ spoils each kind of file so often; every spoilt file depends on its kind and num
 
 import json
 import shutil
+import sqlite3
 import sys
 import warnings
 import zlib
 from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import foreign_robot
 import numpy as np
 import pytest
+from tiny_loop import write_diagnosis
 
 sys.path.append(str(Path(__file__).parent))
 
 from mutation import mutated
 
 from proxytune.cli.compare import read_runs
+from proxytune.closing.comparison import compare_errors
+from proxytune.closing.diagnosing import read_diagnosis
+from proxytune.closing.episodes import pictures_file, read_pictures
 from proxytune.closing.steps import Kept
+from proxytune.closing.wording import following, lacking, level_text
+from proxytune.domain import make_episode
 from proxytune.driving.road.reading import read_map
 from proxytune.driving.robot import read_robot
 from proxytune.effects.model import read_model
@@ -35,8 +44,10 @@ from proxytune.logs import read_log
 from proxytune.scores import read_scores
 from proxytune.shipped import shipped
 from proxytune.storage.store import Store
+from proxytune.study.families.lessons import read_lessons
 from proxytune.study.result import result_of
 from proxytune.study.run import as_stored
+from proxytune.study.settings import read_study_settings
 from proxytune.study.study import open_study
 from proxytune.study.study_run import StudyRun
 
@@ -126,6 +137,52 @@ def read_study(home: Path) -> object:
         return result_of(StudyRun(as_stored(study, store), store))
 
 
+def write_note(home: Path, finished: Path) -> None:
+    copy_finished(home, finished)
+    with Store.open(home) as store:
+        store.under_way("one").begin(make_episode({"delay": 0.1, "trim": -0.2}, agent="agent1", start=2, seed=11))
+    (home / "theta").write_text('{"delay": 0.1, "trim": -0.2}')
+
+
+def read_note(home: Path) -> object:
+    with closing(sqlite3.connect(home / "study.db")) as plain, plain:
+        plain.execute("UPDATE under_way SET theta = CAST(? AS TEXT)", ((home / "theta").read_bytes(),))
+    with Store.open(home) as store:
+        return store.under_way("one").left()
+
+
+def write_lessons(home: Path, finished: Path) -> None:
+    estimate = {"value": 3.0, "low": 1.0, "high": 5.0}
+    lesson = {"theta": {"trim": 0.1}, "zero_shot": 2.5, "failure": "", "needed": estimate, "plv": None, "more": None}
+    copy_finished(home, finished)
+    (home / "families").mkdir()
+    (home / "families" / "lessons.json").write_text(json.dumps({"one": lesson, "two": lesson}))
+
+
+def read_the_lessons(home: Path) -> object:
+    lessons = read_lessons(read_study_settings(home))
+    return json.dumps({name: asdict(lesson) for name, lesson in lessons.items()}, allow_nan=False)
+
+
+def write_pictures(home: Path, finished: Path) -> None:
+    path = pictures_file(home)
+    path.parent.mkdir()
+    path.with_name("before.png").write_bytes(b"a picture")
+    texts = [{"file": "before.png", "title": "steady beside the target", "caption": "They part at 2 s."}]
+    path.write_text(json.dumps(texts, indent=2))
+
+
+def write_a_diagnosis(home: Path, finished: Path) -> None:
+    write_diagnosis(home)
+
+
+def read_a_diagnosis(home: Path) -> object:
+    """As a loop reads it and prints it."""
+    found = read_diagnosis(home)
+    rows = [level_text(row.before, row.unit) for row in compare_errors(found)]
+    return json.dumps([lacking(found), following(found, "", "model.toml", {}), rows, found], allow_nan=False)
+
+
 def write_runs(home: Path, finished: Path) -> None:
     judgement = {"code": "1a2b", "score": 3.0, "theta": {"trim": 0.1}}
     run = {"key": KEY, "visited": [[0.1, 0.2]], "seconds": 0.1, "judgement": judgement}
@@ -149,12 +206,16 @@ READERS = {
     "scores": Reader(write("scores.csv", SCORES), ("scores.csv",), read_both),
     "table": Reader(write_tables("csv"), ("run0.csv",), lambda home: read_source(home / "run0.csv", Wanted())),
     "arrays": Reader(write_arrays, ("lesson.npz",), read_arrays),
+    "lessons.json": Reader(write_lessons, ("families/lessons.json",), read_the_lessons),
+    "pictures.json": Reader(write_pictures, ("righted/pictures.json",), read_pictures),
+    "diagnosis.json": Reader(write_a_diagnosis, ("diagnosis.json",), read_a_diagnosis),
+    "under way": Reader(write_note, ("theta",), read_note),
     "runs": Reader(write_runs, ("runs.jsonl",), lambda home: read_runs(home / "runs.jsonl"), False),
     "loop.json": Reader(
         write("loop.json", '{"format": 1, "steps": {"study": "0123456789abcdef", "log": "0123"}}'), ("loop.json",), Kept
     ),
 }
-SHARE = {"study.db": 0.3, "log": 0.5, "table": 0.5}
+SHARE = {"study.db": 0.3, "under way": 0.3, "log": 0.5, "table": 0.5}
 """What takes longer to read is read less often."""
 
 

@@ -29,6 +29,7 @@ def filled(folder):
             store.save_trial("i", TrialRecord(number, theta, "finished", 4.0, {"prpv": 4.0, "ppv": 1 / 3}))
         store.save_trial("i", TrialRecord(1, THETAS[0], "finished", -3.0, {"plv": 3.0}), objective="plv")
         store.save_sweep("i", SweepRecord("trim", {"delay": 0.1}, (0.0, 0.1)))
+        store.under_way("i").begin(make_episode(THETAS[1], agent="agent1", start=2, seed=11))
     return folder / "study.db"
 
 
@@ -43,6 +44,7 @@ def test_what_was_written_is_whole(tmp_path, writable):
     assert [trial.number for trial in opened(tmp_path, writable)] == [1, 2, 3, 4]
 
 
+NOTE = "1 note of the episode under way"
 DAMAGES = {
     "UPDATE trials SET score = score + 7 WHERE number = 3": "trials 3 to 4 by prpv",
     "UPDATE trials SET measures = replace(measures, '4.0', '5.0') WHERE number = 2": "trials 2 to 4 by prpv",
@@ -59,6 +61,13 @@ DAMAGES = {
     "UPDATE episodes SET code = 'other' WHERE instance = 1 AND start = 3": "1 episode",
     "UPDATE episodes SET agent = CAST(x'ff61' AS TEXT) WHERE instance = 1 AND start = 3": "1 episode",
     "UPDATE sweeps SET points = '[0.0, 0.2]'": "1 sweep",
+    "UPDATE under_way SET theta = '{'": NOTE,
+    "UPDATE under_way SET theta = '[1, 2]'": NOTE,
+    f"UPDATE under_way SET theta = '{{\"trim\": {'9' * 400}}}'": NOTE,
+    'UPDATE under_way SET theta = \'{"trim": "x"}\'': NOTE,
+    "UPDATE under_way SET theta = x'ff61'": NOTE,
+    "UPDATE under_way SET agent = CAST(x'ff61' AS TEXT)": NOTE,
+    "UPDATE under_way SET start = 'first'": NOTE,
     "UPDATE instances SET identity = 'j' WHERE id = 1": "1 domain instance",
     "UPDATE instances SET theta = '{}' WHERE id = 4": "1 domain instance, 2 episodes, trial 4 by prpv",
 }

@@ -1,6 +1,9 @@
+import sqlite3
+
 import pytest
 
 from proxytune.domain import Outcome, make_episode
+from proxytune.errors import StoreError
 from proxytune.storage.store import Store
 
 EPISODES = [make_episode({"trim": 0.1 / 3.0, "delay": 0.2}, agent="a", start=start, seed=7) for start in (0, 1)]
@@ -31,3 +34,12 @@ def test_agents_are_known_by_how_an_episode_of_theirs_failed(tmp_path):
             episode = make_episode({}, agent=agent, start=0, seed=7)
             store.save_outcome("one", Outcome(episode, None, failure, 1.0))
         assert store.under_way("one").agents_that_failed("it ended", "it took") == {"a", "c"}
+
+
+def test_a_table_of_another_shape_is_refused(tmp_path):
+    with Store.open(tmp_path):
+        pass
+    with sqlite3.connect(tmp_path / "study.db") as plain:
+        plain.execute("CREATE TABLE under_way (agent TEXT)")
+    with pytest.raises(StoreError, match="its table 'under_way' is not as proxytune makes it"), Store.open(tmp_path):
+        pass

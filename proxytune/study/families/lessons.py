@@ -1,10 +1,11 @@
 """The lessons of several families as a file, so that they can be shown again without running any code."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from proxytune.drafts import draft_of
 from proxytune.errors import StoreError
@@ -42,15 +43,28 @@ def read_lessons(settings: StudySettings) -> dict[str, Lesson]:
         return {name: _lesson(one) for name, one in json.loads(path.read_bytes()).items()}
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         raise StoreError(f"{path}: is not as proxytune writes it; delete it, and run the study again") from None
 
 
 def _lesson(kept: Mapping[str, Any]) -> Lesson:
-    estimates = {name: None if kept[name] is None else Estimate(**kept[name]) for name in ESTIMATES}
-    theta = {str(name): float(value) for name, value in kept["theta"].items()}
-    zero_shot = None if kept["zero_shot"] is None else float(kept["zero_shot"])
-    return Lesson(theta, zero_shot, failure=str(kept["failure"]), **estimates)
+    estimates = {name: None if kept[name] is None else _estimate(**kept[name]) for name in ESTIMATES}
+    theta = {str(name): _number(value) for name, value in kept["theta"].items()}
+    return Lesson(theta, _or_none(kept["zero_shot"]), failure=str(kept["failure"]), **estimates)
+
+
+def _estimate(value: object, low: object, high: object) -> Estimate:
+    return Estimate(_or_none(value), _or_none(low), _or_none(high))
+
+
+def _or_none(value: object) -> float | None:
+    return None if value is None else _number(value)
+
+
+def _number(value: object) -> float:
+    if type(value) not in (int, float) or not math.isfinite(cast(float, value)):
+        raise ValueError("not a number")
+    return float(cast(float, value))
 
 
 def _file(settings: StudySettings) -> Path:

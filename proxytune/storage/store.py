@@ -10,19 +10,11 @@ from typing import Any, TypeVar
 from proxytune.domain import Episode, Outcome
 from proxytune.errors import InputError
 from proxytune.space import Theta
+from proxytune.storage import records
 from proxytune.storage.checksums import chain, seal
 from proxytune.storage.complaints import not_ours, sqlite_errors_as_store_errors
 from proxytune.storage.database import connect, disconnect, transaction
-from proxytune.storage.records import (
-    SweepRecord,
-    TrialRecord,
-    episode_of,
-    fact_of,
-    outcome_of,
-    sweep_of,
-    theta_json,
-    trial_of,
-)
+from proxytune.storage.records import SweepRecord, TrialRecord, theta_json
 from proxytune.storage.renaming import RENAMING
 from proxytune.storage.under_way import UnderWay
 
@@ -71,7 +63,7 @@ class Store:
 
     def facts(self) -> dict[str, Any]:
         """What determined the finished trials; empty before the first."""
-        return dict(self._made(fact_of, "SELECT key, value FROM facts"))
+        return dict(self._made(records.fact_of, "SELECT key, value FROM facts"))
 
     def begin(self, facts: Mapping[str, Any], objective: str = "prpv") -> None:
         """Start a search afresh with these facts beside those of others; episodes are kept, its trials are not."""
@@ -110,7 +102,7 @@ class Store:
         """Every trial of a search, in order; the last ones may be open."""
         if objective not in self._trials:
             trials = self._made(
-                trial_of,
+                records.trial_of,
                 "SELECT number, theta, state, score, measures, failed_episodes, failure, decided, bound, seconds"
                 " FROM trials JOIN instances ON instances.id = trials.instance WHERE objective = ? ORDER BY number",
                 (objective,),
@@ -163,7 +155,7 @@ class Store:
         key = identity, theta_json(theta)
         if key not in self._outcomes:
             outcomes = self._made(
-                outcome_of,
+                records.outcome_of,
                 "SELECT theta, agent, start, seed, metrics, failure, seconds"
                 " FROM episodes JOIN instances ON instances.id = episodes.instance WHERE identity = ? AND theta = ?",
                 key,
@@ -181,7 +173,7 @@ class Store:
             "SELECT theta, agent, start, seed FROM episodes JOIN instances ON instances.id = episodes.instance"
             " WHERE identity = ? AND failure IS NOT NULL AND code <> ?"
         )
-        return set(self._made(episode_of, query, (identity, code)))
+        return set(self._made(records.episode_of, query, (identity, code)))
 
     def forget_failures(self) -> None:
         """Make every failure one of other code, so that it is tried again."""
@@ -218,7 +210,7 @@ class Store:
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""
         query = "SELECT identity, parameter, base, points, target_model, replays FROM sweeps ORDER BY number"
-        return self._made(sweep_of, query)
+        return self._made(records.sweep_of, query)
 
     def _remember(self, identity: str, theta: str, outcome: Outcome) -> None:
         driven = outcome.episode

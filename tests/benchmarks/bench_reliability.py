@@ -46,15 +46,16 @@ TABLES = ("facts", "trials", "episodes", "instances")
 
 def survive_kills(count: int, home: Path) -> str:
     """Kill studies of every engine, and compare what they come to."""
-    make_study = conftest.study_maker(home)
     cases = list(itertools.product([engine for engine in STUDY_ENGINES if engine != "tpe"], "12", range(count)))
     equal, kills = 0, 0
     with launched.launching() as launcher:
         for engine, jobs, number in cases:
-            keys, name = {"engine": f'"{engine}"', "initial": "3"}, f"{engine}_{jobs}_{number}"
-            whole = launched.never_stopped(make_study, f"whole_{name}", **keys)
-            folder = make_study(name, domain={"sleep": "0.01"}, jobs=jobs, **keys)
-            moments = np.random.default_rng((int(jobs), number)).integers(0, len(whole[1]), KILLS)
+            own = home / f"{engine}_{jobs}_{number}"
+            own.mkdir()
+            make_study, keys = conftest.study_maker(own), {"engine": f'"{engine}"', "initial": "3"}
+            whole = launched.never_stopped(make_study, **keys)
+            folder = make_study("stopped", domain={"sleep": "0.01"}, jobs=jobs, **keys)
+            moments = np.random.default_rng((int(jobs), number)).integers(1, len(whole[1]), KILLS)
             kills += sum(killed(launcher, folder, int(moment)) for moment in sorted(moments))
             status, printed = launched.Launched(launcher, folder).end()
             assert status == 0, printed

@@ -17,6 +17,7 @@ from proxytune.study.settings import LEARNING, StudySettings, read_study_setting
 from proxytune.study.study_run import StudyRun
 from proxytune.study.without_code import open_to_look
 
+AGAIN = "a sweep that is lost is there again after the same sweep command, which drives only episodes that are lost"
 COUNTED = {"trials": "trial", "episodes": "episode", "sweeps": "sweep"}
 
 
@@ -94,6 +95,7 @@ def _say(found: Salvage | None) -> list[str]:
     return [
         f"kept: {_count(found.kept)}",
         f"lost: {_count(lost) or 'nothing that could be read'}",
+        *([AGAIN] if "sweeps" in lost else []),
         f"the damaged file is now {found.aside}",
     ]
 

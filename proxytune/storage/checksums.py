@@ -30,6 +30,8 @@ LINKED = (
     " state, score, measures, failed_episodes, failure, decided, bound, seconds"
 )
 """What a trial's digest covers."""
+SWEEP_COUNT = """
+CREATE TABLE IF NOT EXISTS sweep_count (place INTEGER PRIMARY KEY CHECK (place = 1), sweeps INTEGER NOT NULL)"""
 SINGULAR = {
     "facts": "fact",
     "instances": "domain instance",
@@ -120,6 +122,20 @@ def chain(connection: sqlite3.Connection, objective: str, first: int = 1) -> Non
         connection.execute("INSERT INTO chains VALUES (?, ?, ?)", (objective, count, digest))
 
 
+def count_sweeps(connection: sqlite3.Connection) -> None:
+    """Write how many sweeps there are."""
+    connection.execute(SWEEP_COUNT)
+    connection.execute("INSERT OR REPLACE INTO sweep_count SELECT 1, count(*) FROM sweeps")
+
+
+def missing_sweeps(connection: sqlite3.Connection) -> int:
+    """How many sweeps are there no more; none where they were not counted."""
+    if not _has(connection, "sweep_count"):
+        return 0
+    query = "SELECT max(0, sweeps - (SELECT count(*) FROM sweeps)) FROM sweep_count"
+    return sum(int(missing) for (missing,) in connection.execute(query))
+
+
 def seal_all(connection: sqlite3.Connection) -> None:
     """Write the checksums and digests of all that a database has."""
     for table in COLUMNS:
@@ -132,6 +148,7 @@ def find_damage(connection: sqlite3.Connection) -> Damage:
     """What is not as it was written."""
     with readable_texts(connection):
         counts = {table: _broken_rows(connection, table) for table in COLUMNS}
+        counts["sweeps"] += missing_sweeps(connection)
         counts["under_way"] = _unreadable_notes(connection)
         ends = {name: (count, digest) for name, count, digest in connection.execute("SELECT * FROM chains")}
         names = [name for (name,) in connection.execute("SELECT DISTINCT objective FROM trials")]
@@ -158,10 +175,14 @@ def _unreadable_notes(connection: sqlite3.Connection) -> int:
 
 
 def _rows_under_way(connection: sqlite3.Connection) -> list[tuple[Any, ...]]:
-    query = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = 'under_way'"
-    if not connection.execute(query).fetchone()[0]:
+    if not _has(connection, "under_way"):
         return []
     return connection.execute("SELECT theta, agent, start, seed FROM under_way").fetchall()
+
+
+def _has(connection: sqlite3.Connection, table: str) -> bool:
+    query = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?"
+    return bool(connection.execute(query, (table,)).fetchone()[0])
 
 
 def _first_broken(connection: sqlite3.Connection, objective: str, count: int, end: str) -> int | None:

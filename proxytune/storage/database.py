@@ -8,7 +8,7 @@ from pathlib import Path
 from proxytune.errors import StoreError
 from proxytune.storage.checksums import COLUMNS, find_damage, prepare
 from proxytune.storage.complaints import corrupt, sqlite_errors_as_store_errors
-from proxytune.storage.formats import APPLICATION, FORMAT, UNDER_WAY, convert, make_tables, version_of
+from proxytune.storage.formats import APPLICATION, BESIDE, FORMAT, convert, make_tables, version_of
 from proxytune.storage.own_files import refuse_links
 
 PATIENCE_S = 30.0
@@ -154,11 +154,12 @@ def check_tables(connection: sqlite3.Connection, path: Path) -> None:
     """
     own = sqlite3.connect(":memory:", isolation_level=None)
     make_tables(own)
-    own.execute(UNDER_WAY)
-    for table in (*COLUMNS, "trials", "chains", "under_way"):
+    for table in BESIDE.values():
+        own.execute(table)
+    for table in (*COLUMNS, "trials", "chains", *BESIDE):
         query = f"SELECT name, type, pk, hidden FROM pragma_table_xinfo('{table}')"
         found, made = connection.execute(query).fetchall(), own.execute(query).fetchall()
-        if found != made and (found or table != "under_way"):
+        if found != made and (found or table not in BESIDE):
             raise corrupt(path, f"its table '{table}' is not as proxytune makes it")
     own.close()
 

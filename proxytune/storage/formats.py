@@ -23,6 +23,8 @@ For plain SQL (`sqlite3 study.db`); the format is `PRAGMA user_version`:
                replays                            identity of the instances whose episodes are POD's replays, or empty
     under_way  place (1), identity, theta (JSON)  the episode that runs in the study's own process; no row between runs.
                agent, start, seed                 The table is made when it is first needed
+    sweep_count  place (1), sweeps                how many sweeps there are, so that a deleted one is missed. The table
+                                                  is made with the first of them; without it that is not known
 
 Each row of facts, instances, episodes and sweeps has a `checksum` (checksums.py): who edits one by hand is told that it
 is damaged.
@@ -41,7 +43,7 @@ columns. Up to format 4 nothing was known of the code of a failure. Up to format
 import json
 import sqlite3
 
-from proxytune.storage.checksums import seal_all
+from proxytune.storage.checksums import SWEEP_COUNT, seal_all
 
 FORMAT = 6
 APPLICATION = 0x70747564  # "ptud"
@@ -110,6 +112,8 @@ UNDER_WAY = """
 CREATE TABLE IF NOT EXISTS under_way (
     place INTEGER PRIMARY KEY CHECK (place = 1), identity TEXT NOT NULL, theta TEXT NOT NULL, agent TEXT NOT NULL,
     start INTEGER NOT NULL, seed INTEGER NOT NULL)"""
+BESIDE = {"under_way": UNDER_WAY, "sweep_count": SWEEP_COUNT}
+"""Tables that are made when they are first needed."""
 STEPS = (FROM_1, FROM_2, FROM_3, FROM_4, FROM_5)
 """From each format to the next."""
 SCHEMA = f"{OF_5}{FROM_5}PRAGMA application_id = {APPLICATION};"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.errors import InputError, StoreError
-from proxytune.storage.checksums import chain, checksum, link, readable_texts
+from proxytune.storage.checksums import chain, checksum, count_sweeps, link, missing_sweeps, readable_texts
 from proxytune.storage.complaints import sqlite_errors_as_store_errors
 from proxytune.storage.database import check_whole, copy_of_earlier, open_file
 from proxytune.storage.formats import APPLICATION, FORMAT, make_tables, version_of
@@ -33,7 +33,8 @@ class Salvage:
     Attributes:
         aside: Where the damaged one is now.
         kept: Rows by table.
-        lost: Rows by table that could be read and were not whole, or stand on what was not; others could not be read.
+        lost: Rows by table that could be read and were not whole, or stand on what was not, and sweeps that are gone;
+            others could not be read.
     """
 
     aside: Path
@@ -66,7 +67,7 @@ def salvage(folder: Path) -> Salvage | None:
 
 
 def _rebuild(path: Path) -> Salvage:
-    rows = _rows(path)
+    rows, gone = _rows(path)
     whole = dict(_whole(rows))
     draft = path.with_name(f".{path.name}.draft")
     try:
@@ -81,16 +82,20 @@ def _rebuild(path: Path) -> Salvage:
         with suppress(OSError):
             draft.unlink()
     kept = {table: len(whole[table]) for table in KEYS}
-    return Salvage(aside, kept, {table: len(rows[table]) - kept[table] for table in KEYS})
+    lost = {table: len(rows[table]) - kept[table] for table in KEYS}
+    return Salvage(aside, kept, {**lost, "sweeps": lost["sweeps"] + gone})
 
 
-def _rows(path: Path) -> dict[str, list[Row]]:
-    """All rows that can be read."""
+def _rows(path: Path) -> tuple[dict[str, list[Row]], int]:
+    """All rows that can be read, and how many sweeps are there no more."""
     connection = open_file(path, writable=False)
     try:
         connection = _ours(connection, path)
         with readable_texts(connection):
-            return {table: _readable(connection, table) for table in KEYS}
+            gone = 0
+            with suppress(sqlite3.DatabaseError):
+                gone = missing_sweeps(connection)
+            return {table: _readable(connection, table) for table in KEYS}, gone
     finally:
         connection.close()
 
@@ -172,6 +177,7 @@ def _write(path: Path, rows: Mapping[str, list[Row]]) -> None:
                 connection.execute(f"INSERT INTO {table} VALUES ({', '.join('?' * len(row))})", row)
         for (objective,) in connection.execute("SELECT DISTINCT objective FROM trials").fetchall():
             chain(connection, objective)
+        count_sweeps(connection)
         connection.execute("COMMIT")
     finally:
         connection.close()

@@ -11,7 +11,7 @@ from proxytune.domain import Episode, Outcome
 from proxytune.errors import InputError
 from proxytune.space import Theta
 from proxytune.storage import records
-from proxytune.storage.checksums import chain, seal
+from proxytune.storage.checksums import chain, count_sweeps, seal
 from proxytune.storage.complaints import not_ours, sqlite_errors_as_store_errors
 from proxytune.storage.database import connect, disconnect, transaction
 from proxytune.storage.records import SweepRecord, TrialRecord, theta_json
@@ -96,6 +96,7 @@ class Store:
                 connection.execute("UPDATE facts SET value = ? WHERE key = 'identity' AND value = ?", values)
             for table in ("facts", "instances", "sweeps"):
                 seal(connection, table)
+            count_sweeps(connection)
         self._outcomes.clear()
 
     def trials(self, objective: str = "prpv") -> list[TrialRecord]:
@@ -206,6 +207,7 @@ class Store:
                 (*row, sweep.target_model, sweep.replays),
             )
             seal(connection, "sweeps", "number = last_insert_rowid()")
+            count_sweeps(connection)
 
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""

@@ -80,6 +80,22 @@ def test_a_score_that_its_episodes_do_not_give_is_told_also_where_every_checksum
     assert goes_on_as_if_nothing_had_happened(finished, finished_once, capsys) == 0
 
 
+def test_a_sweep_that_was_deleted_is_told_and_there_again_after_the_same_command(finished, capsys):
+    sweep = ["sweep", str(finished), "--parameter", "trim", "--points", "2", "--json"]
+    assert main(sweep) == 0
+    whole = json.loads(capsys.readouterr().out)["curves"]
+    damaged(finished, "DELETE FROM sweeps")
+    for command in (["plot", str(finished)], sweep):
+        assert main(command) == 1
+        assert "is damaged, or was edited by hand: 1 sweep; run: " in capsys.readouterr().err
+    assert main(["repair", str(finished)]) == 0
+    said = capsys.readouterr().out
+    assert "lost: 1 sweep\na sweep that is lost is there again after the same sweep command" in said
+    assert main(sweep) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert (again["curves"], again["episodes"]["run"]) == (whole, 0)
+
+
 def test_a_whole_study_is_left_as_it_is(finished, capsys):
     before = (finished / "study.db").read_bytes()
     assert main(["repair", str(finished)]) == 0

@@ -32,7 +32,7 @@ CREATE TABLE sweeps (
 INSERT INTO sweeps SELECT parameter, base, points, identity FROM sweeps_2;
 DROP TABLE sweeps_2;"""
 BACK = {
-    5: f"DROP TABLE IF EXISTS under_way; {WITHOUT_CHECKSUMS}",
+    5: f"DROP TABLE IF EXISTS under_way; DROP TABLE IF EXISTS sweep_count; {WITHOUT_CHECKSUMS}",
     4: WITHOUT_CODE,
     3: WITH_PRPV_ALONE,
     2: WITHOUT_CUTTING,

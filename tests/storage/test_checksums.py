@@ -61,6 +61,8 @@ DAMAGES = {
     "UPDATE episodes SET code = 'other' WHERE instance = 1 AND start = 3": "1 episode",
     "UPDATE episodes SET agent = CAST(x'ff61' AS TEXT) WHERE instance = 1 AND start = 3": "1 episode",
     "UPDATE sweeps SET points = '[0.0, 0.2]'": "1 sweep",
+    "DELETE FROM sweeps": "1 sweep",
+    "DELETE FROM sweeps; UPDATE facts SET value = 'x' WHERE key = 'seed'": "1 fact, 1 sweep",
     "UPDATE under_way SET theta = '{'": NOTE,
     "UPDATE under_way SET theta = '[1, 2]'": NOTE,
     f"UPDATE under_way SET theta = '{{\"trim\": {'9' * 400}}}'": NOTE,
@@ -78,7 +80,7 @@ DAMAGES = {
 def test_damage_is_told_with_what_is_lost_and_what_to_do(tmp_path, damage, writable):
     path = filled(tmp_path)
     with sqlite3.connect(path) as plain:
-        plain.execute(damage)
+        plain.executescript(damage)
     lost = f"{path}: is damaged, or was edited by hand: {DAMAGES[damage]}; run: python -m proxytune repair {tmp_path}"
     with pytest.raises(StoreError) as complaint:
         opened(tmp_path, writable)
@@ -133,6 +135,35 @@ def test_what_earlier_versions_wrote_is_taken_as_it_is_and_sealed(tmp_path):
         opened(tmp_path, writable=True)
 
 
+def test_sweeps_asked_for_again_or_renamed_are_not_missed(tmp_path):
+    path = filled(tmp_path)
+    sweep = SweepRecord("trim", {"delay": 0.1}, (0.0, 0.1))
+    with Store.open(tmp_path) as store:
+        store.save_sweep("i", sweep)
+        store.save_sweep("j", sweep)
+        store.rename_identity(("i",), "j")
+    with Store.read(tmp_path) as store:
+        assert store.sweeps() == [("j", sweep)]
+    with sqlite3.connect(path) as plain:
+        plain.execute("DELETE FROM sweeps")
+    with pytest.raises(StoreError, match="1 sweep"):
+        opened(tmp_path, writable=False)
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_sweeps_that_nobody_has_counted_are_taken_as_they_are_and_counted_with_the_next(tmp_path, writable):
+    path = filled(tmp_path)
+    with sqlite3.connect(path) as plain:
+        plain.execute("DROP TABLE sweep_count")
+    assert [trial.number for trial in opened(tmp_path, writable)] == [1, 2, 3, 4]
+    with Store.open(tmp_path) as store:
+        store.save_sweep("i", SweepRecord("delay", {}, (0.0, 0.1)))
+    with sqlite3.connect(path) as plain:
+        plain.execute("DELETE FROM sweeps WHERE parameter = 'trim'")
+    with pytest.raises(StoreError, match="1 sweep"):
+        opened(tmp_path, writable)
+
+
 @pytest.mark.parametrize("writable", [True, False])
 @pytest.mark.parametrize(
     ("statement", "what"),
@@ -142,6 +173,10 @@ def test_what_earlier_versions_wrote_is_taken_as_it_is_and_sealed(tmp_path):
         ("CREATE VIRTUAL TABLE notes USING fts5(text)", "a virtual table 'notes'"),
         ("ALTER TABLE facts ADD COLUMN more TEXT", r"its table 'facts' is not as proxytune makes it"),
         ("ALTER TABLE trials ADD COLUMN more AS (score + 7)", r"its table 'trials' is not as proxytune makes it"),
+        (
+            "DROP TABLE sweep_count; CREATE TABLE sweep_count (n)",
+            r"its table 'sweep_count' is not as proxytune makes it",
+        ),
         ("DROP TABLE sweeps", r"its table 'sweeps' is not as proxytune makes it"),
     ],
 )

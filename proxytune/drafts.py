@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import platform
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,11 +11,14 @@ from pathlib import Path
 def draft_of(path: Path) -> Iterator[Path]:
     """The empty draft of a file, to be written meanwhile; what raises leaves the old file, and no draft.
 
+    Drafts of the same file that killed processes of this machine have left are removed.
+
     Raises:
         OSError: If it cannot be made, brought to the disk, or take the file's name.
     """
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    draft = draft_path(path)
     try:
+        _clear_away(path)
         _make_anew(draft)
         yield draft
         _to_disk(draft)
@@ -23,6 +27,36 @@ def draft_of(path: Path) -> Iterator[Path]:
         with contextlib.suppress(OSError):
             draft.unlink()
         raise
+
+
+def draft_path(path: Path) -> Path:
+    """Where this process writes the draft of a file: machines that share a folder may have processes of one number."""
+    return path.with_name(f"{_of_this_machine(path)}{os.getpid()}")
+
+
+def _of_this_machine(path: Path) -> str:
+    return f".{path.name}.{platform.node()}-"
+
+
+def _clear_away(path: Path) -> None:
+    """Remove what processes left that were killed while they wrote this file."""
+    start = _of_this_machine(path)
+    for left in path.parent.iterdir():
+        process = left.name.removeprefix(start)
+        if left.name.startswith(start) and process.isdecimal() and not _is_alive(int(process)):
+            with contextlib.suppress(OSError):
+                left.unlink()
+
+
+def _is_alive(process: int) -> bool:
+    """Whether a process of this machine is still there."""
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # another user's
+        _clear_away(path)
+    return True
 
 
 def _make_anew(draft: Path) -> None:

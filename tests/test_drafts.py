@@ -1,10 +1,13 @@
 """A file is the old one or the new one, whatever happens between."""
 
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
-from proxytune.drafts import draft_of
+from proxytune.drafts import draft_of, draft_path
 
 
 def test_the_draft_takes_the_files_name_once_it_is_written(tmp_path):
@@ -31,7 +34,56 @@ def test_what_raises_leaves_the_old_file_and_no_draft(tmp_path, problem):
 def test_a_link_in_the_drafts_place_is_not_followed(tmp_path):
     victim, path = tmp_path / "precious", tmp_path / "table.csv"
     victim.write_text("mine")
-    path.with_name(f".{path.name}.{os.getpid()}").symlink_to(victim)
+    draft_path(path).symlink_to(victim)
     with draft_of(path) as draft:
         draft.write_text("new")
     assert (victim.read_text(), path.read_text()) == ("mine", "new")
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from proxytune.drafts import draft_of
+with draft_of(Path(sys.argv[1])):
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def left_by_a_killed_process(path: Path) -> Path:
+    subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+    (left,) = (entry for entry in path.parent.iterdir() if entry.name.startswith(f".{path.name}"))
+    return left
+
+
+def test_the_next_draft_of_the_same_file_removes_what_a_killed_process_left(tmp_path):
+    path = tmp_path / "page.html"
+    assert left_by_a_killed_process(path).exists()
+    with draft_of(path) as draft:
+        draft.write_text("whole")
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_others_write_is_left_alone(tmp_path):
+    path, alive = tmp_path / "table.csv", os.getppid()
+    dead = left_by_a_killed_process(tmp_path / "table.csv.gz")
+    mine = draft_path(path).name
+    theirs = [
+        mine.replace(str(os.getpid()), str(alive)),  # a process that still writes
+        mine.replace(".table.csv.", ".table.csv.another-"),  # the same file from another machine
+        f".{path.name}.bak",
+        mine.replace(str(os.getpid()), "old"),
+        mine.replace(str(os.getpid()), "²"),
+    ]
+    for name in theirs:
+        (tmp_path / name).write_text("theirs")
+    with draft_of(path) as draft:
+        draft.write_text("new")
+    assert {entry.name for entry in tmp_path.iterdir()} == {path.name, dead.name, *theirs}
+
+
+def test_a_process_number_beyond_all_is_no_process(tmp_path):
+    path = tmp_path / "table.csv"
+    draft_path(path).with_name(draft_path(path).name + "9" * 30).write_text("nobody's")
+    with draft_of(path) as draft:
+        draft.write_text("new")
+    assert list(tmp_path.iterdir()) == [path]

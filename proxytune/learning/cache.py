@@ -1,9 +1,7 @@
 """Arrays kept on disk by what determines them: made once, found again after any interruption."""
 
-import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,22 +71,6 @@ def _write(path: Path, arrays: Arrays) -> None:
             np.savez_compressed(file, allow_pickle=False, **arrays)
     except OSError as problem:
         raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
-    finally:
-        for left in path.parent.glob(f".{path.name}.*"):
-            if not _is_alive(int(left.suffix[1:])):
-                with contextlib.suppress(OSError):
-                    left.unlink()
-
-
-def _is_alive(process: int) -> bool:
-    """Whether a process that may have been killed while it wrote is still there."""
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # another user's
-        pass
-    return True
 
 
 def _read(path: Path) -> Arrays:

@@ -5,6 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
+from proxytune.drafts import draft_path
 from proxytune.errors import RunError
 from proxytune.report.writing import figures_also_as, save, write_picture, write_text
 
@@ -91,7 +92,7 @@ def test_a_failed_picture_keeps_the_old_file_and_is_told_in_one_line(tmp_path, m
 def test_a_draft_follows_no_link_that_lies_in_its_place(tmp_path):
     victim = tmp_path / "precious"
     victim.write_text("mine")
-    (tmp_path / f".page.html.{os.getpid()}").symlink_to(victim)
+    draft_path(tmp_path / "page.html").symlink_to(victim)
     write_text(tmp_path / "page.html", "new")
     assert victim.read_text() == "mine"
     assert (tmp_path / "page.html").read_text() == "new"

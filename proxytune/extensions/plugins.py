@@ -23,8 +23,10 @@ def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint
         ExtensionError: If two have one name, or one is called like something shipped.
     """
     found: dict[str, EntryPoint] = {}
-    for point in _installed(kind, tuple(sys.path)):
-        name = point.name.partition(".")[2]
+    for point in _installed(tuple(sys.path)):
+        of_kind, _, name = point.name.partition(".")
+        if of_kind != kind:
+            continue
         if not name.replace("-", "_").isidentifier():
             raise ExtensionError(f"plug-in '{point.name}' of {_package(point)} must be called {kind}.NAME, one word")
         if name in shipped:
@@ -37,11 +39,10 @@ def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint
     return MappingProxyType(found)
 
 
-@lru_cache
-def _installed(kind: str, path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """The entry points of a kind; `path` is sys.path, on which they depend."""
-    points = [point for point in entry_points(group=GROUP) if point.name.startswith(f"{kind}.")]
-    return tuple(sorted(points, key=lambda point: (point.name, _package(point))))
+@lru_cache(maxsize=1)
+def _installed(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """The entry points of every kind; `path` is sys.path, on which they depend: looking for them takes 20 ms."""
+    return tuple(sorted(entry_points(group=GROUP), key=lambda point: (point.name, _package(point))))
 
 
 def _package(point: EntryPoint) -> str:

@@ -9,7 +9,10 @@ from proxytune.search.design import unit_points
 from proxytune.search.surrogate import Array, Surrogate
 
 POINTS = 2048
-"""At most so many points: the functions drawn are drawn jointly, which takes the cube of their number."""
+"""At most so many points."""
+
+DRAWN_POINTS = 1024
+"""At most so many of them for the functions drawn: these are drawn jointly, which takes the cube of their number."""
 
 DRAWS = 200
 LEVELS = (0.025, 0.975)
@@ -42,8 +45,8 @@ def importances(surrogate: Surrogate) -> tuple[Importance, ...]:
     """
     names = surrogate.space.names
     with threadpool_limits(limits=1):
-        mean, drawn = _values(surrogate, len(names))
-    share, alone = _indices(mean)
+        share, alone = _indices(surrogate.mean(_points(len(names), POINTS)).reshape(2 + len(names), -1))
+        drawn = _draws(surrogate, _points(len(names), DRAWN_POINTS)).reshape(DRAWS, 2 + len(names), -1)
     low, high = np.quantile(_indices(drawn)[0], LEVELS, axis=0)
     return tuple(
         Importance(
@@ -56,20 +59,24 @@ def importances(surrogate: Surrogate) -> tuple[Importance, ...]:
     )
 
 
-def _values(surrogate: Surrogate, dimensions: int) -> tuple[Array, Array]:
-    """The posterior mean, shape (2 + parameters, points), and draws of it, one more axis before.
+def _points(dimensions: int, most: int) -> Array:
+    """At most so many points of the unit cube in 2 + parameters rows, one after another: (points, parameters).
 
-    Row 0 is at one set of points, row 1 at another, row 2 + i at the first with column i of the other.
+    Row 0 is one set of points, row 1 another, row 2 + i the first with column i of the other.
     """
-    base = 2 ** int(np.log2(POINTS / (2 + dimensions)))
-    pairs = unit_points(2 * dimensions, base, 0)
+    pairs = unit_points(2 * dimensions, 2 ** int(np.log2(most / (2 + dimensions))), 0)
     first, second = pairs[:, :dimensions], pairs[:, dimensions:]
     swapped = [np.where(np.arange(dimensions) == column, second, first) for column in range(dimensions)]
-    mean, covariance = surrogate.joint(np.concatenate([first, second, *swapped]))
+    return np.concatenate([first, second, *swapped])
+
+
+def _draws(surrogate: Surrogate, points: Array) -> Array:
+    """Functions drawn from the posterior, at points of the unit cube: (draws, points)."""
+    mean, covariance = surrogate.joint(points)
     scale = max(float(np.diag(covariance).mean()), JITTER)
     root = np.linalg.cholesky(covariance + JITTER * scale * np.eye(len(mean)))
-    drawn = mean + np.random.default_rng(0).standard_normal((DRAWS, len(mean))) @ root.T
-    return mean.reshape(-1, base), drawn.reshape(DRAWS, -1, base)
+    drawn: Array = mean + np.random.default_rng(0).standard_normal((DRAWS, len(mean))) @ root.T
+    return drawn
 
 
 def _indices(values: Array) -> tuple[Array, Array]:

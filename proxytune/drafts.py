@@ -55,7 +55,7 @@ def _is_alive(process: int) -> bool:
     except (ProcessLookupError, OverflowError):
         return False
     except PermissionError:  # another user's
-        _clear_away(path)
+        pass
     return True
 
 

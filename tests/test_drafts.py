@@ -87,3 +87,16 @@ def test_a_process_number_beyond_all_is_no_process(tmp_path):
     with draft_of(path) as draft:
         draft.write_text("new")
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_another_users_process_still_writes(tmp_path, monkeypatch):
+    path = tmp_path / "table.csv"
+    draft_path(path).with_name(draft_path(path).name + "1").write_text("theirs")
+
+    def forbidden(process, signal):
+        raise PermissionError
+
+    monkeypatch.setattr(os, "kill", forbidden)
+    with draft_of(path) as draft:
+        draft.write_text("new")
+    assert len(list(tmp_path.iterdir())) == 2

@@ -1,5 +1,6 @@
 """One door for a user's own code: found, kept apart by folder, usable in other processes, refused in one line."""
 
+import os
 import pickle
 import sys
 
@@ -50,6 +51,17 @@ def test_an_attribute_is_found_in_the_folder_before_the_installed_modules(write)
     assert load("json:here", kind="agent", beside=folder) == 7
     assert load("json:loads", kind="agent")("3") == 3
     assert "here" not in vars(sys.modules["json"])
+
+
+def test_what_runs_is_what_the_file_says_though_its_time_and_size_are_as_before(write, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    for size in (1, 2):
+        folder = write("study", family=f"size = {size}\n")
+        os.utime(folder / "family.py", (1.0, 1.0))
+        assert load("family:size", kind="family", beside=folder) == size
+        assert [path.name for path in folder.iterdir()] == ["family.py"]
+        for name in [name for name in sys.modules if name.startswith("beside_study") and name.endswith(".family")]:
+            del sys.modules[name]
 
 
 def test_modules_of_one_name_in_two_folders_are_not_mixed_up(write):

@@ -14,7 +14,7 @@ import importlib
 import sys
 from collections.abc import Mapping, Sequence
 from importlib.abc import Loader
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -103,7 +103,12 @@ class _Loader(Loader):
     def exec_module(self, module: ModuleType) -> None:
         own = functools.partial(_import, self._home)
         vars(module)["__builtins__"] = {**vars(builtins), "__import__": own}
-        self._loader.exec_module(module)
+        if isinstance(self._loader, SourceFileLoader):
+            path = self._loader.path
+            # Bytecode kept beside a file may be that of what it was: Python compares whole seconds and sizes
+            exec(self._loader.source_to_code(self._loader.get_data(path), path), vars(module))
+        else:
+            self._loader.exec_module(module)
 
 
 def _import(

@@ -54,6 +54,7 @@ def test_the_readme_shows_python_in_ten_lines_at_most():
     assert len(code.splitlines()) <= 10
 
 
+@pytest.mark.slow
 def test_the_python_of_the_readme_runs(tmp_path, monkeypatch):
     """On quickstart made small."""
     made = shutil.ignore_patterns("study.db*", "figures", "*.md", "*.png")

@@ -103,6 +103,7 @@ def truths(folder, output, *more):
     return ("compare", *map(str, (folder, *few, *more)), "--json")
 
 
+@pytest.mark.slow
 def test_with_truths_it_tells_what_is_known_of_them_and_simulates_nothing_twice(make_study, tmp_path, capsys):
     folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
     assert main([*truths(folder, tmp_path / "out")]) == 0
@@ -122,6 +123,7 @@ def test_with_truths_it_tells_what_is_known_of_them_and_simulates_nothing_twice(
     assert [{**row, "seconds": 0.0} for row in again["engines"]] == timed
 
 
+@pytest.mark.slow
 def test_targets_with_what_the_proxy_lacks_are_other_runs(make_study, tmp_path, capsys):
     folder, lacks = make_study(parameters={"trim": "[-0.3, 0.3]"}), tmp_path / "lacks.toml"
     lacks.write_text("delay = 0.25\n")

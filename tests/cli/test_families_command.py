@@ -192,6 +192,7 @@ def test_loop_is_of_a_study_without_families(make_study, place, capsys):
     assert "families: `loop` is of one family; give it a study without this table" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_every_command_takes_the_folder_of_one_family(finished, capsys):
     one = str(finished / "families" / "wrong")
     assert main(["plot", one]) == main(["repair", one]) == main(["study", one]) == 0
@@ -227,6 +228,7 @@ def test_a_family_in_which_nothing_works_is_named(make_study, capsys):
     assert (folder / "families" / "a" / "study.db").exists()
 
 
+@pytest.mark.slow
 def test_what_changed_since_is_told_with_the_family_and_its_database(make_study, capsys):
     folder = make_several(make_study)
     run_families(folder)

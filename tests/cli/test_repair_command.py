@@ -144,6 +144,7 @@ def test_writes_that_are_still_in_the_log_are_kept_and_the_log_is_set_aside(fini
         assert store.trials() == before[:6]
 
 
+@pytest.mark.slow
 def test_what_was_set_aside_before_is_kept(finished, capsys):
     for _ in range(2):
         damaged(finished, "UPDATE trials SET score = score + 7 WHERE number = 3 OR number = 1")

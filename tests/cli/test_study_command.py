@@ -135,6 +135,7 @@ def test_a_budget_or_jobs_out_of_bounds_are_refused(make_study, capsys, option, 
     assert f"{option} must be between 1 and " in line
 
 
+@pytest.mark.slow
 def test_why_a_study_has_ended_is_said(make_study, capsys):
     folder = make_study(stop="{ no_improvement = 1e9 }")
     assert main(["study", str(folder)]) == 0

@@ -52,6 +52,7 @@ def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, c
     assert {path.name for path in (folder / "figures").glob("*.png")} == {"sweep_trim.png", "sweep_trim_pod.png"}
 
 
+@pytest.mark.slow
 def test_trials_and_sweeps_share_episodes(finished, capsys):
     assert main(["study", str(finished), "--json"]) == 0
     theta = json.loads(capsys.readouterr().out)["trials"][0]["theta"]

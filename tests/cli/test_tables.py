@@ -57,6 +57,7 @@ def test_the_scores_of_one_proxy_and_of_several_are_whole(tmp_path):
         assert_whole(shown("score", *words, "--target", f"{path}:the_target", *metrics))
 
 
+@pytest.mark.slow
 def test_a_study_and_its_sweep_are_whole(finished):
     assert_whole(shown("study", finished))
     assert_whole(shown("sweep", finished, "--parameter", "trim", "--points", "2"))
@@ -69,6 +70,7 @@ def test_the_scores_of_a_twin_are_whole(make_study, tmp_path):
     assert_whole(shown("measure", make_study(), *words))
 
 
+@pytest.mark.slow
 def test_a_comparison_is_whole(tmp_path):
     few = ("--seeds", "2", "--budget", "4", "--initial", "2", "--output", tmp_path)
     assert_whole(shown("compare", "analytic", "--engines", "sobol,random", *few))

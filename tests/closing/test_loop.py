@@ -153,6 +153,7 @@ def test_what_is_done_is_not_done_again_and_comes_out_the_same(closed, closed_on
     assert but_for_times(again) == but_for_times(closed_once[1])
 
 
+@pytest.mark.slow
 def test_another_log_does_only_what_comes_after_it_again(closed, closed_once, diagnosed, close, tmp_path):
     log = (closed / "loop" / "log").rename(tmp_path / "log")
     # The same drives, but now they are what somebody gave.

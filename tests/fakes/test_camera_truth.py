@@ -274,6 +274,7 @@ def test_a_still_set_is_a_log_with_a_row_for_every_frame(few_frames, tmp_path):
     assert 2.0 <= abs(truth.theta["camera_roll"]) <= 6.0
 
 
+@pytest.mark.slow
 def test_a_driven_set_tells_when_its_frames_were_taken(few_frames, tmp_path):
     write_set(tmp_path / "set", "camera_latency plain", 1)
     frames, samples = (rows_of(tmp_path / "set" / name) for name in ("frames.csv", "samples.csv"))

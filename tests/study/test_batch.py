@@ -61,6 +61,7 @@ def test_the_thetas_of_a_batch_follow_from_the_trials_before_it(make_study):
     assert len({tuple(trial.theta.items()) for trial in trials}) == 10
 
 
+@pytest.mark.slow
 def test_two_jobs_cut_off_the_same_trials_of_a_batch_at_the_same_agents_as_one(make_study, cutting):
     _, one, expected = cutting
     two, trials = run(ordered_study(make_study, **KEYS, jobs="2"))

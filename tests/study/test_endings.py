@@ -50,7 +50,7 @@ def test_an_agent_that_hangs_fails_where_the_study_limits_its_time(make_study):
     assert failures(folder) == {("agent1", 1): "it took longer than 1.5 s"}
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fault", ["exits", "interrupts"])
 def test_an_agent_that_exits_or_interrupts_fails_and_the_study_goes_on(make_study, capsys, jobs, fault):
     assert main(["study", str(make_study(domain=domain(fault), jobs=jobs, **FAMILY)), "--json"]) == 0

@@ -81,6 +81,7 @@ def test_failures_of_changed_code_are_driven_again_and_only_these(edited):
     assert run_study(edited("pass")).spent.episodes == 0
 
 
+@pytest.mark.slow
 def test_failures_of_the_same_code_are_remembered_until_all_are_to_be_retried(edited):
     start1 = "if (episode.agent, episode.start) == ('agent3', 1): raise KeyError('mass')"
     folder = edited(start1)

@@ -45,6 +45,7 @@ def test_every_point_of_a_learning_curve_is_told_with_its_score(make_study):
     assert f"none, repetition 3, {GRID[-1]} target samples: score {last:.3g}" in telling.lines
 
 
+@pytest.mark.slow
 def test_a_stated_level_is_what_counts_as_converged(make_study):
     strict = run(make_taught(make_study, more="level = 59.9"))
     assert (strict.when.level, strict.when.threshold) == (59.9, pytest.approx(53.9))
@@ -74,6 +75,7 @@ def test_what_is_cached_is_neither_driven_nor_trained_again(make_study, tmp_path
     assert examined == 3 * (4 * 3 * len(GRID) - 3)  # starts × (curves × seeds × counts, less those of no learner)
 
 
+@pytest.mark.slow
 def test_more_seeds_add_to_what_was_done(make_study, tmp_path):
     journal = tmp_path / "journal"
     folder = make_taught(make_study, domain={"teaching_journal": f'"{journal}"'})
@@ -92,6 +94,7 @@ def test_a_target_budget_too_small_to_converge_is_no_plv(make_study):
     assert all(lesson.worth is None for lesson in found.teachers)
 
 
+@pytest.mark.slow
 def test_plv_in_cost_is_plv_times_the_cost_where_every_sample_costs_the_same(make_study):
     costs = "[teaching.costs]\noff_policy = 2.0\non_policy = 2.0"
     for one in run(make_taught(make_study, more=costs)).teachers:

@@ -56,6 +56,7 @@ def test_a_family_is_worth_what_teach_says_of_its_best_theta(taught):
     assert far.more == difference(experiment.needs, more="far", less="right")
 
 
+@pytest.mark.slow
 def test_the_learner_without_a_proxy_is_examined_once_for_all_and_nothing_is_made_again(taught, tmp_path):
     journal = tmp_path / "journal"
     settings = taught(domain={"teaching_journal": f'"{journal}"'})

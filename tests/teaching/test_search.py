@@ -36,6 +36,7 @@ def test_it_prefers_a_proxy_from_which_the_target_is_learnt_with_fewest_samples(
     assert abs(found.best.theta["trim"] - 0.12) < 0.15
 
 
+@pytest.mark.slow
 def test_what_a_run_that_goes_on_has_done_before_is_known_at_once(make_study):
     class Known(Silent):
         known: ClassVar = []
@@ -121,6 +122,7 @@ def test_other_settings_of_teaching_begin_its_trials_afresh(make_study):
     assert again.trials[0].curve.scores.shape[0] == 2 != first.trials[0].curve.scores.shape[0]
 
 
+@pytest.mark.slow
 def test_the_width_of_a_parameter_is_searched_beside_its_centre(make_study):
     width = "budget = 2\n[teaching.width]\ntrim = [0.0, 0.2]\n"
     found = run(make_taught(make_study, parameters=BOX, more=width, initial="2"))

@@ -167,7 +167,7 @@ def test_a_run_of_learners_that_drive_comes_to_the_same_whatever_its_cache_has_l
     np.testing.assert_array_equal(run(folder), whole)
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
 def test_no_round_is_driven_twice(make_study, tmp_path, jobs):
     folder = make_tightrope(make_study, tmp_path, grid=[0, 20, 40], jobs=jobs)
     run(folder)

@@ -81,7 +81,7 @@ INSTANCES = {
 }
 
 
-@both_plants
+@pytest.mark.parametrize("plant", [pytest.param("bullet", marks=pytest.mark.slow), "planar"])
 @pytest.mark.parametrize("how", INSTANCES.values(), ids=INSTANCES.keys())
 @pytest.mark.parametrize("policy", [lean, cloned()], ids=("one by one", "many at once"))
 def test_each_robot_drives_and_scores_to_the_bit_as_it_does_by_itself(plant, how, policy):

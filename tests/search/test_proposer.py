@@ -11,6 +11,8 @@ from proxytune.search.engines.registry import NAMES, AfterDesign, make_proposer,
 from proxytune.search.proposer import Trial, batch_at, propose_batch, with_failures_as_worst
 
 HERE = [name for name in NAMES if not why_not(name, composed=True)]
+TAKES_SECONDS = {"skopt": pytest.mark.slow}
+IN_BATCHES = [pytest.param(name, marks=TAKES_SECONDS.get(name, ())) for name in HERE]
 
 
 @given(st.integers(0, 200), st.integers(1, 20), st.integers(1, 30))
@@ -28,7 +30,7 @@ def test_the_design_makes_batches_of_its_own():
     assert [list(batch_at(index, 1, 5)) for index in range(7)] == [[index] for index in range(7)]
 
 
-@pytest.mark.parametrize("engine", HERE)
+@pytest.mark.parametrize("engine", IN_BATCHES)
 def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger_one(engine):
     proposer = make_proposer(engine, 3, WHOLE)
     finished = search(proposer, 6, seed=2)
@@ -38,7 +40,7 @@ def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger
     assert batch[0] == proposer.propose(SPACE, finished, 2)
 
 
-@pytest.mark.parametrize("engine", HERE)
+@pytest.mark.parametrize("engine", IN_BATCHES)
 def test_the_points_of_a_batch_differ_also_where_the_best_is_at_a_corner(engine):
     proposer = make_proposer(engine, 3, WHOLE)
     finished = search(proposer, 8, seed=1, score=lambda values: -100 * values[0] - values[1])

@@ -9,6 +9,7 @@ from floors import floor
 PACKAGE = Path(__file__).resolve().parent.parent / "proxytune"
 ROOMS = {
     "pybullet": {"driving/bullet"},
+    "numba": {"driving/texels"},
     "skopt": {"search"},
     "optuna": {"search"},
     "torch": {"search"},

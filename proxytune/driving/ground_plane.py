@@ -10,6 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 from proxytune.driving.cameras import SKY, CameraFigures, floor_hits, ground_points
 from proxytune.driving.road.texture import Floor
+from proxytune.driving.texels import Table, fastest
 
 
 class GroundPlaneCamera:
@@ -27,63 +28,48 @@ class GroundPlaneCamera:
         copy = np.where(on_floor, _blur_octaves(figures, floor).ravel(), 0)
         scale = copies.per_metre[copy]
         plane = np.stack((points[:, 0] * scale, points[:, 1] * scale, scale))
-        # Pixels above the horizon stay at the last texel, the sky
-        self._plane = np.where(on_floor, plane, 0.0).astype(np.float32)
+        # Pixels above the horizon stay at the last texel, the sky; all before the first that sees floor are left out
+        self._sky = sky = int(np.argmax(on_floor)) if on_floor.any() else len(on_floor)
+        self._table = Table(
+            plane=np.ascontiguousarray(np.where(on_floor, plane, 0.0)[:, sky:], dtype=np.float32),
+            last=np.where(on_floor, copies.sides[copy] - 1, 0)[sky:].astype(np.float32),
+            first=np.where(on_floor, copies.firsts[copy], copies.texels.size - 1)[sky:].astype(np.int32),
+            side=copies.sides[copy][sky:].astype(np.int32),
+            texels=copies.texels,
+        )
+        self._sky_levels = np.array(SKY * sky, dtype=np.uint8)
         self._origin = np.float32(floor.origin)
-        self._last = np.where(on_floor, copies.sides[copy] - 1, 0).astype(np.float32)
-        self._first = np.where(on_floor, copies.firsts[copy], copies.texels.size - 1).astype(np.int32)
-        self._side = copies.sides[copy].astype(np.int32)
-        self._texels = copies.texels
-        self._shape = (figures.rows, figures.columns)
-        self._keep_from(int(np.argmax(on_floor)) if on_floor.any() else len(on_floor))
+        self._shape = (figures.rows, figures.columns, 3)
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
-        return self._with_sky(self.glimpse(poses).view(np.uint8).reshape(len(poses), -1, 4))
+        pictures = self._sky_only(len(poses))
+        texels = self.glimpse(poses).view(np.uint8).reshape(len(poses), -1, 4)
+        for colour in range(3):  # four times as fast as one copy of [..., :3]
+            pictures[:, self._sky :, colour] = texels[..., colour]
+        shown: NDArray[np.uint8] = pictures.reshape(-1, *self._shape)
+        return shown
 
     def glimpse(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint32]:
         """The texels (n, pixels) that its pixels show from poses (n, 3), but for those that are always sky."""
-        column, row = self._look(poses)
-        row *= self._side
-        row += column
-        row += self._first
-        texels: NDArray[np.uint32] = self._texels.take(row, mode="clip")
-        return texels
+        places = np.empty((len(poses), 4), dtype=np.float32)
+        places[:, 0], places[:, 1] = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        places[:, 2:] = poses[:, :2]
+        places[:, 2:] -= self._origin
+        return fastest().look_up(self._table, places)
 
     def mean(self, glimpses: NDArray[np.uint32], weights: NDArray[np.float32]) -> NDArray[np.uint8]:
         """The weighted mean of glimpses (n, pixels) as a picture (rows, columns, 3); weights are as `Blur` has them."""
-        bytes_of = glimpses.view(np.uint8).reshape(len(glimpses), -1)
-        colours = np.rint(weights @ bytes_of.astype(np.float32)).astype(np.uint8)
-        picture: NDArray[np.uint8] = self._with_sky(colours.reshape(1, -1, 4))[0]
-        return picture
+        picture = self._sky_only(1)[0]
+        fastest().average(glimpses, weights, picture[self._sky :])
+        shown: NDArray[np.uint8] = picture.reshape(self._shape)
+        return shown
 
-    def _with_sky(self, texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Pictures (n, rows, columns, 3) of texels (n, pixels, 4): red, green, blue and a spare byte."""
-        pictures = np.empty((len(texels), self._shape[0] * self._shape[1], 3), dtype=np.uint8)
-        pictures.reshape(len(texels), -1)[:, : self._sky.size] = self._sky
-        for colour in range(3):  # four times as fast as one copy of [..., :3]
-            pictures[:, self._sky.size // 3 :, colour] = texels[..., colour]
-        return pictures.reshape(len(texels), *self._shape, 3)
-
-    def _keep_from(self, pixel: int) -> None:
-        """Look up only the pixels from this one on: all before it are sky."""
-        self._sky = np.array(SKY * pixel, dtype=np.uint8)
-        self._plane, self._last = np.ascontiguousarray(self._plane[:, pixel:]), self._last[pixel:]
-        self._first, self._side = self._first[pixel:], self._side[pixel:]
-
-    def _look(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.int32]:
-        """Column and row (2, n, pixels) of each pixel's texel in its copy."""
-        cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-        ahead, left = np.array((cos, sin), dtype=np.float32), np.array((-sin, cos), dtype=np.float32)
-        place = poses[:, :2].T.astype(np.float32) - self._origin
-        # Not a matrix product: BLAS rounds differently from processor to processor, and so would the pictures
-        where: NDArray[np.float32] = ahead[..., None] * self._plane[0]
-        where += left[..., None] * self._plane[1]
-        where += place[..., None] * self._plane[2]
-        # Both at once, np.clip, takes twice as long
-        np.maximum(where, 0.0, out=where)
-        np.minimum(where, self._last, out=where)
-        return where.astype(np.int32)
+    def _sky_only(self, count: int) -> NDArray[np.uint8]:
+        """Pictures (count, pixels, 3) in which only the pixels that are always sky have been drawn."""
+        pictures = np.empty((count, self._sky + len(self._table.last), 3), dtype=np.uint8)
+        pictures.reshape(count, -1)[:, : 3 * self._sky] = self._sky_levels
+        return pictures
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from proxytune.domain import make_episode
+from proxytune.driving import ground_plane
+from proxytune.driving.agents.loading import load_agent
 from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.episode import TICK_HZ
 from proxytune.driving.family import lane_following
-from proxytune.driving.planar import integrate
+from proxytune.driving.planar import PlanarPlant, integrate
 from proxytune.driving.robot import read_robot
+from proxytune.driving.texels import plain
+from proxytune.driving.view import View
 from proxytune.effects import Setting, effects_from
 from proxytune.settings import Section
 
@@ -30,9 +34,22 @@ def family(folder: Path, plant: str):
     return lane_following(Section(folder / "study.toml", "domain.", {"plant": plant}), model=None)
 
 
+def use(monkeypatch, by):
+    """Let texels be looked up by Numba or by NumPy."""
+    if by == "numba":
+        pytest.importorskip("proxytune.driving.texels.compiled", reason="needs pip install 'proxytune[fast]'")
+    else:
+        monkeypatch.setattr(ground_plane, "fastest", lambda: plain)
+
+
+both = pytest.mark.parametrize("by", ["numpy", "numba"])
+
+
 @pytest.mark.benchmark(group="60-s episode")
+@both
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
-def test_episode_with_camera_and_agent(benchmark, tmp_path, plant):
+def test_episode_with_camera_and_agent(benchmark, tmp_path, monkeypatch, plant, by):
+    use(monkeypatch, by)
     domain = family(tmp_path, plant)
     metrics = benchmark.pedantic(domain.run, args=(CAREFUL,), rounds=7, warmup_rounds=1)
     assert metrics["survival_time"] == 60.0
@@ -54,6 +71,64 @@ def test_bare_steps_of_the_same_episode(benchmark, tmp_path):
         plant.__exit__(None, None, None)
 
     benchmark.pedantic(step, setup=setup, rounds=7, warmup_rounds=1)
+
+
+@pytest.fixture
+def driven(tmp_path):
+    """The instance of a planar episode, its drive, and the pictures that its agent saw."""
+    domain = family(tmp_path, "planar")
+    drive = domain.drive(CAREFUL)
+    return domain.instance({}), drive, domain.replay(CAREFUL, drive.commands).pictures
+
+
+@pytest.mark.benchmark(group="parts of a 60-s planar episode")
+def test_agent(benchmark, driven, tmp_path):
+    agent = load_agent(CAREFUL.agent, tmp_path)
+
+    def act():
+        memory = agent.begin(ROBOT)
+        for picture in driven[2]:
+            _, memory = agent.act(picture, memory)
+
+    benchmark(act)
+
+
+@pytest.mark.benchmark(group="parts of a 60-s planar episode")
+def test_effects_on_commands_and_motion(benchmark, driven):
+    train, held = driven[0].drivetrain, [np.repeat(command[None], 3, axis=0) for command in driven[1].commands]
+
+    def apply():
+        memory = train.begin(Setting(TICK_HZ, np.zeros(2), ROBOT.figures))
+        for duties in held:
+            _, memory = train.apply(duties, memory)
+
+    benchmark(apply)
+
+
+@pytest.mark.benchmark(group="parts of a 60-s planar episode")
+def test_planar_plant(benchmark):
+    steps = twists().reshape(-1, 3, 3)
+
+    def move():
+        plant = PlanarPlant(np.zeros(3), 1.0 / TICK_HZ)
+        for step in steps:
+            plant.move(step)
+
+    benchmark(move)
+
+
+@pytest.mark.benchmark(group="parts of a 60-s planar episode")
+@both
+def test_pictures(benchmark, driven, monkeypatch, by):
+    use(monkeypatch, by)
+    instance, steps = driven[0], driven[1].poses[1:].reshape(-1, 3, 3)
+
+    def see():
+        view = View(instance.camera, instance.image, Setting(TICK_HZ, driven[1].poses[0], ROBOT.figures))
+        for poses in steps:
+            view.pass_by(poses)
+
+    benchmark(see)
 
 
 @pytest.mark.benchmark(group="one-minute log")

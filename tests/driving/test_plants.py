@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from proxytune.driving.bullet import worlds
 from proxytune.driving.bullet.plant import BulletPlant
 from proxytune.driving.drivetrain import drivetrain
 from proxytune.driving.planar import PlanarPlant, integrate
@@ -150,6 +151,18 @@ def test_planar_integration_is_exact_on_a_circle():
     angle = 1.25 * np.arange(1, 241) * TICK_S
     np.testing.assert_allclose(poses[0, :, 0], 0.4 * np.sin(angle), atol=1e-12)
     np.testing.assert_allclose(poses[1, :, 1], 0.4 * (1 - np.cos(angle)), atol=1e-12)
+
+
+def test_in_a_world_that_others_have_left_a_robot_drives_to_the_bit_as_in_a_new_one(monkeypatch):
+    duties = held(0.6, 0.5, 2.0)
+    for twist in ((0.3, 0.2, 2.0), (-0.5, 0.0, -9.0)):  # one slides sideways, one spins
+        with BulletPlant(ROBOT, START, TICK_S) as robot:
+            robot.move(np.tile(twist, (40, 1)))
+    before = len(worlds._empty)
+    used = poses_for("bullet", duties)
+    assert len(worlds._empty) == before > 0
+    monkeypatch.setattr(worlds, "_empty", [])
+    np.testing.assert_array_equal(poses_for("bullet", duties), used)
 
 
 def test_two_robots_at_once_do_not_disturb_each_other():

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 import pybullet
 
+from proxytune.driving.bullet.worlds import leave_world, open_world
 from proxytune.driving.robot import Robot
 from proxytune.effects import Signal
 
@@ -27,7 +28,7 @@ class BulletPlant:
 
     def __init__(self, robot: Robot, start: Signal, tick_s: float) -> None:
         urdf = robot.body()
-        self._world = pybullet.connect(pybullet.DIRECT)
+        self._world = open_world()
         self._tick_s = tick_s
         self._radius = robot.figures["wheel_radius"]
         self._half_distance = robot.figures["wheel_distance"] / 2.0
@@ -112,4 +113,4 @@ class BulletPlant:
     def __exit__(
         self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
     ) -> None:
-        pybullet.disconnect(self._world)
+        leave_world(self._world)

@@ -110,3 +110,14 @@ def test_the_interval_covers_the_expected_prpv_at_about_the_nominal_rate(paired)
         result = bootstrap_prpv(proxy=sides[0], target=sides[1], metrics=M, resamples=300, seed=seed)
         held.append(result.low <= expected <= result.high)
     assert 0.92 <= np.mean(held) <= 0.99
+
+
+def test_episodes_of_uneven_agents_are_drawn_evenly_and_independently():
+    values = np.zeros((2, 5, 2))
+    values[0, 3:] = np.nan
+    counts = draw_counts(table(values), np.random.default_rng(3), 20_000)
+    for drawn, episodes in zip(counts, (3, 5), strict=True):
+        together = np.full((episodes, episodes), -1 / episodes) + np.eye(episodes)  # a multinomial's
+        np.testing.assert_allclose(drawn[:, :episodes].mean(axis=0), 1.0, atol=0.03)
+        np.testing.assert_allclose(np.cov(drawn[:, :episodes].T), together, atol=0.03)
+    assert not counts[0, :, 3:].any()

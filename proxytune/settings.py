@@ -82,7 +82,7 @@ class Section:
         value = self._get(key, default)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f"must be a number, got {value!r}")
-        if not _is_finite(value):
+        if not is_finite(value):
             raise self.error(key, f"must be finite, got {value}")
         if not low <= value <= high:
             raise self.error(key, f"must be between {low:g} and {high:g}, got {value}")
@@ -109,18 +109,31 @@ class Section:
         value = self._get(key, default)
         if not isinstance(value, str):
             raise self.error(key, f"must be text in quotes, got {value!r}")
-        if "\0" in value:
-            raise self.error(key, f"must not contain the character NUL, got {value!r}")
+        self._check_letters(key, value)
         names = list(choices)
         if names and value not in names:
             raise self.error(key, f"unknown value '{value}'; {nearest(value, names)}")
         return value
+
+    def file(self, key: str, name: str | None = None) -> Path:
+        """The file that a key names, by its text or by one of its texts, from this file's folder on."""
+        path = self.path.parent / (self.text(key) if name is None else name)
+        try:
+            path.stat()
+        except OSError as problem:
+            if (
+                problem.errno == errno.ENAMETOOLONG
+            ):  # else it may be made later, and whoever reads it says what is wrong
+                raise self.error(key, "no file can have so long a name; shorten it") from None
+        return path
 
     def texts(self, key: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
         """A list of distinct texts."""
         value = self._get(key, None if default is None else list(default))
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
             raise self.error(key, f"must be a list of texts in quotes, got {value!r}")
+        for item in value:
+            self._check_letters(key, item)
         if len(set(value)) < len(value):
             raise self.error(key, "names something twice")
         return tuple(value)
@@ -131,7 +144,7 @@ class Section:
         pair = value if isinstance(value, list) and len(value) == 2 else None
         if pair is None or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in pair):
             raise self.error(key, f"must be [low, high], got {value!r}")
-        if not (_is_finite(pair[0]) and _is_finite(pair[1])):
+        if not (is_finite(pair[0]) and is_finite(pair[1])):
             raise self.error(key, f"bounds must be finite, got {value!r}")
         low, high = float(pair[0]), float(pair[1])
         if low >= high:
@@ -144,6 +157,10 @@ class Section:
         if not isinstance(value, dict):
             raise self.error(key, f"must be a table, written [{self.name}{key}], got {value!r}")
         return Section(self.path, f"{self.name}{key}.", value)
+
+    def _check_letters(self, key: str, text: str) -> None:
+        if "\0" in text:
+            raise self.error(key, f"must not contain the character NUL, got {text!r}")
 
     def _get(self, key: str, default: Any) -> Any:
         if key in self.values:
@@ -200,7 +217,7 @@ def _check_dots(text: str) -> None:
             raise ValueError(f"a key of more than {MOST_DOTS} parts (at line {number})")
 
 
-def _is_finite(value: float) -> bool:
+def is_finite(value: float) -> bool:
     """Whether a number is finite as a float; a whole number may have too many digits."""
     try:
         return math.isfinite(value)

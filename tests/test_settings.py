@@ -109,12 +109,26 @@ def test_long_rows_of_numbers_are_no_long_keys(tmp_path):
     assert len(read_settings(path)["weights"]) == 500
 
 
+LONG = {"long": f"{'a' * 300}.csv", "far": "a/" * 4000}
+
+
+def test_a_file_is_looked_for_beside_the_one_that_names_it():
+    section = Section(Path("/some/study.toml"), "", {"target": "../target.csv"})
+    assert section.file("target") == Path("/some/../target.csv")
+    assert section.file("target", "other.csv") == Path("/some/other.csv")
+
+
 def test_numbers_too_large_for_a_float_and_texts_that_no_file_can_have_are_refused():
-    section = Section(Path("study.toml"), "", {"n": 10**400, "pair": [0, 10**400], "name": "a\0b"})
+    section = Section(
+        Path("study.toml"), "", {"n": 10**400, "pair": [0, 10**400], "name": "a\0b", "names": ["a\0b"], **LONG}
+    )
     for read, says in (
         (lambda: section.number("n"), "n: must be finite"),
         (lambda: section.bounds("pair"), "pair: bounds must be finite"),
         (lambda: section.text("name"), "name: must not contain the character NUL"),
+        (lambda: section.texts("names"), "names: must not contain the character NUL"),
+        (lambda: section.file("long"), "long: no file can have so long a name; shorten it"),
+        (lambda: section.file("far"), "far: no file can have so long a name; shorten it"),
     ):
         with pytest.raises(SettingsError, match=says):
             read()

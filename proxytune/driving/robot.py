@@ -226,7 +226,7 @@ def _homes(folder: Path | None) -> list[Path]:
 def _urdf(settings: Section) -> Path | None:
     if "urdf" not in settings.values:
         return None
-    urdf = settings.path.parent / settings.text("urdf")
+    urdf = settings.file("urdf")
     if not urdf.is_file():
         raise settings.error("urdf", f"no such file: {urdf.name}; add it beside robot.toml")
     return urdf

@@ -104,7 +104,7 @@ def read_teaching(section: Section) -> TeachingSettings | None:
     if not section.values:
         return None
     section.only(KEYS)
-    target = section.path.parent / section.text("target")
+    target = section.file("target")
     if not target.is_file():
         raise section.error("target", f"no such file: {target}; give the target's model.toml")
     proxies = _proxies(section.section("proxies"))

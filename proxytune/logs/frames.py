@@ -95,7 +95,7 @@ def _road(settings: Section) -> str:
         problem = "is missing; frames show a map: add its name or that of a map file beside log.toml (above [camera])"
         raise settings.error("map", problem)
     name = settings.text("map")
-    path = settings.path.parent / name
+    path = settings.file("map")
     if name.endswith(".toml") and not path.is_file():
         raise settings.error("map", f"no such file: {name}; add it beside log.toml")
     if not (name.endswith(".toml") or PLAIN_NAME.fullmatch(name)):

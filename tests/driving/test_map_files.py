@@ -111,6 +111,7 @@ def test_bends_are_painted_on_the_roads_own_radius_where_the_file_says_nothing(t
         ("format = 1", "format = 2", "format: must be between 1 and 1, got 2"),
         ("[1.755, 1.755]", "1.755", "size: must be a list of 2 finite numbers, got 1.755"),
         ("[1.755, 1.755]", "[1.755, true]", "size: must be a list of 2 finite numbers"),
+        ("[1.755, 1.755]", f"[1.755, 1{'0' * 400}]", "size: must be a list of 2 finite numbers"),
         ("[1.755, 1.755]", "[1.755, inf]", "size: must be a list of 2 finite numbers"),
         ("[1.755, 1.755]", "[1.755, 11.0]", "size: each side must be above 0 and at most 10 m"),
         ("size = [1.755, 1.755]\n", "", "size: must be a list of 2 finite numbers, got None"),

@@ -214,6 +214,7 @@ def test_an_unknown_robot_is_told_with_the_nearest():
         ('unit = "kg", source = "DB18 with battery, weighed"', 'unit = "kg"', "figures.mass.source: is missing"),
         ("value = 0.0318", "value = 0", "figures.wheel_radius.value: must be between 1e-06"),
         ('urdf = "duckiebot.urdf"', 'urdf = "gone.urdf"', "urdf: no such file: gone.urdf"),
+        ('urdf = "duckiebot.urdf"', f'urdf = "{"a" * 300}"', "urdf: no file can have so long a name"),
         ("value = 1.05", "value = nan", "figures.mass.value: must be finite"),
     ],
 )

@@ -1,7 +1,6 @@
 """Maps as their files describe them: those that travel with the package, and a user's own beside the study."""
 
 import functools
-import math
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,7 @@ from proxytune.driving.road.checks import LARGEST_M, check_road
 from proxytune.driving.road.maps import Paint, Road
 from proxytune.driving.road.segments import Arc, Segment, Straight
 from proxytune.errors import SettingsError
-from proxytune.settings import Section, nearest, read_settings
+from proxytune.settings import Section, is_finite, nearest, read_settings
 from proxytune.shipped import shipped
 
 SHORTEST_M = 0.001
@@ -44,7 +43,7 @@ def chosen_map(section: Section) -> Road:
     """
     name = section.text("map", "small_loop")
     if name.endswith(".toml"):
-        return read_map(section.path.parent / name)
+        return read_map(section.file("map"))
     if name not in map_names():
         hint = f"{nearest(name, map_names())} (a map file of your own ends in .toml)"
         raise section.error("map", f"unknown value '{name}'; {hint}")
@@ -127,10 +126,10 @@ def _list(section: Section, key: str) -> list[Any]:
 def _numbers(section: Section, key: str, count: int) -> list[float]:
     value = section.values.get(key)
     numbers = value if isinstance(value, list) else []
-    if len(numbers) != count or not all(_is_finite(number) for number in numbers):
+    if len(numbers) != count or not all(_is_number(number) for number in numbers):
         raise section.error(key, f"must be a list of {count} finite numbers, got {value!r}")
     return [float(number) for number in numbers]
 
 
-def _is_finite(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and is_finite(value)

@@ -1,7 +1,6 @@
 """The lessons of several families as a file, so that they can be shown again without running any code."""
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any, cast
 from proxytune.drafts import draft_of
 from proxytune.errors import StoreError
 from proxytune.learning.plv import Estimate
+from proxytune.settings import is_finite
 from proxytune.storage.own_files import FAMILIES
 from proxytune.study.families.compared import Lesson
 from proxytune.study.settings import StudySettings
@@ -62,7 +62,7 @@ def _or_none(value: object) -> float | None:
 
 
 def _number(value: object) -> float:
-    if type(value) not in (int, float) or not math.isfinite(cast(float, value)):
+    if type(value) not in (int, float) or not is_finite(cast(float, value)):
         raise ValueError("not a number")
     return float(cast(float, value))
 

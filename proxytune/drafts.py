@@ -41,11 +41,11 @@ def _of_this_machine(path: Path) -> str:
 def _clear_away(path: Path) -> None:
     """Remove what processes left that were killed while they wrote this file."""
     start = _of_this_machine(path)
-    for left in path.parent.iterdir():
-        process = left.name.removeprefix(start)
-        if left.name.startswith(start) and process.isdecimal() and not _is_alive(int(process)):
+    for name in os.listdir(path.parent):
+        process = name.removeprefix(start)
+        if name.startswith(start) and process.isdecimal() and not _is_alive(int(process)):
             with contextlib.suppress(OSError):
-                left.unlink()
+                path.with_name(name).unlink()
 
 
 def _is_alive(process: int) -> bool:

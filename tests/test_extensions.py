@@ -1,8 +1,11 @@
 """One door for a user's own code: found, kept apart by folder, usable in other processes, refused in one line."""
 
+import importlib.util
 import os
 import pickle
+import py_compile
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -62,6 +65,15 @@ def test_what_runs_is_what_the_file_says_though_its_time_and_size_are_as_before(
         assert [path.name for path in folder.iterdir()] == ["family.py"]
         for name in [name for name in sys.modules if name.startswith("beside_study") and name.endswith(".family")]:
             del sys.modules[name]
+
+
+def test_bytecode_that_claims_to_need_no_check_is_not_run(write):
+    folder = write("study", family="size = 2\n", other="size = 1\n")
+    cached = Path(importlib.util.cache_from_source(str(folder / "family.py")))
+    py_compile.compile(
+        str(folder / "other.py"), str(cached), invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH
+    )
+    assert load("family:size", kind="family", beside=folder) == 2
 
 
 def test_modules_of_one_name_in_two_folders_are_not_mixed_up(write):

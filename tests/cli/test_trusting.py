@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -156,6 +157,14 @@ def test_the_code_of_shipped_studies_is_ours_wherever_it_lies_until_it_is_change
 
     assert _is_shipped(folder, "pendulum")
     assert not _is_shipped(folder, "os")
+    for name in ("mujoco.pyc", "mujoco.abi3.so", "mujoco/__init__.pyc", "__pycache__/pendulum.cpython-311.pyc"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(b"anything")
+        assert not _is_shipped(folder, "pendulum")
+        with only_trusted_code(False), pytest.raises(ExtensionError, match=re.escape(name)):
+            import_beside("pendulum", folder)
+        (folder / name).unlink()
+    assert _is_shipped(folder, "pendulum")
     (folder / "numpy.py").write_text("raise SystemExit")
     assert not _is_shipped(folder, "pendulum")
 

@@ -8,15 +8,18 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
+from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES
 from pathlib import Path
 
 from proxytune.errors import ExtensionError, InputError
 from proxytune.extensions.trust import permitting
-from proxytune.meaning import modules_beside
+from proxytune.meaning import files_beside, modules_beside
 from proxytune.shipped import shipped
 
 ALL = "PROXYTUNE_TRUST"
 """The environment variable that trusts whatever is run, as in tests and on a cluster."""
+COMPILED = (*BYTECODE_SUFFIXES, *EXTENSION_SUFFIXES)
+"""How modules end that are no text."""
 NAMED = 4
 """So many modules are named at most."""
 
@@ -95,15 +98,26 @@ def _is_shipped(folder: Path, module: str) -> bool:
     top = module.partition(".")[0]
     if not any(name.split("/")[0] in (top, f"{top}.py") for name in own):
         return False
-    return any(_contents(home) == own for home in shipped("studies").iterdir() if home.is_dir())
+    homes = [home for home in shipped("studies").iterdir() if home.is_dir()]
+    if any(home.samefile(folder) for home in homes):
+        return True
+    return not compiled_beside(folder) and any(_contents(home) == own for home in homes)
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in modules_beside(folder)}
 
 
+def compiled_beside(folder: Path) -> list[Path]:
+    """What Python may run of a folder though nobody can read it: libraries, and bytecode, maybe of another text."""
+    files = files_beside(folder)
+    homes = sorted({folder, *(path.parent for path in files)})
+    cached = [path for home in homes for path in sorted((home / "__pycache__").glob("*.pyc"))]
+    return [*(path for path in files if path.name.endswith(COMPILED)), *cached]
+
+
 def _request(folder: Path, module: str) -> str:
-    files = [path.relative_to(folder).as_posix() for path in modules_beside(folder)]
+    files = [path.relative_to(folder).as_posix() for path in (*modules_beside(folder), *compiled_beside(folder))]
     more = f" and {len(files) - NAMED} more" if len(files) > NAMED else ""
     beside = f", where {', '.join(files[:NAMED])}{more} lie" if files else ""
     where = f"module '{module}', named in {folder.resolve()}{beside}"

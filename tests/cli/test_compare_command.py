@@ -153,6 +153,7 @@ def test_a_model_that_is_not_there_is_told_before_anything_runs(make_study, tmp_
     assert "no such file" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_engine_that_models_metrics_is_compared_where_there_are_metrics(tmp_path, capsys):
     few = ("--engines", "gp,composite", "--seeds", "2", "--budget", "7", "--initial", "5")
     assert compare("ranking", *few, "--output", tmp_path / "out", "--json") == 0

@@ -141,6 +141,7 @@ def test_stopped_at_any_moment_it_goes_on_to_the_same_document(finished, make_st
     assert json.loads(text) == here
 
 
+@pytest.mark.slow
 def test_plot_draws_it_again_and_runs_no_code(make_study, capsys, monkeypatch, tmp_path):
     folder = make_several(make_study)
     ran = document_of(["study", str(folder)], capsys)

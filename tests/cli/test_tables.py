@@ -76,6 +76,7 @@ def test_a_comparison_is_whole(tmp_path):
     assert_whole(shown("compare", "analytic", "--engines", "sobol,random", *few))
 
 
+@pytest.mark.slow
 def test_learning_curves_are_whole(make_study):
     assert_whole(shown("teach", make_taught(make_study)))
 

@@ -199,6 +199,7 @@ def test_figures_and_report_on_a_full_disk_are_told_and_the_old_ones_stay(finish
     assert {path: again[path] for path in before} == before
 
 
+@pytest.mark.slow
 def test_a_standard_output_that_is_full_is_told(finished):
     with open("/dev/full", "w") as full:
         process = start("plot", finished, "--json", stdout=full)

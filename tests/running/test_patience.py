@@ -34,6 +34,7 @@ def test_it_is_told_which_episode_has_been_under_way_for_long(soon, jobs):
     assert all(seconds >= LONG_S for _, seconds in said)
 
 
+@pytest.mark.slow
 def test_where_every_episode_is_short_nothing_is_told():
     assert told_of("agent1:0:lingers") == []
 

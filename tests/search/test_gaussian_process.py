@@ -42,6 +42,7 @@ def test_it_never_proposes_a_point_twice_even_on_a_flat_score():
     assert distances.min() > 1e-3
 
 
+@pytest.mark.slow
 def test_it_finds_the_lowest_step_that_the_design_alone_misses():
     lowest = [min(trial.score for trial in search(make_proposer("gp", 6), 18, seed=seed)) for seed in range(4)]
     design = [min(steps(design_point(SPACE, index, seed)) for index in range(18)) for seed in range(4)]

@@ -96,6 +96,7 @@ def aliased(make_study):
     return make
 
 
+@pytest.mark.slow
 def test_a_study_with_aliases_is_the_study_without_but_for_the_names(aliased, make_study):
     folder = aliased()
     named, plain = run_study(folder), run_study(make_study("plain"))

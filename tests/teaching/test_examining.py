@@ -30,6 +30,7 @@ def counts(experiment):
     return {name: curve.counts for name, curve in experiment.needs.curves.items()}
 
 
+@pytest.mark.slow
 def test_as_many_examinations_are_made_as_the_study_allows_and_counts_need_not_lie_on_the_grid(make_study):
     found = run(make_taught(make_study, more=CHOSEN))
     assert sum(len(curve.examined) for curve in found.needs.curves.values()) == 14 * CURVES

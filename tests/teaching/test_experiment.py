@@ -35,6 +35,7 @@ def test_the_right_proxy_saves_target_samples_and_the_wrong_one_harms(make_study
     assert np.isfinite(found.without.scores[:, 1:]).all()
 
 
+@pytest.mark.slow
 def test_every_point_of_a_learning_curve_is_told_with_its_score(make_study):
     telling = Telling()
     settings = read_study_settings(make_taught(make_study))
@@ -64,6 +65,7 @@ def test_a_run_whose_cache_lost_any_of_its_pieces_comes_to_the_same(make_study, 
         assert [lesson.worth for lesson in again.teachers] == [lesson.worth for lesson in whole.teachers]
 
 
+@pytest.mark.slow
 def test_what_is_cached_is_neither_driven_nor_trained_again(make_study, tmp_path):
     journal = tmp_path / "journal"
     folder = make_taught(make_study, domain={"teaching_journal": f'"{journal}"'})
@@ -102,6 +104,7 @@ def test_plv_in_cost_is_plv_times_the_cost_where_every_sample_costs_the_same(mak
         assert [one.cost.value, one.cost.low, one.cost.high] == pytest.approx(doubled)
 
 
+@pytest.mark.slow
 def test_where_the_learner_drives_its_first_samples_without_a_proxy_cost_what_the_experts_do(make_study):
     settings = read_study_settings(make_taught(make_study))
     setup = load_setup(settings)

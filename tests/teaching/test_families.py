@@ -38,6 +38,7 @@ def teach(settings, *thetas):
     )
 
 
+@pytest.mark.slow
 def test_a_family_is_worth_what_teach_says_of_its_best_theta(taught):
     settings = taught()
     lessons = teach(settings, RIGHT, FAR)

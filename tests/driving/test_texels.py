@@ -1,6 +1,8 @@
 """Numba and NumPy look up the same texels, to the bit; where Numba is not at hand, NumPy does it."""
 
 import importlib
+import os
+import subprocess
 import sys
 
 import numpy as np
@@ -67,6 +69,18 @@ def test_an_episode_is_the_same_without_numba(compiled, tmp_path, monkeypatch, p
     with_numba = family.drive(episode).poses
     monkeypatch.setattr(ground_plane, "fastest", lambda: plain)
     np.testing.assert_array_equal(family.drive(episode).poses, with_numba)
+
+
+def test_numpy_does_it_where_numba_is_told_not_to_compile(compiled):
+    code = "from proxytune.driving.texels import fastest; print(fastest().__name__)"
+    told = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert told.stdout == "proxytune.driving.texels.plain\n"
 
 
 @pytest.mark.parametrize("at_hand", [True, False])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from proxytune.driving.texels.table import Colours, Glimpses, Places, Table
 
-if numba.config.DISABLE_JIT:
+if vars(numba.config)["DISABLE_JIT"]:
     raise ImportError("NUMBA_DISABLE_JIT is set: uncompiled, these loops take a thousand times as long")
 
 # Signatures are compiled on import, which finds out whether Numba works here. No fast mathematics: it changes bits

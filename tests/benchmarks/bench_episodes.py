@@ -15,6 +15,7 @@ from proxytune.driving.family import lane_following
 from proxytune.driving.planar import PlanarPlant, integrate
 from proxytune.driving.robot import read_robot
 from proxytune.driving.texels import plain
+from proxytune.driving.texels.choosing import by_numba
 from proxytune.driving.view import View
 from proxytune.effects import Setting, effects_from
 from proxytune.settings import Section
@@ -36,10 +37,7 @@ def family(folder: Path, plant: str):
 
 def use(monkeypatch, by):
     """Let texels be looked up by Numba or by NumPy."""
-    if by == "numba":
-        pytest.importorskip("proxytune.driving.texels.compiled", reason="needs pip install 'proxytune[fast]'")
-    else:
-        monkeypatch.setattr(ground_plane, "fastest", lambda: plain)
+    monkeypatch.setattr(ground_plane, "fastest", by_numba if by == "numba" else lambda: plain)
 
 
 both = pytest.mark.parametrize("by", ["numpy", "numba"])

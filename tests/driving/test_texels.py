@@ -1,6 +1,7 @@
 """Numba and NumPy look up the same texels, to the bit; where Numba is not at hand, NumPy does it."""
 
 import importlib
+import itertools
 import os
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from proxytune.driving import ground_plane
 from proxytune.driving.family import lane_following
 from proxytune.driving.road.reading import shipped_map
 from proxytune.driving.road.texture import draw_floor
-from proxytune.driving.texels import fastest, plain
+from proxytune.driving.texels import choosing, plain
 from proxytune.effects.sight.shutter import Blur
 from proxytune.settings import Section
 
@@ -66,13 +67,14 @@ def test_both_blur_to_the_same_picture(compiled, blur, seed):
 def test_an_episode_is_the_same_without_numba(compiled, tmp_path, monkeypatch, plant):
     family = lane_following(Section(tmp_path / "study.toml", "domain.", {"plant": plant}), model=None)
     episode = make_episode({}, agent="steady", start=2, seed=5)
+    monkeypatch.setattr(ground_plane, "fastest", lambda: compiled)
     with_numba = family.drive(episode).poses
     monkeypatch.setattr(ground_plane, "fastest", lambda: plain)
     np.testing.assert_array_equal(family.drive(episode).poses, with_numba)
 
 
 def test_numpy_does_it_where_numba_is_told_not_to_compile(compiled):
-    code = "from proxytune.driving.texels import fastest; print(fastest().__name__)"
+    code = "from proxytune.driving.texels.choosing import by_numba; print(by_numba().__name__)"
     told = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
@@ -88,4 +90,9 @@ def test_numpy_does_it_where_numba_does_not_work(compiled, monkeypatch, at_hand)
     if not at_hand:
         monkeypatch.delattr("proxytune.driving.texels.compiled")
         monkeypatch.setitem(sys.modules, "proxytune.driving.texels.compiled", None)
-    assert fastest.__wrapped__() is (compiled if at_hand else plain)
+    assert choosing.by_numba.__wrapped__() is (compiled if at_hand else plain)
+
+
+def test_numba_is_loaded_once_that_pays_off(compiled, monkeypatch):
+    monkeypatch.setattr(choosing, "_uses", itertools.count(choosing.PAYS_OFF - 2))
+    assert [choosing.fastest() for _ in range(4)] == [plain, plain, compiled, compiled]

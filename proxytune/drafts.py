@@ -30,7 +30,7 @@ def draft_of(path: Path) -> Iterator[Path]:
 
 
 def draft_path(path: Path) -> Path:
-    """Where this process writes the draft of a file: machines that share a folder may have processes of one number."""
+    """Where this process writes a draft, of a file or a folder: on another machine a process may have its number."""
     return path.with_name(f"{_of_this_machine(path)}{os.getpid()}")
 
 

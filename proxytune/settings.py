@@ -121,9 +121,8 @@ class Section:
         try:
             path.stat()
         except OSError as problem:
-            if (
-                problem.errno == errno.ENAMETOOLONG
-            ):  # else it may be made later, and whoever reads it says what is wrong
+            # Of all else that may be wrong, whoever reads the file tells
+            if problem.errno == errno.ENAMETOOLONG:
                 raise self.error(key, "no file can have so long a name; shorten it") from None
         return path
 

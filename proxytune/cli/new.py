@@ -2,7 +2,6 @@
 
 import argparse
 import keyword
-import os
 import shutil
 from contextlib import suppress
 from importlib.util import find_spec
@@ -12,6 +11,7 @@ from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.trusting import remember
+from proxytune.drafts import draft_path
 from proxytune.driving.robot import read_robot, robot_names
 from proxytune.errors import InputError, ProxytuneError, RunError
 from proxytune.skeletons.family import family_skeleton
@@ -73,7 +73,7 @@ def write_folder(folder: Path, skeleton: Skeleton) -> None:
     Raises:
         RunError: If they cannot be written.
     """
-    draft = folder.with_name(f".{folder.name}.{os.getpid()}")
+    draft = draft_path(folder)
     try:
         draft.mkdir()
         for name, text in skeleton.files.items():

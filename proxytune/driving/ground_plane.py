@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 
 from proxytune.driving.cameras import SKY, CameraFigures, floor_hits, ground_points
 from proxytune.driving.road.texture import Floor
-from proxytune.driving.texels import Table, fastest
+from proxytune.driving.texels import Table, fastest, keep_colours
 
 
 class GroundPlaneCamera:
@@ -22,22 +22,8 @@ class GroundPlaneCamera:
 
     def __init__(self, figures: CameraFigures, floor: Floor) -> None:
         """Find for every pixel its point on the floor and its copy of the floor's picture."""
-        copies = _copies(floor)
-        points = ground_points(figures).reshape(-1, 2)
-        on_floor = np.isfinite(points[:, 0])
-        copy = np.where(on_floor, _blur_octaves(figures, floor).ravel(), 0)
-        scale = copies.per_metre[copy]
-        plane = np.stack((points[:, 0] * scale, points[:, 1] * scale, scale))
-        # Pixels above the horizon stay at the last texel, the sky; all before the first that sees floor are left out
-        self._sky = sky = int(np.argmax(on_floor)) if on_floor.any() else len(on_floor)
-        self._table = Table(
-            plane=np.ascontiguousarray(np.where(on_floor, plane, 0.0)[:, sky:], dtype=np.float32),
-            last=np.where(on_floor, copies.sides[copy] - 1, 0)[sky:].astype(np.float32),
-            first=np.where(on_floor, copies.firsts[copy], copies.texels.size - 1)[sky:].astype(np.int32),
-            side=copies.sides[copy][sky:].astype(np.int32),
-            texels=copies.texels,
-        )
-        self._sky_levels = np.array(SKY * sky, dtype=np.uint8)
+        self._sky, self._table = _tabulate(figures, floor)
+        self._sky_levels = np.array(SKY * self._sky, dtype=np.uint8)
         self._origin = np.float32(floor.origin)
         self._shape = (figures.rows, figures.columns, 3)
 
@@ -45,8 +31,7 @@ class GroundPlaneCamera:
         """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
         pictures = self._sky_only(len(poses))
         texels = self.glimpse(poses).view(np.uint8).reshape(len(poses), -1, 4)
-        for colour in range(3):  # four times as fast as one copy of [..., :3]
-            pictures[:, self._sky :, colour] = texels[..., colour]
+        keep_colours(texels, pictures[:, self._sky :])
         shown: NDArray[np.uint8] = pictures.reshape(-1, *self._shape)
         return shown
 
@@ -70,6 +55,25 @@ class GroundPlaneCamera:
         pictures = np.empty((count, self._sky + len(self._table.last), 3), dtype=np.uint8)
         pictures.reshape(count, -1)[:, : 3 * self._sky] = self._sky_levels
         return pictures
+
+
+def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, Table]:
+    """How many pixels are sky before the first that sees floor, and where each from that one on looks."""
+    copies, points = _copies(floor), ground_points(figures).reshape(-1, 2)
+    on_floor = np.isfinite(points[:, 0])
+    sky = int(np.argmax(on_floor)) if on_floor.any() else len(on_floor)
+    points, on_floor = points[sky:], on_floor[sky:]
+    copy = np.where(on_floor, _blur_octaves(figures, floor).ravel()[sky:], 0)
+    scale = copies.per_metre[copy]
+    plane = np.stack((points[:, 0] * scale, points[:, 1] * scale, scale))
+    # Those above the horizon stay at the last texel, the sky
+    return sky, Table(
+        plane=np.where(on_floor, plane, 0.0).astype(np.float32),
+        last=np.where(on_floor, copies.sides[copy] - 1, 0).astype(np.float32),
+        first=np.where(on_floor, copies.firsts[copy], copies.texels.size - 1).astype(np.int32),
+        side=copies.sides[copy].astype(np.int32),
+        texels=copies.texels,
+    )
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """The rows of study.db as values."""
 
 import json
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, cast
 
 from proxytune.domain import Episode, Outcome
+from proxytune.settings import is_finite
 from proxytune.space import Theta
 
 State = Literal["open", "finished", "failed", "cut"]
@@ -145,10 +145,7 @@ def _list(text: str, *kinds: type) -> list[Any]:
 
 
 def _is_number(value: object) -> bool:
-    try:
-        return type(value) in (int, float) and math.isfinite(cast(float, value))
-    except OverflowError:  # a whole number of hundreds of digits
-        return False
+    return type(value) in (int, float) and is_finite(cast(float, value))
 
 
 def _expect(holds: bool, what: str, found: object) -> None:

@@ -168,12 +168,13 @@ def _settings(read: Section) -> StudySettings:
     read.only(KEYS)
     if read.whole("format", low=1) > FORMAT:
         raise read.error("format", f"this proxytune reads up to {FORMAT}; install a newer one")
+    targets = tuple(read.file("target", name) for name in targets_of(read))
     return StudySettings(
         path=path,
         name=read.text("name", path.absolute().parent.name),
         family=read.text("family", DEFAULT_FAMILY),
         proxy=read.file("proxy") if "proxy" in read.values else None,
-        target=read.file("target", targets_of(read)[0]),
+        target=targets[0],
         truth=read.file("truth") if "truth" in read.values else None,
         objective=read.text("objective", "prpv"),
         metrics=metrics_of(read),
@@ -194,7 +195,7 @@ def _settings(read: Section) -> StudySettings:
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
         aliases=aliases_of(read),
-        more_targets=tuple(read.file("target", name) for name in targets_of(read)[1:]),
+        more_targets=targets[1:],
         target_columns=texts_of(read.section("target_columns")),
         episode_timeout_s=positive(read, "episode_timeout_s"),
     )

@@ -11,8 +11,7 @@ from proxytune.search.engines.registry import NAMES, AfterDesign, make_proposer,
 from proxytune.search.proposer import Trial, batch_at, propose_batch, with_failures_as_worst
 
 HERE = [name for name in NAMES if not why_not(name, composed=True)]
-TAKES_SECONDS = {"skopt": pytest.mark.slow}
-IN_BATCHES = [pytest.param(name, marks=TAKES_SECONDS.get(name, ())) for name in HERE]
+IN_BATCHES = [pytest.param(name, marks=pytest.mark.slow) if name == "skopt" else name for name in HERE]
 
 
 @given(st.integers(0, 200), st.integers(1, 20), st.integers(1, 30))

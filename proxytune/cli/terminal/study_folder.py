@@ -1,12 +1,12 @@
 """The folder that a PATH means: an existing one, or a copy of a study that comes with the package."""
 
 import contextlib
-import os
 import shutil
 import sys
 from pathlib import Path
 
 from proxytune.cli.terminal.trusting import remember
+from proxytune.drafts import draft_path
 from proxytune.errors import InputError, ProxytuneError, StoreError
 from proxytune.settings import nearest
 from proxytune.shipped import shipped
@@ -48,7 +48,7 @@ def study_folder(path: Path) -> Path:
 
 def _copy(source: Path, folder: Path) -> None:
     """Copy the whole folder or nothing."""
-    draft = folder.with_name(f".{folder.name}.{os.getpid()}")
+    draft = draft_path(folder)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED))

@@ -101,14 +101,14 @@ def _is_shipped(folder: Path, module: str) -> bool:
     homes = [home for home in shipped("studies").iterdir() if home.is_dir()]
     if any(home.samefile(folder) for home in homes):
         return True
-    return not compiled_beside(folder) and any(_contents(home) == own for home in homes)
+    return not _compiled_beside(folder) and any(_contents(home) == own for home in homes)
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in modules_beside(folder)}
 
 
-def compiled_beside(folder: Path) -> list[Path]:
+def _compiled_beside(folder: Path) -> list[Path]:
     """What Python may run of a folder though nobody can read it: libraries, and bytecode, maybe of another text."""
     files = files_beside(folder)
     homes = sorted({folder, *(path.parent for path in files)})
@@ -117,7 +117,7 @@ def compiled_beside(folder: Path) -> list[Path]:
 
 
 def _request(folder: Path, module: str) -> str:
-    files = [path.relative_to(folder).as_posix() for path in (*modules_beside(folder), *compiled_beside(folder))]
+    files = [path.relative_to(folder).as_posix() for path in (*modules_beside(folder), *_compiled_beside(folder))]
     more = f" and {len(files) - NAMED} more" if len(files) > NAMED else ""
     beside = f", where {', '.join(files[:NAMED])}{more} lie" if files else ""
     where = f"module '{module}', named in {folder.resolve()}{beside}"

@@ -20,8 +20,13 @@ def average(glimpses: Glimpses, weights: NDArray[np.float32], colours: Colours) 
     """Write the weighted mean of glimpses into colours; exact for weights as `Blur` has them."""
     of_all = glimpses.view(np.uint8).reshape(len(glimpses), -1)
     mean = np.rint(weights @ of_all.astype(np.float32)).astype(np.uint8).reshape(-1, 4)
+    keep_colours(mean, colours)
+
+
+def keep_colours(levels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> None:
+    """Write levels (…, 4), the last of them spare, into colours (…, 3)."""
     for colour in range(3):  # four times as fast as one copy of [..., :3]
-        colours[:, colour] = mean[:, colour]
+        colours[..., colour] = levels[..., colour]
 
 
 def _look(table: Table, places: Places) -> NDArray[np.int32]:

@@ -9,10 +9,10 @@ from proxytune.search.design import unit_points
 from proxytune.search.surrogate import Array, Surrogate
 
 POINTS = 2048
-"""At most so many points."""
+"""At most so many points for the posterior mean."""
 
 DRAWN_POINTS = 1024
-"""At most so many of them for the functions drawn: these are drawn jointly, which takes the cube of their number."""
+"""At most so many for the functions drawn: these are drawn jointly, which takes the cube of their number."""
 
 DRAWS = 200
 LEVELS = (0.025, 0.975)

@@ -12,6 +12,8 @@ import pytest
 
 FAKES = Path(__file__).parent / "fakes"
 sys.path.append(str(FAKES))
+# Two processes whose linear algebra has two threads each wait for one another; NumPy is not imported yet.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 # Tests write the code that they run; those of trust take this back.
 os.environ["PROXYTUNE_TRUST"] = "1"
 # A run in the background ignores Ctrl-C; tests mean it to be heeded, as in a terminal.

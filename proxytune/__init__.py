@@ -23,14 +23,13 @@ if TYPE_CHECKING:
     from proxytune.api.studies import StudyReport, read_study, run_study
     from proxytune.api.tables import score
     from proxytune.domain import DomainFamily, Episode
-    from proxytune.driving.agents import Agent
+    from proxytune.driving import Agent
     from proxytune.effects import Effect
     from proxytune.errors import InputError, ProxytuneError, RunError
-    from proxytune.learning.learner import Learner
+    from proxytune.learning import Learner
     from proxytune.logs import Log, read_log
     from proxytune.scores import Metric, ScoreTable, read_scores
-    from proxytune.search.engines.engine import Engine
-    from proxytune.search.proposer import Proposer
+    from proxytune.search import Engine, Proposer
     from proxytune.space import Parameter
     from proxytune.usefulness import Assessment, Measure
 

@@ -108,11 +108,9 @@ def make_studies(tmp_path_factory: pytest.TempPathFactory) -> MakeStudy:
 @pytest.fixture(scope="session")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
-    from proxytune.search.engines.registry import make_proposer
-    from proxytune.storage.store import Store
-    from proxytune.study.run import run_study
-    from proxytune.study.study import open_study
-    from proxytune.study.study_run import StudyRun
+    from proxytune.search import make_proposer
+    from proxytune.storage import Store
+    from proxytune.study import StudyRun, open_study, run_study
 
     folder = study_maker(tmp_path_factory.mktemp("finished"))()
     with Store.open(folder) as store:

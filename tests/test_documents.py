@@ -16,17 +16,13 @@ from floors import floor
 from proxytune.cli.compare_objective import STAND_INS
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
 from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
-from proxytune.driving.agents import AGENTS
-from proxytune.driving.road.reading import map_names
-from proxytune.driving.robot import UNITS
-from proxytune.driving.task import METRICS
-from proxytune.effects import CATALOGUE
-from proxytune.effects.learnt.features import GROUPS
+from proxytune.driving import AGENTS, METRICS, UNITS, map_names
+from proxytune.effects import CATALOGUE, GROUPS
+from proxytune.files import shipped
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
 from proxytune.report.diagnosis.notes import MEANINGS
-from proxytune.search.engines.registry import ENGINES
+from proxytune.search import ENGINES
 from proxytune.settings import read_settings
-from proxytune.shipped import shipped
 from proxytune.study.settings import KEYS
 from proxytune.usefulness import MEASURES, PODS
 

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from proxytune.cli.main import main
-from proxytune.driving.family import lane_following
+from proxytune.driving import lane_following
 from proxytune.effects import Catalogue, read_model
-from proxytune.extensions import GROUP, load
+from proxytune.extensions import load
+from proxytune.extensions.door import GROUP
 from proxytune.settings import read_settings
-from proxytune.study.study import open_study
+from proxytune.study import open_study
 
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "extending.md").read_text(encoding="utf-8")
 INTRODUCTION, *CHAPTERS = re.split(r"^## ", PAGE, flags=re.MULTILINE)

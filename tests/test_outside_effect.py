@@ -1,22 +1,17 @@
 """A user's effect beside a study, or in a plug-in, is simulated, identified, written and read as a shipped one is."""
 
 import json
-import sys
 from dataclasses import replace
-from pathlib import Path
 
+import planted
 import pytest
 from outside_effects import NAME, WEAK_REVERSE, WRONG
 
-sys.path.append(str(Path(__file__).parent / "diagnosis"))
-
-import planted
-
 from proxytune.cli.main import main
-from proxytune.driving.family import lane_following
+from proxytune.driving import lane_following
 from proxytune.effects import Catalogue, Model, effect_of, effects_from, model_text, read_model
 from proxytune.errors import ExtensionError, InputError, SettingsError
-from proxytune.extensions import GROUP
+from proxytune.extensions.door import GROUP
 from proxytune.settings import Section
 
 TABLE = f'format = 1\nrobot = "duckiebot"\n\n[effects."{NAME}"]\nloss = 0.3\n'

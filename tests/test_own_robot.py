@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from proxytune.cli.main import main
-from proxytune.skeletons.robot import SIX
+from proxytune.skeletons.writing import SIX
 
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "own_robot.md").read_text(encoding="utf-8")
 LINES = [

@@ -11,10 +11,9 @@ import pytest
 
 from proxytune.cli.main import main
 from proxytune.domain import make_episode
+from proxytune.learning import Distribution, collect_samples
 from proxytune.learning.cloning import BehaviourCloning
-from proxytune.learning.lessons import Distribution, collect_samples
-from proxytune.study.family import load_family
-from proxytune.study.settings import read_study_settings
+from proxytune.study import load_family, read_study_settings
 
 STUDIES = Path(__file__).resolve().parent.parent / "studies"
 MADE_FROM = {

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 import pandas as pd
 
 from proxytune.errors import InputError
-from proxytune.search.engines.engine import Engine
-from proxytune.search.engines.registry import make_proposer
-from proxytune.search.proposer import Trial, Values
+from proxytune.search import Engine, Trial, Values, make_proposer
 from proxytune.space import Interval, Space, Theta
 
 

@@ -10,18 +10,16 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.camera.result import CameraDiagnosis
-from proxytune.diagnosis.log_diagnosis import LogDiagnosis, diagnose_log
-from proxytune.diagnosis.measured.vehicle import robot_of
-from proxytune.diagnosis.result import Diagnosis
+from proxytune.diagnosis import CameraDiagnosis, Diagnosis, LogDiagnosis, diagnose_log, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.importing.opening import open_log
+from proxytune.importing import open_log
 from proxytune.logs import Log
 from proxytune.report.diagnosis.camera.document import noise_floor
 from proxytune.report.diagnosis.page import diagnosis_page
 from proxytune.report.diagnosis.whole import model_file, whole_document, whole_figures, whole_headline, whole_notes
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.writing import save, write_text
 
 IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: ", "--test": "test"}

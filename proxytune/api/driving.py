@@ -10,9 +10,7 @@ from proxytune.domain import make_episode
 from proxytune.errors import InputError
 from proxytune.seeds import episode_seed
 from proxytune.space import Theta
-from proxytune.study.family import load_family
-from proxytune.study.settings import read_study_settings
-from proxytune.study.single_episode import check_episode, record_episode
+from proxytune.study import check_episode, load_family, read_study_settings, record_episode
 
 
 @dataclass(frozen=True)

@@ -14,19 +14,26 @@ from proxytune.report.families.document import families_document
 from proxytune.report.families.figure import families_figure
 from proxytune.report.families.page import families_page
 from proxytune.report.families.words import families_sentence
-from proxytune.report.page import html_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.writing import save, write_text
-from proxytune.running.progress import Bars, Silent, Watcher
-from proxytune.storage.lock import locked
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import Spent
-from proxytune.study.families.compared import ComparedFamilies, Lesson, TunedFamily, tuned
-from proxytune.study.families.lessons import read_lessons, save_lessons
-from proxytune.study.settings import StudySettings, read_study_settings
-from proxytune.study.spending import with_spending
-from proxytune.study.study import Study, open_settings
-from proxytune.study.study_run import StudyRun
-from proxytune.teaching.families import classrooms, teach_families
+from proxytune.running import Bars, Silent, Watcher
+from proxytune.storage import Store, locked
+from proxytune.study import (
+    ComparedFamilies,
+    Lesson,
+    Spent,
+    Study,
+    StudyRun,
+    StudySettings,
+    TunedFamily,
+    open_settings,
+    read_lessons,
+    read_study_settings,
+    save_lessons,
+    tuned,
+    with_spending,
+)
+from proxytune.teaching import classrooms, teach_families
 
 
 class Teller(Protocol):

@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from proxytune.diagnosis.filming import FilmedDrive, film
-from proxytune.diagnosis.recording import PICTURES, frames_text, log_text, record, samples_text
-from proxytune.driving.lane_following import LaneFollowing
+from proxytune.diagnosis import PICTURES, FilmedDrive, film, frames_text, log_text, record, samples_text
+from proxytune.driving import LaneFollowing
 from proxytune.errors import InputError
 from proxytune.logs import Frames, Log
 from proxytune.report.writing import write_picture, write_text
 from proxytune.settings import Section
-from proxytune.study.family import bare_family
-from proxytune.study.settings import StudySettings
+from proxytune.study import StudySettings, bare_family
 
 Tell = Callable[[str], None]
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.report.page import html_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.study.convergence import convergence
 from proxytune.report.study.document import study_document
 from proxytune.report.study.finding import finding_of
@@ -20,24 +20,34 @@ from proxytune.report.study.profiles_figure import profiles_figure
 from proxytune.report.study.search_figures import evaluations_figure
 from proxytune.report.study.verdict import sentence
 from proxytune.report.writing import save, write_text
-from proxytune.running.progress import Bars, Silent, Watcher
-from proxytune.search.engines.registry import make_proposer
-from proxytune.search.history import History, optimize_result
-from proxytune.storage.lock import locked
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import Spent
-from proxytune.study.history import history_of
-from proxytune.study.knowledge import goal_of
-from proxytune.study.provenance import note_search
-from proxytune.study.result import Best, StudyResult, result_of
-from proxytune.study.run import check_facts, stored_run
-from proxytune.study.run import run_study as run_trials
-from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
-from proxytune.study.spending import with_spending
-from proxytune.study.stages import confirmation, preflight, retrying
-from proxytune.study.study import Study, open_study
-from proxytune.study.study_run import StudyRun
-from proxytune.study.without_code import open_to_look
+from proxytune.running import Bars, Silent, Watcher
+from proxytune.search import History, make_proposer, optimize_result
+from proxytune.storage import Store, locked
+from proxytune.study import (
+    LEARNING,
+    Best,
+    Spent,
+    Study,
+    StudyResult,
+    StudyRun,
+    StudySettings,
+    check_facts,
+    goal_of,
+    history_of,
+    most_confirmation_episodes,
+    most_preflight_episodes,
+    note_search,
+    open_study,
+    open_to_look,
+    read_study_settings,
+    result_of,
+    retry_failed,
+    run_confirmation,
+    run_preflight,
+    stored_run,
+    with_spending,
+)
+from proxytune.study import run_study as run_trials
 
 FIGURES: Mapping[str, Callable[[StudyResult], Figure]] = {
     "convergence": convergence,
@@ -192,7 +202,7 @@ def run_opened(
             _prepare(under_way, warn)
             # The proposer allows for the noise that the pre-flight measured.
             run_trials(under_way, make_proposer(study.engine, settings.initial, goal_of(under_way)))
-            confirmation.run_confirmation(under_way)
+            run_confirmation(under_way)
         return StudyReport(result_of(under_way), under_way.spent)
 
 
@@ -215,15 +225,15 @@ def read_study(path: str | Path) -> StudyReport:
 def most_episodes(settings: StudySettings) -> int:
     """How many episodes a study takes at most, from pre-flight to confirmation."""
     trials = settings.budget * len(settings.agents) * settings.starts
-    return trials + preflight.most_episodes(settings) + confirmation.most_episodes(settings)
+    return trials + most_preflight_episodes(settings) + most_confirmation_episodes(settings)
 
 
 def _prepare(under_way: StudyRun, warn: Callable[[str], None]) -> None:
     """Run the pre-flight and warn at once of parameters without effect, so that the user can stop the study."""
     check_facts(under_way)
-    retrying.retry_failed(under_way)
+    retry_failed(under_way)
     if line := note_search(under_way.study, under_way.store):
         warn(line)
-    learnt = preflight.run_preflight(under_way)
+    learnt = run_preflight(under_way)
     for warning in learnt.warnings if learnt and under_way.spent.episodes else ():
         warn(warning)

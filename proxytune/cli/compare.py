@@ -21,12 +21,12 @@ from proxytune.errors import InputError, StoreError
 from proxytune.report.compare.document import compare_document, compare_lines, compare_tables
 from proxytune.report.compare.figure import compare_figure
 from proxytune.report.compare.page import compare_page
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.writing import save, write_text
-from proxytune.running.workers import working
-from proxytune.search.engines.engine import Engine
-from proxytune.search.engines.registry import NAMES, STUDY_ENGINES, engine_code, engine_of, why_not
-from proxytune.storage.lock import locked
+from proxytune.running import working
+from proxytune.search import NAMES, STUDY_ENGINES, Engine, engine_code, engine_of, why_not
+from proxytune.storage import locked
 
 FILE_NAME = "runs.jsonl"
 MOST = 100_000

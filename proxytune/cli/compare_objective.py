@@ -14,13 +14,9 @@ from proxytune.comparison.of_study import StudyObjective, noise_floor
 from proxytune.comparison.of_truths import TruthObjective, lacking_families
 from proxytune.comparison.ranking import Ranking
 from proxytune.errors import InputError
-from proxytune.running.progress import Bars
-from proxytune.storage.store import Store
-from proxytune.study.provenance import adopt
-from proxytune.study.settings import StudySettings
-from proxytune.study.stages.preflight import most_episodes
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.running import Bars
+from proxytune.storage import Store
+from proxytune.study import StudyRun, StudySettings, adopt, most_preflight_episodes, open_study
 
 STAND_INS: dict[str, Objective] = {"analytic": Analytic(), "ranking": Ranking(), "calibrated": Calibrated()}
 BUDGET, INITIAL = 40, 10
@@ -110,7 +106,7 @@ def _on_study(arguments: argparse.Namespace, run: StudyRun) -> Objective:
 def _episodes_per_run(arguments: argparse.Namespace, settings: StudySettings, budget: int) -> int:
     """At most: every point, the answer, the pre-flight; with truths also target, truth twice, fresh ones of points."""
     points = 2 * budget + 3 if arguments.truths else budget + 1
-    return points * len(settings.agents) * settings.starts + most_episodes(settings)
+    return points * len(settings.agents) * settings.starts + most_preflight_episodes(settings)
 
 
 def _spending(arguments: argparse.Namespace, budget: int, initial: int) -> tuple[int, int]:

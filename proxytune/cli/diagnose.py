@@ -13,11 +13,10 @@ from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
 from proxytune.cli.terminal.steps import Steps
 from proxytune.cli.terminal.typed import typed
-from proxytune.diagnosis.log_diagnosis import diagnose_log
-from proxytune.diagnosis.measured.vehicle import robot_of
+from proxytune.diagnosis import diagnose_log, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.importing.opening import open_log
+from proxytune.importing import open_log
 from proxytune.logs import Log
 from proxytune.report.diagnosis.whole import whole_tables_and_notes
 

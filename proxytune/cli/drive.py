@@ -16,10 +16,16 @@ from proxytune.report.drive.document import episode_document, episode_table, par
 from proxytune.report.drive.pictures import NO_PLACES, check_output, write_episode
 from proxytune.seeds import episode_seed
 from proxytune.space import Theta
-from proxytune.study.family import load_family
-from proxytune.study.settings import StudySettings, read_study_settings
-from proxytune.study.side_by_side import SideBySide, drive_side_by_side, load_target
-from proxytune.study.single_episode import can_record, check_episode
+from proxytune.study import (
+    SideBySide,
+    StudySettings,
+    can_record,
+    check_episode,
+    drive_side_by_side,
+    load_family,
+    load_target,
+    read_study_settings,
+)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

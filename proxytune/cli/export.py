@@ -8,8 +8,7 @@ from rich.text import Text
 
 from proxytune.api.studies import read_study
 from proxytune.cli.terminal.answer import Answer
-from proxytune.driving.lane_following import LaneFollowing
-from proxytune.driving.robot import Robot, read_robot, robot_from_geometry, robot_names
+from proxytune.driving import LaneFollowing, Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
 from proxytune.report.export.instance import Instance, Line, lines_of
@@ -18,8 +17,8 @@ from proxytune.report.export.places import FORMATS
 from proxytune.report.export.ros import ros_text
 from proxytune.report.export.urdf import urdf_text
 from proxytune.report.writing import write_text, write_whole
-from proxytune.search.history import History, write_optuna, write_skopt
-from proxytune.study.family import bare_family
+from proxytune.search import History, write_optuna, write_skopt
+from proxytune.study import bare_family
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
 """What takes the trials of a study, not what was found."""

@@ -11,9 +11,8 @@ from proxytune.api.studies import most_episodes
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.live_page import renewed_page
 from proxytune.report.families.table import families_table
-from proxytune.running.progress import Bars, Watcher
-from proxytune.study.settings import StudySettings
-from proxytune.study.study import Study
+from proxytune.running import Bars, Watcher
+from proxytune.study import Study, StudySettings
 
 
 def compare_families(settings: StudySettings, spending: Spending) -> Answer:

@@ -11,10 +11,7 @@ from rich.text import Text
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
 from proxytune.cli.terminal.waiting import waiting
-from proxytune.importing.opening import source_without_unnamed_pictures
-from proxytune.importing.reading import read_source
-from proxytune.importing.source import Source, Survey
-from proxytune.importing.writing import write_log
+from proxytune.importing import Source, Survey, read_source, source_without_unnamed_pictures, write_log
 
 MEASURES = ("drive", "time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
 """The columns of the table of drives."""

@@ -8,24 +8,19 @@ from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.live_page import renewed_page
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.study.page import study_command, study_settings
 from proxytune.report.teaching.page import plv_page
 from proxytune.report.teaching.plv_document import plv_document, plv_table
 from proxytune.report.teaching.plv_figure import plv_figure
 from proxytune.report.teaching.words import plv_answer
 from proxytune.report.writing import save, write_text
-from proxytune.running.progress import Bars
-from proxytune.search.engines.registry import make_proposer
-from proxytune.storage.lock import locked
-from proxytune.storage.store import Store
-from proxytune.study.result import StudyResult
-from proxytune.study.settings import LEARNING
-from proxytune.study.study import Study
-from proxytune.teaching.box import search_space
-from proxytune.teaching.experiment import load_setup
-from proxytune.teaching.finalists import most_examinations
-from proxytune.teaching.search import PlvSearch
+from proxytune.running import Bars
+from proxytune.search import make_proposer
+from proxytune.storage import Store, locked
+from proxytune.study import LEARNING, Study, StudyResult
+from proxytune.teaching import PlvSearch, load_setup, most_examinations, search_space
 
 
 def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]) -> Answer:

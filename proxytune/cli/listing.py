@@ -7,16 +7,11 @@ from pathlib import Path
 from rich.table import Table
 
 from proxytune.cli.terminal.answer import Answer
-from proxytune.driving.agents import AGENTS
-from proxytune.driving.agents.loading import load_agent
-from proxytune.driving.road.lane import lane_length
-from proxytune.driving.road.reading import map_names, shipped_map
-from proxytune.driving.robot import read_robot, robot_names
-from proxytune.driving.task import METRICS
+from proxytune.driving import AGENTS, METRICS, lane_length, load_agent, map_names, read_robot, robot_names, shipped_map
 from proxytune.effects import DECLARED, SHIPPED
 from proxytune.extensions import plugins
-from proxytune.search.engines.registry import ENGINES, NAMES, engine_of, installed
-from proxytune.study.objective import measure_of
+from proxytune.search import ENGINES, NAMES, engine_of, installed
+from proxytune.study import measure_of
 from proxytune.usefulness import MEASURES, PODS
 
 Row = dict[str, object]

@@ -18,14 +18,11 @@ from proxytune.cli.diagnose import shares
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.steps import Steps
 from proxytune.cli.terminal.study_folder import study_folder
-from proxytune.closing.closed import Closed
-from proxytune.closing.loop import close_loop
-from proxytune.closing.opening import open_loop
-from proxytune.closing.report import COLUMNS, document_of, notes_of, page_of, rows_of, table_rows
 from proxytune.logs import Log
-from proxytune.report.page import html_of
+from proxytune.loop import COLUMNS, Closed, close_loop, document_of, notes_of, open_loop, page_of, rows_of, table_rows
+from proxytune.report.page.rendering import html_of
 from proxytune.report.writing import write_text
-from proxytune.running.progress import Bars, Watcher
+from proxytune.running import Bars, Watcher
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

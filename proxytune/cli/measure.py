@@ -9,11 +9,10 @@ from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.errors import InputError
-from proxytune.running.progress import Bars
+from proxytune.running import Bars
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import TARGET_OFFSET, target_seed
-from proxytune.study.measure import measure
-from proxytune.study.settings import read_study_settings
+from proxytune.study import measure, read_study_settings
 
 MOST_REPEATS = 1_000_000
 

@@ -11,14 +11,10 @@ from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.trusting import remember
-from proxytune.drafts import draft_path
-from proxytune.driving.robot import read_robot, robot_names
+from proxytune.driving import read_robot, robot_names
 from proxytune.errors import InputError, ProxytuneError, RunError
-from proxytune.skeletons.family import family_skeleton
-from proxytune.skeletons.given_urdf import robot_from_urdf
-from proxytune.skeletons.robot import robot_skeleton
-from proxytune.skeletons.skeleton import Skeleton
-from proxytune.skeletons.study import study_skeleton
+from proxytune.files import draft_path
+from proxytune.skeletons import Skeleton, family_skeleton, robot_from_urdf, robot_skeleton, study_skeleton
 
 KINDS = ("robot", "study", "family")
 

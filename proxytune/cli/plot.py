@@ -19,15 +19,20 @@ from proxytune.report.study.table_files import write_tables
 from proxytune.report.sweep.document import curve_name
 from proxytune.report.sweep.files import draw_curves, held_alike, held_values, write_page
 from proxytune.scores import Metric
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import Spent
-from proxytune.study.rescoring import rescored, with_metrics
-from proxytune.study.result import StudyResult, result_of
-from proxytune.study.run import stored_run
-from proxytune.study.settings import StudySettings, read_study_settings
-from proxytune.study.study_run import StudyRun
-from proxytune.study.without_code import open_to_look
-from proxytune.sweep.sweep import Curve, all_curves
+from proxytune.storage import Store
+from proxytune.study import (
+    Spent,
+    StudyResult,
+    StudyRun,
+    StudySettings,
+    open_to_look,
+    read_study_settings,
+    rescored,
+    result_of,
+    stored_run,
+    with_metrics,
+)
+from proxytune.sweep import Curve, all_curves
 
 RESCORED = "rescored"
 

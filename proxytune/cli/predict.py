@@ -10,14 +10,11 @@ from rich.text import Text
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
 from proxytune.cli.terminal.waiting import waiting
-from proxytune.diagnosis.horizon.prediction import agreement, predict
-from proxytune.diagnosis.measured.vehicle import robot_of
-from proxytune.diagnosis.predicted_pictures import frames_of, predict_pictures
-from proxytune.diagnosis.recording import PICTURES, frames_text
-from proxytune.driving.robot import Robot, robot_from_geometry, robot_names
+from proxytune.diagnosis import PICTURES, agreement, frames_of, frames_text, predict, predict_pictures, robot_of
+from proxytune.driving import Robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
-from proxytune.importing.opening import open_log
+from proxytune.importing import open_log
 from proxytune.logs import GEOMETRY, Log
 from proxytune.report.writing import write_picture, write_text
 

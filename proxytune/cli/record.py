@@ -10,7 +10,7 @@ from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.waiting import waiting
 from proxytune.errors import InputError
 from proxytune.logs import Log
-from proxytune.study.settings import read_study_settings
+from proxytune.study import read_study_settings
 
 MOST_FRAMES = 1_000_000
 """As many as six digits number."""

@@ -7,15 +7,17 @@ from pathlib import Path
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.errors import InputError
-from proxytune.storage.lock import locked
-from proxytune.storage.repair import Salvage, salvage
-from proxytune.storage.store import Store
-from proxytune.study.founded import unfounded
-from proxytune.study.objective import PRPV
-from proxytune.study.run import as_stored
-from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
-from proxytune.study.study_run import StudyRun
-from proxytune.study.without_code import open_to_look
+from proxytune.storage import Salvage, Store, locked, salvage
+from proxytune.study import (
+    LEARNING,
+    PRPV,
+    StudyRun,
+    StudySettings,
+    as_stored,
+    open_to_look,
+    read_study_settings,
+    unfounded,
+)
 
 AGAIN = "a sweep that is lost is there again after the same sweep command, which drives only episodes that are lost"
 COUNTED = {"trials": "trial", "episodes": "episode", "sweeps": "sweep"}

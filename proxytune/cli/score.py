@@ -12,7 +12,8 @@ from proxytune.cli.score_tables import read_sides
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.typed import typed
 from proxytune.errors import InputError
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.scores.document import document_of, document_of_ranking
 from proxytune.report.scores.figures import flipped_pairs, scatter
 from proxytune.report.scores.page import Drawn, score_page

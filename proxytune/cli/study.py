@@ -15,12 +15,8 @@ from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_clu
 from proxytune.cli.terminal.live_page import renewed_page
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.report.study.table import study_table
-from proxytune.running.progress import Bars
-from proxytune.study.evaluation import Spent
-from proxytune.study.result import StudyResult
-from proxytune.study.settings import LEARNING, read_study_settings
-from proxytune.study.spending import with_spending
-from proxytune.study.study import Study, open_settings
+from proxytune.running import Bars
+from proxytune.study import LEARNING, Spent, Study, StudyResult, open_settings, read_study_settings, with_spending
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -16,18 +16,22 @@ from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.report.sweep.document import NO_POD, curve_document, curve_lines, curve_tables, failures
 from proxytune.report.sweep.files import draw_curves, held_values, write_curves, write_page
-from proxytune.running.progress import Bars
+from proxytune.running import Bars
 from proxytune.space import Theta
-from proxytune.storage.lock import locked
-from proxytune.storage.records import SweepRecord
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import Spent
-from proxytune.study.provenance import adopt
-from proxytune.study.study import Study, open_study
-from proxytune.study.study_run import StudyRun
-from proxytune.sweep.answer import best_theta, has_answer
-from proxytune.sweep.discrepancy import discrepancy_study
-from proxytune.sweep.sweep import Curve, check_base, curve_of, plan_sweep, run_sweep, sweep_interval, with_target
+from proxytune.storage import Store, SweepRecord, locked
+from proxytune.study import Spent, Study, StudyRun, adopt, open_study
+from proxytune.sweep import (
+    Curve,
+    best_theta,
+    check_base,
+    curve_of,
+    discrepancy_study,
+    has_answer,
+    plan_sweep,
+    run_sweep,
+    sweep_interval,
+    with_target,
+)
 
 MOST_POINTS = 10_000
 

@@ -10,7 +10,8 @@ from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.cli.terminal.typed import typed
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.study.page import study_settings
 from proxytune.report.teaching.document import teach_document
 from proxytune.report.teaching.figure import teach_figure
@@ -18,15 +19,10 @@ from proxytune.report.teaching.page import teach_page
 from proxytune.report.teaching.table import teach_table
 from proxytune.report.teaching.words import teach_answer
 from proxytune.report.writing import save, write_text
-from proxytune.running.progress import Bars
-from proxytune.storage.lock import locked
-from proxytune.storage.store import Store
-from proxytune.study.provenance import adopt
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
-from proxytune.teaching.examining import count_examinations
-from proxytune.teaching.experiment import check_proxies, load_setup, run_experiment
-from proxytune.teaching.predictivity import predictivity
+from proxytune.running import Bars
+from proxytune.storage import Store, locked
+from proxytune.study import StudyRun, adopt, open_study
+from proxytune.teaching import check_proxies, count_examinations, load_setup, predictivity, run_experiment
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

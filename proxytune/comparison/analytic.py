@@ -6,9 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from proxytune.search.design import to_unit
-from proxytune.search.goal import Goal
-from proxytune.search.proposer import Values
+from proxytune.search import Goal, Values, to_unit
 from proxytune.space import Interval, Space
 
 BOX = Space(

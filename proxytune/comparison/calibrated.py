@@ -5,18 +5,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxytune.arrays import Floats
 from proxytune.comparison.analytic import BOX
 from proxytune.comparison.courses import TABLE, course, simulated
 from proxytune.scores import Metric
-from proxytune.search.design import from_unit, to_unit
-from proxytune.search.goal import Goal
-from proxytune.search.proposer import Values
+from proxytune.search import Goal, Values, from_unit, to_unit
 from proxytune.space import Space
-from proxytune.usefulness.prpv import prpv_of_means
-
-Array = NDArray[np.float64]
+from proxytune.usefulness import prpv_of_means
 
 METRICS = ("distance", "survival_time", "early_distance", "early_offset")
 COMPARED = (Metric("distance"), Metric("survival_time"))
@@ -48,7 +44,7 @@ class Calibrated:
         """The true θ: each parameter drawn from the middle 80 % of its interval."""
         return from_unit(self.space, np.random.default_rng([seed, 1]).uniform(0.1, 0.9, len(self.space.intervals)))
 
-    def means(self, values: Values, seed: int) -> Array:
+    def means(self, values: Values, seed: int) -> Floats:
         """Every agent's mean metrics under the study's placement, shape (outputs,)."""
         known = simulated()
         rough = known.mixing @ _generator(values, seed, 3).standard_normal(len(known.rough))
@@ -67,7 +63,7 @@ class Calibrated:
         """Every agent's mean metrics."""
         return tuple(self.means(values, seed).tolist())
 
-    def target(self, seed: int) -> Array:
+    def target(self, seed: int) -> Floats:
         """The truth's outputs under another placement."""
         truth = self.truth(seed)
         return np.asarray(replaced(self.means(truth, seed), 1, _generator(truth, seed, 4))[0])
@@ -97,7 +93,7 @@ class Calibrated:
         return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.truth(seed))).mean())
 
 
-def replaced(means: Array, count: int, generator: np.random.Generator) -> Array:
+def replaced(means: Floats, count: int, generator: np.random.Generator) -> Floats:
     """The outputs under so many other placements, shape (count, outputs).
 
     Each agent changes as it did in one of the placements that were simulated: if it is not stopped, in one of those
@@ -119,7 +115,7 @@ def _generator(values: Values, seed: int, which: int) -> np.random.Generator:
     return np.random.default_rng([seed, which, *bits.tolist()])
 
 
-def _possible(outputs: Array) -> Array:
+def _possible(outputs: Floats) -> Floats:
     """Distances and times not below 0, and who almost survives does."""
     by_metric = outputs.reshape(*outputs.shape[:-1], -1, len(METRICS)).copy()
     by_metric[..., :3] = np.maximum(0.0, by_metric[..., :3])
@@ -127,6 +123,6 @@ def _possible(outputs: Array) -> Array:
     return np.asarray(by_metric.reshape(outputs.shape))
 
 
-def _prpv(outputs: Array, target: Array) -> Array:
+def _prpv(outputs: Floats, target: Floats) -> Floats:
     one, other = (means.reshape(*means.shape[:-1], -1, len(METRICS))[..., :2] for means in (outputs, target))
     return prpv_of_means(one, other, COMPARED)

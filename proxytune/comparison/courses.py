@@ -9,12 +9,10 @@ from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxytune.arrays import Floats
 from proxytune.comparison.analytic import BOX
-from proxytune.search.design import to_unit
-
-Array = NDArray[np.float64]
+from proxytune.search import to_unit
 
 TABLE = Path(__file__).with_name("calibrated.csv")
 FEATURES = 512
@@ -37,12 +35,12 @@ class Simulated:
     """
 
     agents: tuple[str, ...]
-    points: Array
-    means: Array
-    scales: Array
-    smooth: Array
-    rough: Array
-    placements: Array
+    points: Floats
+    means: Floats
+    scales: Floats
+    smooth: Floats
+    rough: Floats
+    placements: Floats
 
     @property
     def roughness(self) -> float:
@@ -50,31 +48,31 @@ class Simulated:
         return float(self.rough.sum() / self.smooth.sum())
 
     @cached_property
-    def standardised(self) -> Array:
+    def standardised(self) -> Floats:
         """The outputs as the smooth course's standard deviations from their mean."""
         deviation = np.sqrt(np.where(self.smooth > 0.0, self.smooth, 1.0))  # an output that never changes stays 0
         return np.asarray((self.means - self.means.mean(axis=0)) / deviation)
 
     @cached_property
-    def lower(self) -> Array:
+    def lower(self) -> Floats:
         """Lower root of the points' covariance, roughness included; all outputs share it."""
         return lower_root(self.covariance(self.points) + self.roughness * np.eye(len(self.points)))
 
     @cached_property
-    def mixing(self) -> Array:
+    def mixing(self) -> Floats:
         """Lower root of the outputs' correlation, from what is left when the points' nearness is accounted for."""
         left = np.linalg.solve(self.lower, self.standardised)
         unit = left / np.maximum(np.linalg.norm(left, axis=0), 1e-12)
         correlation = (1.0 - SHRINKAGE) * unit.T @ unit + SHRINKAGE * np.eye(unit.shape[1])
         return lower_root(correlation)
 
-    def covariance(self, points: Array) -> Array:
+    def covariance(self, points: Floats) -> Floats:
         """Matérn 5/2 between points (m, parameters) and those simulated, shape (m, n)."""
         away = np.sqrt(5.0) * np.linalg.norm((points[:, None] - self.points) / self.scales, axis=-1)
         return np.asarray((1.0 + away + away**2 / 3.0) * np.exp(-away))
 
 
-def lower_root(matrix: Array) -> Array:
+def lower_root(matrix: Floats) -> Floats:
     """L of a symmetric positive matrix L Lᵀ."""
     return np.asarray(np.linalg.cholesky(matrix), dtype=float)
 
@@ -108,20 +106,20 @@ class Course:
         weights: What draws it through the points, shape (n, outputs).
     """
 
-    frequencies: Array
-    phases: Array
-    heights: Array
-    weights: Array
+    frequencies: Floats
+    phases: Floats
+    heights: Floats
+    weights: Floats
 
-    def __call__(self, unit: Array) -> Array:
+    def __call__(self, unit: Floats) -> Floats:
         """Every output at a point of the unit cube, in standard deviations from its mean."""
         return np.asarray(self._waves(unit[None])[0] + (simulated().covariance(unit[None]) @ self.weights)[0])
 
-    def _waves(self, points: Array) -> Array:
+    def _waves(self, points: Floats) -> Floats:
         return waves(points, self.frequencies, self.phases) @ self.heights
 
 
-def waves(points: Array, frequencies: Array, phases: Array) -> Array:
+def waves(points: Floats, frequencies: Floats, phases: Floats) -> Floats:
     """Cosines (points, waves) whose sum with normal heights is a draw of the Gaussian process, all but exactly."""
     return np.asarray(np.sqrt(2.0 / len(phases)) * np.cos(points @ frequencies + phases))
 

@@ -6,10 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from proxytune.comparison.analytic import Objective
-from proxytune.search.digest import code_of
-from proxytune.search.knowledge.knowledge import Knowledge, learn
-from proxytune.search.proposer import Trial, Values
-from proxytune.search.surrogate import fit_surrogate
+from proxytune.search import Knowledge, Trial, Values, code_of, fit_surrogate, learn
 
 
 @dataclass(frozen=True)

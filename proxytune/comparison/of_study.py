@@ -4,16 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from proxytune.search.goal import Goal
-from proxytune.search.proposer import Values
+from proxytune.search import Goal, Values
 from proxytune.seeds import fresh_seed
 from proxytune.space import Space
-from proxytune.study.evaluation import Evaluation, plan
-from proxytune.study.knowledge import goal_of
-from proxytune.study.outputs import outputs_of
-from proxytune.study.stages.preflight import run_preflight
-from proxytune.study.study import Study, facts
-from proxytune.study.study_run import StudyRun
+from proxytune.study import Evaluation, Study, StudyRun, goal_of, outputs_of, plan, run_preflight, study_facts
 from proxytune.usefulness import assess
 
 
@@ -53,7 +47,7 @@ class StudyObjective:
     def identity_without(self, named: Sequence[str]) -> str:
         """The same, but for some of the study's facts."""
         left_out = {"seed", "initial", "batch", "engine", "cut_off", *named}
-        return repr(sorted((key, value) for key, value in facts(self.run.study).items() if key not in left_out))
+        return repr(sorted((key, value) for key, value in study_facts(self.run.study).items() if key not in left_out))
 
     def score(self, values: Values, seed: int) -> float | None:
         """What the study makes small, with the placement noise of this seed; None where an agent has no score."""

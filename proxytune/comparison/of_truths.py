@@ -11,15 +11,10 @@ from proxytune.comparison.of_study import StudyObjective
 from proxytune.domain import DomainFamily
 from proxytune.errors import EpisodeError
 from proxytune.scores import ScoreTable
-from proxytune.search.design import from_unit, to_unit
-from proxytune.search.goal import Goal
-from proxytune.search.proposer import Values
+from proxytune.search import Goal, Values, from_unit, to_unit
 from proxytune.seeds import target_seed
 from proxytune.space import Space
-from proxytune.study.evaluation import failure_of, plan, table
-from proxytune.study.family import load_family
-from proxytune.study.study import Study
-from proxytune.study.study_run import StudyRun
+from proxytune.study import Study, StudyRun, failure_of, load_family, plan, table
 
 MIDDLE = (0.1, 0.9)
 """Truths are drawn from this part of every parameter's interval."""

@@ -4,17 +4,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxytune.arrays import Floats
 from proxytune.comparison.analytic import BOX
 from proxytune.scores import Metric, ScoreTable
-from proxytune.search.design import from_unit, to_unit
-from proxytune.search.goal import Goal
-from proxytune.search.proposer import Values
+from proxytune.search import Goal, Values, from_unit, to_unit
 from proxytune.space import Space
-from proxytune.usefulness.prpv import prpv_of_means
-
-Array = NDArray[np.float64]
+from proxytune.usefulness import prpv_of_means
 
 AGENTS, EPISODES = 12, 10
 METRICS = (Metric("distance"), Metric("survival_time"))
@@ -45,14 +41,14 @@ class Ranking:
         unit = np.random.default_rng([seed, 1]).uniform(0.2, 0.8, len(self.space.intervals))
         return from_unit(self.space, unit)
 
-    def means(self, values: Values, seed: int) -> Array:
+    def means(self, values: Values, seed: int) -> Floats:
         """Mean scores without noise, shape (agents, metrics)."""
         generator = np.random.default_rng([seed, 2])
         best = generator.uniform(0.4, 1.0, (AGENTS, len(METRICS)))
         weights = WEIGHTS * generator.lognormal(0.0, 0.7, (AGENTS, len(METRICS), len(WEIGHTS)))
         liked = generator.normal(0.0, 0.15, (AGENTS, 1, len(WEIGHTS)))
         away = to_unit(self.space, values) - to_unit(self.space, self.truth(seed))
-        decay: Array = np.exp(-np.linalg.norm(weights * (away - liked), axis=-1))
+        decay: Floats = np.exp(-np.linalg.norm(weights * (away - liked), axis=-1))
         return best * decay
 
     def table(self, values: Values, seed: int) -> ScoreTable:
@@ -100,11 +96,11 @@ class Ranking:
         return float(np.abs(to_unit(self.space, values) - to_unit(self.space, self.truth(seed))).mean())
 
 
-def _composed(outcomes: Array, target: Array) -> Array:
+def _composed(outcomes: Floats, target: Floats) -> Floats:
     return prpv_of_means(outcomes.reshape(*outcomes.shape[:-1], *target.shape), target, METRICS)
 
 
-def _episodes(means: Array, generator: np.random.Generator) -> ScoreTable:
+def _episodes(means: Floats, generator: np.random.Generator) -> ScoreTable:
     values = means[:, None, :] + generator.normal(0.0, SPREAD, (AGENTS, EPISODES, len(METRICS)))
     agents, episodes = (tuple(f"{i:02}" for i in range(count)) for count in (AGENTS, EPISODES))
     return ScoreTable(agents, episodes, tuple(metric.name for metric in METRICS), values)

@@ -8,10 +8,7 @@ from typing import Any
 from proxytune.comparison.analytic import Objective
 from proxytune.comparison.judgement import Judgement, judge, judgement_from
 from proxytune.errors import RunError
-from proxytune.search.engines.engine import Engine
-from proxytune.search.engines.registry import make_proposer
-from proxytune.search.loop import Propose, Search
-from proxytune.search.proposer import Trial, Values
+from proxytune.search import Engine, Propose, Search, Trial, Values, make_proposer
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune.arrays import Floats
 from proxytune.comparison.judgement import Reading
 from proxytune.comparison.runs import Run
 
-Array = NDArray[np.float64]
 RESAMPLES = 4000
 LEVELS = (2.5, 97.5)
 
@@ -96,20 +96,20 @@ def summarise(runs: Sequence[Run], first: Sequence[Run], tolerance: float) -> En
     )
 
 
-def estimate(values: Array, figure: Callable[..., Array]) -> Estimate:
+def estimate(values: Floats, figure: Callable[..., Floats]) -> Estimate:
     """A figure of the values (n,) and its interval; the figure is a numpy reduction."""
     low, high = np.percentile(figure(values[_resampled(len(values))], axis=1), LEVELS)
     return Estimate(float(figure(values)), float(low), float(high))
 
 
-def ratio(values: Array, others: Array) -> Estimate:
+def ratio(values: Floats, others: Floats) -> Estimate:
     """Mean of the values (n,) as a share of that of others (n,), the pairs resampled together."""
     rows = _resampled(len(values))
     low, high = np.percentile(values[rows].mean(axis=1) / others[rows].mean(axis=1), LEVELS)
     return Estimate(float(values.mean() / others.mean()), float(low), float(high))
 
 
-def median_curve(runs: Sequence[Run]) -> tuple[Array, Array, Array]:
+def median_curve(runs: Sequence[Run]) -> tuple[Floats, Floats, Floats]:
     """Median over runs of the lowest regret so far, after each evaluation, and the ends of its interval."""
     curves = np.array([run.judgement.best_regrets for run in runs])
     rows = _resampled(len(curves))
@@ -122,11 +122,11 @@ def _resampled(count: int) -> NDArray[np.int64]:
     return np.random.default_rng(0).integers(0, count, (RESAMPLES, count))
 
 
-def _needed(runs: Sequence[Run], tolerance: float) -> Array:
+def _needed(runs: Sequence[Run], tolerance: float) -> Floats:
     return np.array([run.judgement.evaluations_to(tolerance) or run.key.budget + 1 for run in runs], dtype=float)
 
 
-def _regrets(runs: Sequence[Run]) -> Array:
+def _regrets(runs: Sequence[Run]) -> Floats:
     """A run whose answer has no regret counts as its worst visited point."""
     found = [run.judgement for run in runs]
     worst = [max(regret for regret in one.regrets if regret is not None) for one in found]

@@ -1,1 +1,5 @@
 """Closing the loop: from measured logs to the effect that a model lacks."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

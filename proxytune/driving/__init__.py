@@ -1,1 +1,5 @@
 """Differential-drive robots on a road: plants, cameras, lanes, agents and the lane-following task."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,138 +1,204 @@
-"""How a camera is made and mounted, and where its pixels look."""
+"""What the robot's camera sees of a flat floor: each pixel is one look-up of the floor's picture.
 
-import math
+What a robot's camera shows while it drives: the newest picture, at the camera's rate.
+"""
+
+import functools
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
-from proxytune.effects import CHANNELS, Stage
-from proxytune.errors import SettingsError
-
-CAMERA_CHANNELS = CHANNELS[Stage.CAMERA]
-"""The figures that camera effects act on, in the order of their signal."""
-
-SKY = (115, 209, 255)
-"""What a pixel above the horizon shows: gym-duckietown's sky, red, green, blue."""
+from proxytune.driving.agent import Picture
+from proxytune.driving.optics import SKY, Camera, CameraFigures, floor_hits, ground_points
+from proxytune.driving.plain_texels import Table, keep_colours
+from proxytune.driving.road_picture import Floor
+from proxytune.driving.texels import fastest
+from proxytune.effects import Chain, Setting, Signal
 
 
-@dataclass(frozen=True)
-class CameraFigures:
-    """How a camera is made and mounted.
+class GroundPlaneCamera:
+    """The default camera: the robot drives flat, so where each pixel looks in its frame is known beforehand.
 
-    Attributes:
-        columns: Width of a picture [pixel].
-        rows: Height of a picture [pixel].
-        forward_m: How far the lens is ahead of the axle [m].
-        pitch_deg: How far it looks down [deg].
-        roll_deg: How far it is tilted clockwise in the driver's view [deg].
-        yaw_deg: How far it looks to the left [deg].
-        height_m: Height of the lens above the floor [m].
-        field_of_view_deg: Vertical field of view of the lens without distortion [deg].
-        k1: Radial distortion, plumb-bob model; below zero is a barrel.
-        centre_right: How far right of the picture's middle the lens' axis meets it, as a share of the picture's height.
-        centre_down: How far below the middle it does, in the same way.
-        aspect: Horizontal focal length over the vertical one; above 1 things look wider than they are.
-
-    Raises:
-        SettingsError: If no camera can have these figures.
+    A pixel looks up one point in that of several blurred copies of the floor's picture whose blur is as wide as what
+    the pixel covers there; without that, small pictures of a sharp floor alias.
     """
 
-    columns: int
-    rows: int
-    forward_m: float
-    pitch_deg: float
-    roll_deg: float
-    yaw_deg: float
-    height_m: float
-    field_of_view_deg: float
-    k1: float
-    centre_right: float = 0.0
-    centre_down: float = 0.0
-    aspect: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not math.isfinite(value):
-                raise SettingsError(f"camera: {name} must be finite, got {value}")
-        if self.columns < 1 or self.rows < 1:
-            raise SettingsError(f"camera: a picture needs a column and a row, got {self.columns} × {self.rows}")
-        if self.height_m <= 0.0:
-            raise SettingsError(f"camera: height_m must be above 0 m, got {self.height_m}")
-        if self.aspect <= 0.0:
-            raise SettingsError(f"camera: aspect must be above 0, got {self.aspect}")
-        if not 0.0 < self.field_of_view_deg < 180.0:
-            raise SettingsError(f"camera: field_of_view_deg must be between 0° and 180°, got {self.field_of_view_deg}")
-
-    def channels(self) -> NDArray[np.float64]:
-        """The figures that camera effects act on, in the order of CAMERA_CHANNELS."""
-        return np.array([getattr(self, name) for name in CAMERA_CHANNELS], dtype=float)
-
-    def with_channels(self, values: ArrayLike) -> Self:
-        """The same camera with these values of CAMERA_CHANNELS."""
-        return replace(self, **dict(zip(CAMERA_CHANNELS, np.asarray(values, dtype=float).tolist(), strict=True)))
-
-
-class Camera(Protocol):
-    """A camera on a robot."""
+    def __init__(self, figures: CameraFigures, floor: Floor) -> None:
+        """Find for every pixel its point on the floor and its copy of the floor's picture."""
+        self._sky, self._table = _tabulate(figures, floor)
+        self._sky_levels = np.array(SKY * self._sky, dtype=np.uint8)
+        self._origin = np.float32(floor.origin)
+        self._shape = (figures.rows, figures.columns, 3)
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """What it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
+        pictures = self._sky_only(len(poses))
+        texels = self.glimpse(poses).view(np.uint8).reshape(len(poses), -1, 4)
+        keep_colours(texels, pictures[:, self._sky :])
+        shown: NDArray[np.uint8] = pictures.reshape(-1, *self._shape)
+        return shown
+
+    def glimpse(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint32]:
+        """The texels (n, pixels) that its pixels show from poses (n, 3), but for those that are always sky."""
+        places = np.empty((len(poses), 4), dtype=np.float32)
+        places[:, 0], places[:, 1] = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        places[:, 2:] = poses[:, :2]
+        places[:, 2:] -= self._origin
+        return fastest().look_up(self._table, places)
+
+    def mean(self, glimpses: NDArray[np.uint32], weights: NDArray[np.float32]) -> NDArray[np.uint8]:
+        """The weighted mean of glimpses (n, pixels) as a picture (rows, columns, 3); weights are as `Blur` has them."""
+        picture = self._sky_only(1)[0]
+        fastest().average(glimpses, weights, picture[self._sky :])
+        shown: NDArray[np.uint8] = picture.reshape(self._shape)
+        return shown
+
+    def _sky_only(self, count: int) -> NDArray[np.uint8]:
+        """Pictures (count, pixels, 3) in which only the pixels that are always sky have been drawn."""
+        pictures = np.empty((count, self._sky + len(self._table.last), 3), dtype=np.uint8)
+        pictures.reshape(count, -1)[:, : 3 * self._sky] = self._sky_levels
+        return pictures
+
+
+def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, Table]:
+    """How many pixels are sky before the first that sees floor, and where each from that one on looks."""
+    copies, points = _copies(floor), ground_points(figures).reshape(-1, 2)
+    on_floor = np.isfinite(points[:, 0])
+    sky = int(np.argmax(on_floor)) if on_floor.any() else len(on_floor)
+    points, on_floor = points[sky:], on_floor[sky:]
+    copy = np.where(on_floor, _blur_octaves(figures, floor).ravel()[sky:], 0)
+    scale = copies.per_metre[copy]
+    plane = np.stack((points[:, 0] * scale, points[:, 1] * scale, scale))
+    # Those above the horizon stay at the last texel, the sky
+    return sky, Table(
+        plane=np.where(on_floor, plane, 0.0).astype(np.float32),
+        last=np.where(on_floor, copies.sides[copy] - 1, 0).astype(np.float32),
+        first=np.where(on_floor, copies.firsts[copy], copies.texels.size - 1).astype(np.int32),
+        side=copies.sides[copy].astype(np.int32),
+        texels=copies.texels,
+    )
+
+
+@dataclass(frozen=True)
+class _Copies:
+    """Copies of a floor's picture, each blurred over twice the width of the one before, in one row of texels.
+
+    Attributes:
+        texels: Red, green, blue and a spare byte in one number each; the last is the sky.
+        firsts: Index of each copy's first texel.
+        sides: Texels along a side of each copy.
+        per_metre: Texels per metre of each copy.
+    """
+
+    texels: NDArray[np.uint32]
+    firsts: NDArray[np.int64]
+    sides: NDArray[np.int64]
+    per_metre: NDArray[np.float64]
+
+
+OCTAVES = 6
+"""How often the width of the blur doubles: 64 pixels of the floor's picture are a quarter of a tile."""
+
+FINENESS = 4
+"""Texels across the width of a copy's blur: with one, a look-up is off by half of what the pixel covers."""
+
+
+@functools.lru_cache
+def _copies(floor: Floor) -> _Copies:
+    picture, copies = floor.pixels.astype(np.float32), [floor.pixels]
+    for octave in range(1, OCTAVES + 1):
+        if 2**octave > FINENESS:
+            picture = picture.reshape(len(picture) // 2, 2, -1, 2, 3).mean(axis=(1, 3))
+        # A Gaussian of 0.4 widths is nearest to the mean over a box, measured on pictures of 64 × 48
+        sigma = 0.4 * min(2**octave, FINENESS)
+        copies.append(np.rint(gaussian_filter(picture, (sigma, sigma, 0.0), mode="nearest")).astype(np.uint8))
+    colours = np.concatenate([*(copy.reshape(-1, 3) for copy in copies), np.array([SKY], dtype=np.uint8)])
+    padded = np.concatenate((colours, np.zeros((len(colours), 1), dtype=np.uint8)), axis=1)
+    sides = np.array([len(copy) for copy in copies])
+    per_metre = floor.pixels_per_metre * sides / sides[0]
+    return _Copies(padded.view(np.uint32).ravel(), np.cumsum(sides**2) - sides**2, sides, per_metre)
+
+
+def _blur_octaves(figures: CameraFigures, floor: Floor) -> NDArray[np.int64]:
+    """Which copy each pixel (rows, columns) looks up: blurred over half the diagonal of what the pixel covers."""
+    across = floor_hits(figures, 0.5, 0.0) - floor_hits(figures, -0.5, 0.0)
+    along = floor_hits(figures, 0.0, 0.5) - floor_hits(figures, 0.0, -0.5)
+    width = np.sqrt((across**2 + along**2).sum(axis=-1)) / 2.0 * floor.pixels_per_metre
+    octaves: NDArray[np.int64] = np.rint(np.clip(np.log2(np.nan_to_num(width, nan=np.inf)), 0, OCTAVES)).astype(int)
+    return octaves
+
+
+class _Film(Protocol):
+    """How pictures are made of what the camera sees."""
+
+    def expose(self, poses: Signal) -> Picture:
+        """The picture after the poses (ticks, 3) since the one before."""
         ...
 
 
-def ground_points(figures: CameraFigures) -> NDArray[np.float64]:
-    """Where on the floor each pixel's middle looks, in the robot's frame.
+class _Averaged:
+    """Each picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does."""
 
-    Returns:
-        Shape (rows, columns, 2): x ahead of the axle and y to the left [m]; NaN at and above the horizon.
+    def __init__(self, camera: Camera, weights: Signal, start: Signal) -> None:
+        self._glimpse = getattr(camera, "glimpse", camera.render)
+        self._mean = getattr(camera, "mean", mean_picture)
+        self._weights = weights
+        self._glimpses = np.repeat(self._glimpse(start[None]), len(weights), axis=0)
+
+    def expose(self, poses: Signal) -> Picture:
+        """The picture after some more poses; of more than are averaged the last ones are rendered."""
+        latest = self._glimpse(poses[-len(self._weights) :])
+        kept = self._glimpses[len(latest) :]
+        self._glimpses = np.concatenate((kept, latest)) if len(kept) else latest
+        return np.asarray(self._mean(self._glimpses, self._weights))
+
+
+class _Developed:
+    """Image effects are done to every picture, one after another."""
+
+    def __init__(self, camera: Camera, effects: Chain, setting: Setting) -> None:
+        self._camera, self._effects = camera, effects
+        still = camera.render(setting.rest[None]).reshape(-1)
+        self._memory = effects.begin(replace(setting, rest=still))
+
+    def expose(self, poses: Signal) -> Picture:
+        """The picture after some more poses."""
+        pictures = self._camera.render(poses)
+        signal = pictures.reshape(len(pictures), -1).astype(np.float32)
+        developed, self._memory = self._effects.apply(signal, self._memory)
+        levels = np.minimum(np.maximum(np.rint(developed[-1]), 0), 255)
+        return np.asarray(levels.astype(np.uint8).reshape(pictures.shape[1:]))
+
+
+class View:
+    """The camera with its image effects: the newest picture, at the camera's rate.
+
+    Attributes:
+        picture: That picture, (rows, columns, 3).
     """
-    return floor_hits(figures, 0.0, 0.0)
+
+    def __init__(self, camera: Camera, effects: Chain, setting: Setting) -> None:
+        """Take the first picture; `setting` is that of poses, and its rest where the robot stood before them, (3,)."""
+        weights = effects.mean_weights(setting.rate_hz)
+        self._film: _Film = (
+            _Developed(camera, effects, setting) if weights is None else _Averaged(camera, weights, setting.rest)
+        )
+        self._every = round(setting.rate_hz / setting.nominal["camera_rate"])
+        self._waiting = np.empty((0, 3))
+        self.picture = self._film.expose(setting.rest[None])
+
+    def pass_by(self, poses: Signal) -> None:
+        """Let the shutter see the poses of the next ticks."""
+        self._waiting = np.concatenate((self._waiting, poses))
+        while len(self._waiting) >= self._every:
+            seen, self._waiting = self._waiting[: self._every], self._waiting[self._every :]
+            self.picture = self._film.expose(seen)
 
 
-def floor_hits(figures: CameraFigures, right: float, down: float) -> NDArray[np.float64]:
-    """Where the rays through the pixels' middles, shifted by a part of a pixel, meet the floor."""
-    columns, rows = np.meshgrid(np.arange(figures.columns), np.arange(figures.rows))
-    return floor_points(figures, columns + 0.5 + right, rows + 0.5 + down)
-
-
-def floor_points(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any]) -> NDArray[np.float64]:
-    """Where on the floor any points of the picture look, in the robot's frame.
-
-    Args:
-        figures: Of the camera.
-        columns: Places (…) from the picture's left edge [pixel]; the first pixel's middle is at 0.5.
-        rows: Places (…) from its upper edge [pixel].
-
-    Returns:
-        Shape (…, 2): x ahead of the axle and y to the left [m]; NaN at and above the horizon.
-    """
-    rays = lens_rays(figures, columns, rows)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.where(rays[..., 2] < 0.0, figures.height_m / -rays[..., 2], np.nan)
-    hits: NDArray[np.float64] = rays[..., :2] * reach[..., None] + (figures.forward_m, 0.0)
-    return hits
-
-
-def lens_rays(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any]) -> NDArray[np.float64]:
-    """Directions (…, 3) in the robot's frame, forward, left, up, of the rays through points of the picture [pixel]."""
-    focal = figures.rows / 2.0 / math.tan(math.radians(figures.field_of_view_deg) / 2.0)
-    u = (columns - figures.columns / 2.0 - figures.centre_right * figures.rows) / focal / figures.aspect
-    v = (rows - figures.rows / 2.0 - figures.centre_down * figures.rows) / focal
-    # Plumb-bob r' = r (1 + k1 r²) solved for r to second order in k1: exact inverses end where r' has its maximum,
-    # inside the picture for k1 < -0.2, but real lenses go on (their k2 > 0), and so does the series, always upwards.
-    bend = figures.k1 * (u * u + v * v)
-    stretch = 1.0 - bend + 3.0 * bend * bend
-    rays = np.stack((np.ones_like(u), -u * stretch, -v * stretch), axis=-1)
-    return rays @ orientation(figures).T
-
-
-def orientation(figures: CameraFigures) -> NDArray[np.float64]:
-    """Rotation (3, 3) from the camera's frame to the robot's, both forward, left, up: roll, then pitch, then yaw."""
-    roll, pitch, yaw = (math.radians(angle) for angle in (figures.roll_deg, figures.pitch_deg, figures.yaw_deg))
-    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
-    about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
-    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-    rotation: NDArray[np.float64] = about_z @ about_y @ about_x
-    return rotation
+def mean_picture(pictures: NDArray[np.uint8], weights: Signal) -> Picture:
+    """The weighted mean of pictures (n, rows, columns, 3) as a picture."""
+    mean = weights @ pictures.reshape(len(pictures), -1).astype(np.float32)
+    return np.asarray(np.rint(mean).astype(np.uint8).reshape(pictures.shape[1:]))

@@ -1,16 +1,21 @@
-"""The expert that learners imitate: pure pursuit of the lane's centre line, on the robot's true pose."""
+"""The expert that learners imitate: pure pursuit of the lane's centre line, on the robot's true pose.
+
+An agent that plays recorded commands and keeps what it sees: the same drive in another domain.
+An agent that does what a policy has learnt, and remembers nothing.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proxytune.domain import Demonstration, Policy
-from proxytune.driving.agents.agent import Command, Picture
-from proxytune.driving.agents.pilots import duties
+from proxytune.driving.agent import Command, Picture
+from proxytune.driving.agents import duties
 from proxytune.driving.episode import Sight
-from proxytune.driving.road.lane import lane_point, lane_pose
-from proxytune.driving.road.maps import Road
+from proxytune.driving.lane import lane_point, lane_pose
+from proxytune.driving.road import Road
 from proxytune.driving.robot import Robot
 from proxytune.effects import Signal
 from proxytune.seeds import expert_generator
@@ -122,3 +127,52 @@ def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) ->
     """
     expert = Expert(road, *robot.expert_figures(), seed=seed)
     return expert if policy is None else Guide(expert, policy)
+
+
+class Seen(NamedTuple):
+    """How many commands have been played, and the picture before each."""
+
+    played: int
+    pictures: tuple[Picture, ...]
+
+
+class Observation(NamedTuple):
+    """What recorded commands lead to.
+
+    Attributes:
+        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
+        pictures: The picture before every command, (steps, rows, columns, 3).
+    """
+
+    poses: NDArray[np.float64]
+    pictures: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Playback:
+    """Plays commands (steps, 2) one per control step, then the last one for ever."""
+
+    commands: NDArray[np.float64]
+
+    def begin(self, robot: Robot) -> Seen:
+        """Nothing played yet."""
+        return Seen(0, ())
+
+    def act(self, picture: Picture, memory: Seen) -> tuple[Command, Seen]:
+        """The next command."""
+        command = self.commands[min(memory.played, len(self.commands) - 1)]
+        return command, Seen(memory.played + 1, (*memory.pictures, picture))
+
+
+@dataclass(frozen=True)
+class Pupil:
+    """Answers each picture by a policy."""
+
+    policy: Policy
+
+    def begin(self, robot: Robot) -> None:
+        """Nothing to remember."""
+
+    def act(self, picture: Picture, memory: None) -> tuple[Command, None]:
+        """The policy's command."""
+        return self.policy(picture), None

@@ -1,16 +1,368 @@
-"""The lane-following family as a study's `[domain]` table describes it."""
+"""The lane-following family as a study's `[domain]` table describes it.
 
+The name under which a family's episodes are kept: a digest of all but the episode that determines a result.
+A robot's camera once effects have set its figures, and the effects on its pictures.
+Pictures of another size than the robot's agents are given.
+The ways to draw what a camera sees, by name.
+The lane-following domain family: a robot on a map, its plant, camera and effects.
+"""
+
+import functools
+import hashlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
-from proxytune.driving.body import check_body
-from proxytune.driving.lane_following import LaneFollowing
-from proxytune.driving.plants import PLANTS
-from proxytune.driving.renderers import CAMERAS
-from proxytune.driving.road.reading import chosen_map
-from proxytune.driving.robot import Robot, read_robot, robot_names
-from proxytune.effects import Catalogue, read_effects, read_model
-from proxytune.errors import SettingsError
+import numpy as np
+
+from proxytune.domain import Demonstration, Episode, Policy, Recording
+from proxytune.driving import lineage
+from proxytune.driving.agent import Picture
+from proxytune.driving.agents import load_agent
+from proxytune.driving.batch_rollout import drive_together, groups_of
+from proxytune.driving.bullet import BulletCamera
+from proxytune.driving.cameras import GroundPlaneCamera
+from proxytune.driving.episode import (
+    METRICS,
+    PLANTS,
+    TICK_HZ,
+    Course,
+    Drive,
+    Driver,
+    Instance,
+    Sight,
+    drive,
+    driving_score,
+    fleet_at,
+    measured,
+    picture_only,
+    plant_at,
+    score_trajectory,
+    start_pose,
+)
+from proxytune.driving.expert import Observation, Playback, Pupil, lesson_driver
+from proxytune.driving.lane import off_map
+from proxytune.driving.maps import chosen_map, shipped_map
+from proxytune.driving.optics import Camera, CameraFigures
+from proxytune.driving.plants import Plant, check_body, drivetrain
+from proxytune.driving.road import Road
+from proxytune.driving.road_picture import Floor, draw_floor
+from proxytune.driving.robot import Robot, read_robot, robot_home, robot_names
+from proxytune.effects import (
+    Catalogue,
+    Chain,
+    Effect,
+    Setting,
+    Signal,
+    Stage,
+    effects_from,
+    read_effects,
+    read_model,
+    stage_chain,
+)
+from proxytune.errors import EpisodeError, SettingsError
+from proxytune.identity import meaning_of, modules_beside, versions_of
 from proxytune.settings import Section, nearest
+from proxytune.space import Parameter, Theta
+
+PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def identity_of(settings: tuple[Any, ...], robot: Path, folder: Path, versions: Mapping[str, str]) -> str:
+    """A digest of settings, of what our code, the robot's files and the user's modules mean, and of versions.
+
+    Args:
+        settings: Of the family, without the folder.
+        robot: The robot's folder.
+        folder: Where the user's modules lie.
+        versions: Of the packages that simulate.
+    """
+    own = meaning_of(modules_beside(folder), folder)
+    parts = (settings, lineage.named(code_meaning()), robot_meaning(robot), own, sorted(versions.items()))
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+
+def earlier_identities(settings: tuple[Any, ...], robot: Path, folder: Path) -> tuple[str, ...]:
+    """The identities under which earlier code kept episodes that are those of today, to the last bit.
+
+    Args:
+        settings: Of the family, those that there were then.
+        robot: The robot's folder.
+        folder: Where the user's modules lie; they counted by their bytes, without those in packages.
+    """
+    code = lineage.digest_of_54760ad(robot.name, robot_meaning(robot), code_meaning())
+    if code is None:
+        return ()
+    own = b"".join(path.read_bytes() for path in sorted(folder.glob("*.py")))
+    return (hashlib.sha256(repr(settings).encode() + own + code).hexdigest()[:16],)
+
+
+@functools.lru_cache
+def code_meaning() -> str:
+    """What the code of effects and of driving means; what is said in `lineage` about earlier code is no part of it."""
+    modules = [path for room in ("effects", "driving") for path in (PACKAGE / room).rglob("*.py")]
+    return meaning_of((path for path in modules if path != Path(lineage.__file__).resolve()), PACKAGE)
+
+
+@functools.lru_cache
+def robot_meaning(robot: Path) -> str:
+    """What the files of a robot's folder mean."""
+    return meaning_of((path for path in robot.iterdir() if path.is_file()), robot)
+
+
+_RATE_HZ = 60.0
+"""Camera effects hold for good: no rate changes what they do."""
+
+
+def mounted_camera(robot: Robot, effects: Iterable[Effect]) -> CameraFigures:
+    """The robot's nominal camera with the figures that camera effects set.
+
+    Raises:
+        SettingsError: If the robot has no camera, or no camera can have these figures.
+    """
+    figures = robot.camera_figures()
+    nominal = figures.channels()
+    mounting = stage_chain(effects, Stage.CAMERA)
+    memory = mounting.begin(Setting(_RATE_HZ, nominal, robot.figures))
+    return figures.with_channels(mounting.apply(nominal[None], memory)[0][0])
+
+
+def image_chain(effects: Iterable[Effect], figures: Mapping[str, float]) -> Chain:
+    """The image effects that change a picture, given the nominal figures: neutral ones would only cost time."""
+    chain = stage_chain(effects, Stage.IMAGE)
+    return Chain(tuple(effect for effect in chain.effects if not _is_neutral(effect, figures)))
+
+
+def _is_neutral(effect: Effect, figures: Mapping[str, float]) -> bool:
+    return all(getattr(effect, one.name, None) == one.neutral_value(figures) for one in effect.parameters)
+
+
+def with_columns(robot: Robot, least: int) -> Robot:
+    """The robot with a camera of at least so many columns, rows in proportion; every other figure is the same.
+
+    Raises:
+        SettingsError: If the robot has no camera.
+    """
+    camera = robot.camera_figures()
+    columns = max(camera.columns, least)
+    rows = round(camera.rows * columns / camera.columns)
+    size = {"camera_columns": float(columns), "camera_rows": float(rows)}
+    return replace(robot, figures=MappingProxyType({**robot.figures, **size}))
+
+
+CAMERAS = ("ground_plane", "renderer")
+
+
+def camera_over(floor: Floor, mounted: CameraFigures, kind: str) -> Camera:
+    """A camera of one of CAMERAS over a floor."""
+    return GroundPlaneCamera(mounted, floor) if kind == "ground_plane" else BulletCamera(mounted, floor)
+
+
+@dataclass(frozen=True)
+class LaneFollowing:
+    """S_Θ of a robot that follows a lane.
+
+    Attributes:
+        robot: Name of the robot.
+        plant: One of PLANTS.
+        camera: One of CAMERAS.
+        map: The road, whether the package's or the user's own.
+        seconds: Longest time an episode takes [s].
+        position_noise_m: Standard deviation of where the robot is put down [m].
+        heading_noise_deg: Standard deviation of how it is turned [deg].
+        effects: Values of effects besides the robot's nominal ones, sorted by name.
+        folder: Where a user's own agents, effects and robots lie.
+    """
+
+    robot: str
+    plant: str
+    camera: str
+    map: Road
+    seconds: float
+    position_noise_m: float
+    heading_noise_deg: float
+    effects: tuple[tuple[str, float], ...]
+    folder: Path
+
+    @property
+    def identity(self) -> str:
+        """A digest of settings, of what robot, code and the user's modules mean, and of versions."""
+        settings = tuple(getattr(self, name) for name in self.__dataclass_fields__ if name != "folder")
+        return identity_of(settings, robot_home(self.robot, self.folder), self.folder, self.versions)
+
+    @property
+    def earlier_identities(self) -> tuple[str, ...]:
+        """Identities under which earlier code kept episodes that are the very same."""
+        # Maps were known by their names: one of another name, or changed since, has no earlier episodes.
+        name = self.map.name if self.map == shipped_map("small_loop") else "none of then"
+        world = (self.robot, self.plant, self.camera, name, self.seconds)
+        settings = (*world, self.position_noise_m, self.heading_noise_deg, self.effects)
+        return earlier_identities(settings, robot_home(self.robot, self.folder), self.folder)
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Versions of the packages that simulate."""
+        with_bullet = self.plant == "bullet" or self.camera == "renderer"
+        return versions_of(("numpy", "pybullet") if with_bullet else ("numpy",))
+
+    @property
+    def metrics(self) -> Mapping[str, str]:
+        """The task's metrics with their units."""
+        return METRICS
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Every parameter of the catalogue of effects, a user's own when asked for by name."""
+        return Catalogue(self.folder).parameters
+
+    @property
+    def starts(self) -> int:
+        """How many starting poses the map has."""
+        return len(self.map.starts)
+
+    def check_agent(self, name: str) -> None:
+        """Load the agent once.
+
+        Raises:
+            SettingsError: If there is no such agent.
+        """
+        load_agent(name, self.folder)
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        """Drive one episode and score it.
+
+        Raises:
+            EpisodeError: With the time at which the agent failed.
+        """
+        return score_trajectory(self.map, self.drive(episode).poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+
+    def record(self, episode: Episode) -> Recording:
+        """Drive one episode; its scores, the true pose at every tick, and the duties of both wheels.
+
+        Raises:
+            EpisodeError: With the time at which the agent failed.
+        """
+        driven, control_hz = self.drive(episode), read_robot(self.robot, self.folder).figures["control_rate"]
+        metrics = score_trajectory(self.map, driven.poses, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        return Recording(metrics, *driven.columns(control_hz))
+
+    def drive(self, episode: Episode) -> Drive:
+        """Drive one episode.
+
+        Raises:
+            EpisodeError: With the time at which the agent failed.
+        """
+        return self._drive(episode, load_agent(episode.agent, self.folder), self.course(episode, self.seconds))
+
+    @property
+    def best_score(self) -> float:
+        """Both wheels in the lane until time is over."""
+        return self.seconds
+
+    def demonstrate(self, episode: Episode, seconds: float) -> tuple[Demonstration, int]:
+        """Let the robot's expert drive for some time [s]; steps off the road are not worth imitating.
+
+        Raises:
+            SettingsError: If the robot has no expert.
+        """
+        return self._lesson(episode, None, seconds)
+
+    def guide(self, episode: Episode, policy: Policy, seconds: float) -> tuple[Demonstration, int]:
+        """Let a policy drive for some time [s], and the robot's expert say what it would do at every step on the road.
+
+        Raises:
+            EpisodeError: If the policy raises or does not answer with two finite duties.
+            SettingsError: If the robot has no expert.
+        """
+        return self._lesson(episode, policy, seconds)
+
+    def _lesson(self, episode: Episode, policy: Policy | None, seconds: float) -> tuple[Demonstration, int]:
+        robot = read_robot(self.robot, self.folder)
+        driver = lesson_driver(self.map, robot, episode.seed, policy)
+        shown = self._drive(episode, driver, self.course(episode, seconds), Sight).memory
+        return shown.samples, round(seconds * robot.figures["control_rate"])
+
+    def examine(self, episode: Episode, policy: Policy) -> float:
+        """The paper's driving score of a policy, from −`seconds` to `seconds`.
+
+        Raises:
+            EpisodeError: If the policy raises or does not answer with two finite duties.
+            SettingsError: If the robot does not state the distance between its wheels.
+        """
+        score = self._driving_score()
+        return score(self._drive(episode, Pupil(policy), self.course(episode, self.seconds)).poses)
+
+    def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> list[float]:
+        """What `examine` says of each of several episodes, to the bit: those of one θ are driven side by side.
+
+        Raises:
+            EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
+        """
+        score = self._driving_score()
+        try:
+            return [score(poses) for group in groups_of(episodes) for poses in self._drive_together(group, policy)]
+        except EpisodeError:
+            # Side by side another episode may fail first
+            return [self.examine(episode, policy) for episode in episodes]
+
+    def _drive_together(self, episodes: Sequence[Episode], policy: Policy) -> list[Signal]:
+        instance = self.instance(dict(episodes[0].theta))
+        courses = [self.course(episode, self.seconds) for episode in episodes]
+        with fleet_at(self.plant, instance.robot, np.stack([course.start for course in courses])) as fleet:
+            return drive_together(instance, fleet, policy, courses)
+
+    def _driving_score(self) -> Callable[[Signal], float]:
+        """The paper's driving score of poses."""
+        wheels = read_robot(self.robot, self.folder).wheel_distance()
+        timed = functools.partial(driving_score, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
+        return functools.partial(timed, self.map, wheel_distance=wheels)
+
+    def measured(self, episode: Episode, driven: Drive) -> Signal:
+        """The poses of an episode's drive as they are measured, (ticks + 1, 3); it is scored on the true ones."""
+        return measured(self.instance(dict(episode.theta)), driven.poses, episode.seed)
+
+    def replay(self, episode: Episode, commands: Signal) -> Observation:
+        """Drive recorded commands (steps, 2), one per control step, in place of the episode's agent.
+
+        It goes on wherever it leads, so that two domains can be compared step by step.
+        """
+        seconds = len(commands) / read_robot(self.robot, self.folder).figures["control_rate"]
+        endless = replace(self.course(episode, seconds), ended=lambda x, y: False)
+        driven = self._drive(episode, Playback(commands), endless)
+        return Observation(driven.poses, np.stack(driven.memory.pictures))
+
+    def course(self, episode: Episode, seconds: float) -> Course:
+        """Where an episode starts, and its end: after some time [s], or off the map."""
+        noise = {"position_noise_m": self.position_noise_m, "heading_noise_deg": self.heading_noise_deg}
+        start = np.asarray(start_pose(self.map, episode.start, seed=episode.seed, **noise))
+        return Course(start, seconds, episode.seed, functools.partial(off_map, self.map))
+
+    def _drive(
+        self, episode: Episode, driver: Driver, course: Course, sees: Callable[[Picture, Signal], Any] = picture_only
+    ) -> Drive:
+        instance = self.instance(dict(episode.theta))
+        with self.plant_at(instance.robot, course.start) as plant:
+            return drive(instance, plant, driver, course, sees)
+
+    def instance(self, theta: Theta, columns: int = 0) -> Instance:
+        """The domain instance S_θ: nominal effects, then the family's, then θ; pictures of at least so many columns."""
+        return _instance(self, tuple(sorted(theta.items())), columns)
+
+    def plant_at(self, robot: Robot, start: Signal) -> Plant:
+        """The plant with the robot at a starting pose."""
+        return plant_at(self.plant, robot, start)
+
+
+@functools.lru_cache(maxsize=4)
+def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...], columns: int) -> Instance:
+    named = read_robot(family.robot, family.folder)
+    robot = with_columns(named, columns) if columns else named
+    effects = effects_from({**robot.theta, **dict(family.effects), **dict(theta)}, robot.figures, robot.catalogue)
+    camera = camera_over(draw_floor(family.map), mounted_camera(robot, effects), family.camera)
+    image, measurement = image_chain(effects, robot.figures), stage_chain(effects, Stage.MEASUREMENT)
+    return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
 
 
 def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:

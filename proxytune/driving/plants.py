@@ -1,56 +1,344 @@
-"""Plants by their names: one robot, or several side by side."""
+"""What a plant is: the thing that moves.
 
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
-from typing import Protocol
+From duties to the motion that the wheels ask of the body: the part that both plants share.
+What a URDF says of a robot that drives on two wheels: where they are, how large, and how heavy it is.
+The planar plant: kinematics over whole arrays of time, exact for twists that hold over a tick.
+"""
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from proxytune.driving.bullet.plant import BulletPlant
-from proxytune.driving.episode import TICK_HZ
-from proxytune.driving.planar import PlanarFleet, PlanarPlant
-from proxytune.driving.plant import Plant
 from proxytune.driving.robot import Robot
-from proxytune.effects import Signal
+from proxytune.effects import CHANNELS, Chain, Effect, Memory, Setting, Signal, Stage, stage_chain
+from proxytune.errors import SettingsError
 
-PLANTS = ("bullet", "planar")
 
+class Plant(Protocol):
+    """One robot on a floor, from its starting pose on; a context manager, closed when the episode ends."""
 
-class Fleet(Protocol):
-    """Robots side by side, each on a floor of its own."""
-
-    def move(self, twists: Signal, robots: Sequence[int], /) -> tuple[Signal, Sequence[bool]]:
-        """Let some robots follow their twists, of all robots' (all, time, 3), each for one tick.
+    def move(self, twists: Signal) -> tuple[Signal, bool]:
+        """Follow twists (time, 3), each for one tick.
 
         Returns:
-            Their poses after each tick (robots, time, 3), and whether each has hit something or fallen over.
+            The poses after each tick, (time, 3): x [m], y [m] of the middle of the axle, heading [rad, unwrapped];
+            and whether the robot has hit something or fallen over.
         """
         ...
 
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+
+class Progress(NamedTuple):
+    """What the three stages remember."""
+
+    command: Memory
+    actuation: Memory
+    motion: Memory
+
 
 @dataclass(frozen=True)
-class Plants:
-    """A plant for each robot."""
+class Drivetrain:
+    """Command, actuation and motion effects with the robot's kinematics; itself a causal filter.
 
-    plants: Sequence[Plant]
+    Takes duties (…, time, 2), left and right in [−1, 1]; gives twists (…, time, 3): forward and sideways speed [m/s]
+    and yaw rate [rad/s], each the mean over its sample interval.
+    """
 
-    def move(self, twists: Signal, robots: Sequence[int]) -> tuple[Signal, Sequence[bool]]:
-        """Let one robot after the other follow its twists."""
-        poses, crashed = zip(*(self.plants[robot].move(twists[robot]) for robot in robots), strict=True)
-        return np.stack(poses), crashed
+    robot: Robot
+    command: Chain
+    actuation: Chain
+    motion: Chain
+
+    def begin(self, setting: Setting) -> Progress:
+        """As if the resting command of `setting` had been given for ever."""
+        still = np.zeros((*np.shape(setting.rest)[:-1], len(CHANNELS[Stage.MOTION])))
+        return Progress(
+            self.command.begin(setting),
+            self.actuation.begin(setting),
+            self.motion.begin(replace(setting, rest=still)),
+        )
+
+    def apply(self, signal: Signal, memory: Progress) -> tuple[Signal, Progress]:
+        """The twists that the next chunk of duties leads to."""
+        arrived, command = self.command.apply(signal, memory.command)
+        wheels, actuation = self.actuation.apply(np.minimum(np.maximum(arrived, -1.0), 1.0), memory.actuation)
+        twists, motion = self.motion.apply(self.ideal(wheels), memory.motion)
+        return twists, Progress(command, actuation, motion)
+
+    def ideal(self, wheels: Signal) -> Signal:
+        """The twists that wheel speeds (…, time, 2) ask for, nothing slipping."""
+        full_speed, baseline = self.robot.figures["full_speed"], self.robot.figures["effective_baseline"]
+        left, right = wheels[..., 0], wheels[..., 1]
+        twists = np.zeros((*left.shape, 3))
+        twists[..., 0] = (left + right) * (full_speed / 2.0)
+        twists[..., 2] = (right - left) * (full_speed / baseline)
+        return twists
 
 
-def plant_at(plant: str, robot: Robot, start: Signal) -> Plant:
-    """One of PLANTS with the robot at a starting pose (3,)."""
-    return BulletPlant(robot, start, 1.0 / TICK_HZ) if plant == "bullet" else PlanarPlant(start, 1.0 / TICK_HZ)
+def drivetrain(robot: Robot, effects: Iterable[Effect]) -> Drivetrain:
+    """A robot's drivetrain with these effects."""
+    chosen = tuple(effects)
+    stages = (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
+    return Drivetrain(robot, *(stage_chain(chosen, stage) for stage in stages))
+
+
+AXLES = ("axle_left", "axle_right")
+"""How the bullet plant calls the joints that it drives."""
+
+AGREES = 0.01
+"""How far, relatively, a URDF may be from robot.toml."""
+
+ACROSS = 0.9
+"""An axle points to the left, or to the right, by so much of its length."""
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A driven wheel.
+
+    Attributes:
+        joint: Name of its joint.
+        centre: Where it is in the root link's frame (3,) [m].
+        axis: Direction of its axle there (3,).
+        radius_m: Its radius [m]; None where its geometry is a mesh.
+        effort: The most that its motor gives [N m]; 0 where that is not said.
+    """
+
+    joint: str
+    centre: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    radius_m: float | None
+    effort: float
+
+
+@dataclass(frozen=True)
+class Body:
+    """A URDF's two driven wheels, its mass and its camera.
+
+    Attributes:
+        left: The left wheel.
+        right: The right wheel.
+        mass_kg: Of all its links [kg].
+        camera: The pose of a link called camera in the root link's frame (4, 4); None where there is none.
+    """
+
+    left: Wheel
+    right: Wheel
+    mass_kg: float
+    camera: NDArray[np.float64] | None
+
+    @property
+    def wheel_distance(self) -> float:
+        """Between the wheels' centres, across the robot [m]."""
+        return float(self.left.centre[1] - self.right.centre[1])
+
+
+def parse_urdf(path: Path) -> ET.Element:
+    """The root element of a URDF.
+
+    Raises:
+        SettingsError: If it cannot be read or is no URDF.
+    """
+    try:
+        root = ET.fromstring(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as problem:
+        raise SettingsError(f"{path}: cannot be read ({problem}); check the path") from None
+    except ET.ParseError as problem:
+        raise SettingsError(f"{path}: is not XML ({problem}); of a .xacro file make a URDF first") from None
+    if root.tag != "robot" or root.find("link") is None:
+        raise SettingsError(f"{path}: is no URDF: it needs <robot> with links; got <{root.tag}>")
+    return root
+
+
+def read_body(root: ET.Element, path: Path) -> Body:
+    """What a URDF says of its wheels, mass and camera.
+
+    Raises:
+        SettingsError: If its two driven wheels cannot be told, or a number in it is none.
+    """
+    with sound_urdf(path):
+        return _read_body(root, path)
 
 
 @contextmanager
-def fleet_at(plant: str, robot: Robot, starts: Signal) -> Iterator[Fleet]:
-    """One of PLANTS with such a robot at each of several starting poses (robots, 3)."""
-    if plant == "planar":
-        yield PlanarFleet(starts, 1.0 / TICK_HZ)
-        return
-    with ExitStack() as stack:
-        yield Plants([stack.enter_context(plant_at(plant, robot, start)) for start in starts])
+def sound_urdf(path: Path) -> Iterator[None]:
+    """Whatever is read or changed of a URDF, one line where a number in it is none.
+
+    Raises:
+        SettingsError: If one is none, or its joints go round in a circle.
+    """
+    try:
+        yield
+    except (ValueError, RecursionError) as problem:
+        raise SettingsError(f"{path}: is no sound URDF ({problem}); correct it") from None
+
+
+def _read_body(root: ET.Element, path: Path) -> Body:
+    wheels = [_wheel(root, joint) for joint in root.iter("joint") if joint.get("type") == "continuous"]
+    across = [wheel for wheel in wheels if abs(wheel.axis[1]) > ACROSS]
+    named = [wheel for wheel in across if wheel.joint in AXLES]
+    pair = sorted(named or across, key=lambda wheel: -wheel.centre[1])
+    if len(pair) != 2 or pair[0].centre[1] <= pair[1].centre[1]:
+        found = ", ".join(wheel.joint for wheel in across) or "none"
+        remedy = f"call the two driven joints {' and '.join(AXLES)}"
+        raise SettingsError(f"{path}: the axles must be two continuous joints, left and right; found {found}; {remedy}")
+    masses = (float(mass.get("value", 0.0)) for mass in root.findall("link/inertial/mass"))
+    camera = next((name for name in _links(root) if "camera" in name and "optical" not in name), None)
+    return Body(pair[0], pair[1], sum(masses), link_pose(root, camera) if camera else None)
+
+
+def _links(root: ET.Element) -> list[str]:
+    return [link.get("name", "") for link in root.iter("link")]
+
+
+def links_called(root: ET.Element, name: str) -> list[ET.Element]:
+    """The links of a name, whatever characters it has."""
+    return [link for link in root.findall("link") if link.get("name") == name]
+
+
+def link_pose(root: ET.Element, link: str) -> NDArray[np.float64]:
+    """Pose (4, 4) of a link in the root link's frame, every joint at 0."""
+    for joint in root.iter("joint"):
+        child, parent = joint.find("child"), joint.find("parent")
+        if child is not None and parent is not None and child.get("link") == link:
+            return link_pose(root, parent.get("link", "")) @ origin_of(joint)
+    return np.eye(4)
+
+
+def add_little_mass(link: ET.Element) -> None:
+    """Give a link without mass a gram: PyBullet would give it a kilogram."""
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "mass", value="0.001")
+    ET.SubElement(inertial, "inertia", ixx="1e-7", ixy="0", ixz="0", iyy="1e-7", iyz="0", izz="1e-7")
+
+
+def origin_of(element: ET.Element) -> NDArray[np.float64]:
+    """The transform (4, 4) of an element's <origin>, roll first, then pitch, then yaw."""
+    origin = element.find("origin")
+    xyz, rpy = ((origin.get(key, "0 0 0") if origin is not None else "0 0 0").split() for key in ("xyz", "rpy"))
+    roll, pitch, yaw = (float(angle) for angle in rpy)
+    about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]])
+    about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0, math.cos(pitch)]])
+    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = about_z @ about_y @ about_x, [float(value) for value in xyz]
+    return pose
+
+
+def check_body(robot: Robot) -> None:
+    """Refuse a URDF whose wheels are not those of robot.toml: the bullet plant would drive at another speed.
+
+    Raises:
+        SettingsError: If they differ, or its axles are not called as the plant calls them.
+    """
+    path = robot.body()
+    body = read_body(parse_urdf(path), path)
+    for wheel, name in zip((body.left, body.right), AXLES, strict=True):
+        if wheel.joint != name or wheel.axis[1] < 0.0:
+            said = f"joint '{wheel.joint}' must be called {name}"
+            raise SettingsError(f"{path.name}: {said}, and its axis must point to the left (0 1 0)")
+    for figure, value in _figures(body):
+        if abs(value - robot.figures[figure]) > AGREES * robot.figures[figure]:
+            said = f"has the {figure} {value:g} m, robot.toml says {robot.figures[figure]:g} m"
+            raise SettingsError(f"{path.name}: {said}; correct the one that is wrong")
+
+
+def _figures(body: Body) -> Iterator[tuple[str, float]]:
+    yield from (("wheel_radius", wheel.radius_m) for wheel in (body.left, body.right) if wheel.radius_m is not None)
+    yield "wheel_distance", body.wheel_distance
+
+
+def _wheel(root: ET.Element, joint: ET.Element) -> Wheel:
+    child, axis, limit = joint.find("child"), joint.find("axis"), joint.find("limit")
+    link = child.get("link", "") if child is not None else ""
+    direction = np.array([float(v) for v in (axis.get("xyz", "1 0 0") if axis is not None else "1 0 0").split()])
+    pose = link_pose(root, link)
+    effort = float(limit.get("effort", 0.0)) if limit is not None else 0.0
+    turned = pose[:3, :3] @ (direction / np.linalg.norm(direction))
+    return Wheel(joint.get("name", ""), pose[:3, 3], turned, _radius(root, link), effort)
+
+
+def _radius(root: ET.Element, link: str) -> float | None:
+    """Of what the wheel collides as, else of what it looks like."""
+    shapes = (f"{part}/geometry/{shape}" for part in ("collision", "visual") for shape in ("sphere", "cylinder"))
+    for shape in shapes:
+        for element in links_called(root, link):
+            found = element.find(shape)
+            if found is not None:
+                return float(found.get("radius", 0.0))
+    return None
+
+
+def integrate(start: Signal, twists: Signal, tick_s: float) -> Signal:
+    """The poses after each tick.
+
+    Args:
+        start: Starting poses (…, 3): x [m], y [m], heading [rad].
+        twists: Twists (…, time, 3), each held for a tick.
+        tick_s: Length of a tick [s].
+
+    Returns:
+        Poses (…, time, 3), headings unwrapped.
+    """
+    turns = twists[..., 2] * tick_s
+    headings = start[..., None, 2] + turns.cumsum(axis=-1)
+    middles = headings - turns / 2.0
+    half = np.pi * (turns / (2.0 * np.pi))
+    half[half == 0.0] = np.finfo(float).eps
+    chord = tick_s * (np.sin(half) / half)
+    forward, sideways = twists[..., 0] * chord, twists[..., 1] * chord
+    cosine, sine = np.cos(middles), np.sin(middles)
+    x = start[..., None, 0] + (forward * cosine - sideways * sine).cumsum(axis=-1)
+    y = start[..., None, 1] + (forward * sine + sideways * cosine).cumsum(axis=-1)
+    poses = np.empty((*headings.shape, 3))
+    poses[..., 0], poses[..., 1], poses[..., 2] = x, y, headings
+    return poses
+
+
+class PlanarPlant:
+    """One robot that moves exactly as its wheels ask; it never hits anything."""
+
+    def __init__(self, start: Signal, tick_s: float) -> None:
+        self._pose = np.asarray(start, dtype=float)
+        self._tick_s = tick_s
+
+    def move(self, twists: Signal) -> tuple[Signal, bool]:
+        """Follow twists, each for one tick."""
+        poses = integrate(self._pose, twists, self._tick_s)
+        self._pose = poses[-1]
+        return poses, False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        return None
+
+
+class PlanarFleet:
+    """Robots side by side, each as a PlanarPlant."""
+
+    def __init__(self, starts: Signal, tick_s: float) -> None:
+        self._poses = np.array(starts, dtype=float)
+        self._tick_s = tick_s
+
+    def move(self, twists: Signal, robots: Sequence[int]) -> tuple[Signal, Sequence[bool]]:
+        """Follow twists, each for one tick."""
+        poses = integrate(self._poses[robots], twists[robots], self._tick_s)
+        self._poses[robots] = poses[:, -1]
+        return poses, [False] * len(robots)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from proxytune.driving.cameras import CameraFigures
+from proxytune.driving.optics import CameraFigures
 from proxytune.effects import SHIPPED, Catalogue, read_effects
 from proxytune.errors import ExtensionError, SettingsError
 from proxytune.extensions import load, plugins
+from proxytune.files import shipped
 from proxytune.settings import Section, nearest, read_settings
-from proxytune.shipped import shipped
 
 UNITS: Mapping[str, str] = MappingProxyType(
     {

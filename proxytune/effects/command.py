@@ -1,12 +1,18 @@
-"""Effects on commands between the agent that issues them and the motors that obey them."""
+"""Effects on commands between the agent that issues them and the motors that obey them.
 
+Effects on single messages: commands that arrive irregularly, or never.
+"""
+
+import functools
+import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from proxytune.effects.effect import Setting, Signal, Stage
-from proxytune.effects.trace import Cue, Trace, WheelCurve
+from proxytune.effects.effect import Cue, Draws, Lateness, Setting, Signal, Stage, Trace, WheelCurve
+from proxytune.seeds import message_generator
 from proxytune.space import Parameter
 
 
@@ -82,3 +88,184 @@ class CommandQuantisation:
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Round each sample, halves to the even multiple."""
         return (signal if self.step == 0.0 else np.rint(signal / self.step) * self.step), None
+
+
+BLOCK = 256
+"""So many draws come from one generator: the draws of any message are found without those of the ones before."""
+
+
+@functools.lru_cache(maxsize=1024)
+def _block(seed: int, number: int) -> Signal:
+    drawn = message_generator(seed, number).random(BLOCK)
+    drawn.setflags(write=False)
+    return drawn
+
+
+@dataclass(frozen=True)
+class Messages:
+    """The messages that a signal comes in, numbered from time zero.
+
+    Attributes:
+        per_sample: Messages per sample.
+        seed: Seed of what is drawn for each message.
+    """
+
+    per_sample: float
+    seed: int
+
+    def numbers(self, samples: Signal) -> NDArray[np.int64]:
+        """The message that each sample belongs to."""
+        return np.floor(samples * self.per_sample + 1e-9).astype(np.int64)
+
+    def starts(self, numbers: Signal) -> NDArray[np.int64]:
+        """The first sample of each message."""
+        return np.ceil((numbers - 1e-9) / self.per_sample).astype(np.int64)
+
+    def draws(self, low: int, high: int) -> Signal:
+        """A number from 0 to 1 for each message from `low` on and before `high`: the same in every chunk and batch."""
+        blocks = [_block(self.seed, number) for number in range(low // BLOCK, (high - 1) // BLOCK + 1)]
+        begin = low // BLOCK * BLOCK
+        return np.concatenate(blocks)[low - begin : high - begin]
+
+
+def messages(setting: Setting) -> Messages:
+    """One message per control step of the robot."""
+    return Messages(setting.nominal["control_rate"] / setting.rate_hz, setting.seed)
+
+
+MOST_LOST = 4
+"""Commands lost in a row that are reckoned with."""
+
+
+def _jittered(spread: float, rate_hz: float) -> Lateness:
+    """Late by any time from 0 to the spread."""
+    commands = spread / (1.0 / rate_hz) * (np.linspace(0.0, 1.0, 9) - 0.5)
+    return Lateness(spread / 2.0, commands, np.full(len(commands), -np.log(len(commands))))
+
+
+def _lost(probability: float, rate_hz: float) -> Lateness:
+    """None lost, or one or more in a row."""
+    number = np.arange(MOST_LOST + 1)
+    mean = probability / (1.0 - probability)
+    return Lateness(mean / rate_hz, number - mean, np.log1p(-probability) + number * np.log(probability))
+
+
+class Mailbox(NamedTuple):
+    """The number of the next sample, the newest past samples, and the greatest extra delay [samples]."""
+
+    next: int
+    samples: Signal
+    spread: float
+    messages: Messages
+
+
+class Arrivals(NamedTuple):
+    """Stretches of time with one message in force: first sample it counts in, how long it lasts, whence its value."""
+
+    firsts: NDArray[np.int64]
+    lengths: Signal
+    sources: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class DelayJitter:
+    """Every command is late by an extra time of its own, drawn evenly from 0 to `spread`.
+
+    The order is kept: a command never arrives before the one that was sent before it. A command that arrives within a
+    sample counts for the rest of it.
+    """
+
+    spread: float
+    name: ClassVar[str] = "delay_jitter"
+    stage: ClassVar[Stage] = Stage.COMMAND
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="spread",
+            unit="s",
+            low=0.0,
+            high=0.3,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="wireless links: tens of milliseconds, now and then some tenths of a second",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_jittered, (2e-3, 0.3))
+    )
+
+    def begin(self, setting: Setting) -> Mailbox:
+        """As if the robot had been at rest for ever."""
+        spread = self.spread * setting.rate_hz
+        rest = np.asarray(setting.rest, dtype=float)[..., None, :]
+        return Mailbox(0, np.repeat(rest, math.ceil(spread), axis=-2), spread, messages(setting))
+
+    def apply(self, signal: Signal, memory: Mailbox) -> tuple[Signal, Mailbox]:
+        """The mean over each sample of the commands in force."""
+        length, past = signal.shape[-2], memory.samples.shape[-2]
+        joined = np.concatenate((memory.samples, signal), axis=-2)
+        arrivals = _arrivals(memory, length)
+        values = np.take(joined, arrivals.sources + (past - memory.next), axis=-2) * arrivals.lengths[:, None]
+        arrived = np.add.reduceat(values, arrivals.firsts, axis=-2)
+        return arrived, memory._replace(next=memory.next + length, samples=joined[..., length:, :])
+
+
+def _arrivals(memory: Mailbox, length: int) -> Arrivals:
+    """What is in force when, over the next samples; the same for all members of a batch."""
+    begin, end, sent = memory.next, memory.next + length, memory.messages
+    late = math.ceil((memory.spread + 1.0) * sent.per_sample) + 1
+    newest = int(sent.numbers(np.array(end - 1)))
+    # Twice: a message in force at the beginning may have waited for one that was as late as can be
+    oldest = max(0, int(sent.numbers(np.array(begin))) - 2 * late)
+    drawn = sent.draws(oldest, newest + 1)
+    starts = sent.starts(np.arange(oldest, newest + 2))
+    times = np.maximum.accumulate(starts[:-1] + memory.spread * drawn)
+    inside = times[(times > begin) & (times < end)]
+    edges = np.sort(np.concatenate((np.arange(begin, end + 1), inside)))
+    # A message's own samples pass as they are, for the delay before may have blended two messages in one sample
+    lasts = np.concatenate(([starts[0] - 1], starts[1:] - 1))[np.searchsorted(times, edges[:-1], side="right")]
+    sources = np.minimum(np.floor(edges[:-1]).astype(np.int64), lasts)
+    return Arrivals(np.searchsorted(edges[:-1], np.arange(begin, end)), np.diff(edges), sources)
+
+
+class Held(NamedTuple):
+    """The number of the next sample, and the newest sample that was received."""
+
+    next: int
+    sample: Signal
+    messages: Messages
+
+
+@dataclass(frozen=True)
+class DroppedCommands:
+    """Some commands never arrive; the one before stays in force."""
+
+    probability: float
+    name: ClassVar[str] = "dropped_commands"
+    stage: ClassVar[Stage] = Stage.COMMAND
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="probability",
+            unit="",
+            low=0.0,
+            high=0.9,
+            neutral=0.0,
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.7),
+            source="wireless links: some in a hundred, in bad places half",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS,), shown=WheelCurve.STEP, draws=Draws(_lost, (1e-3, 0.6))
+    )
+
+    def begin(self, setting: Setting) -> Held:
+        """At rest until the first command arrives."""
+        return Held(0, np.asarray(setting.rest, dtype=float)[..., None, :], messages(setting))
+
+    def apply(self, signal: Signal, memory: Held) -> tuple[Signal, Held]:
+        """Hold the last sample of the last message that was received."""
+        numbers = memory.messages.numbers(np.arange(memory.next, memory.next + signal.shape[-2]))
+        received = memory.messages.draws(int(numbers[0]), int(numbers[-1]) + 1) >= self.probability
+        places = np.arange(1, len(numbers) + 1)
+        newest = np.maximum.accumulate(np.where(received[numbers - numbers[0]], places, 0))
+        held = np.take(np.concatenate((memory.sample, signal), axis=-2), newest, axis=-2)
+        return held, memory._replace(next=memory.next + len(numbers), sample=held[..., -1:, :])

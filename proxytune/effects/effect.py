@@ -1,15 +1,154 @@
-"""What an effect is: a causal filter between a command and the pictures that come of it."""
+"""What an effect is: a causal filter between a command and the pictures that come of it.
 
-from collections.abc import Mapping
+The trace that an effect leaves in measured motion: what a diagnosis goes by to find it, fit it and draw it.
+First-order lags: what follows a signal with a time constant, exactly for a signal that holds over each sample.
+Values that are known beforehand, sample by sample, and beyond them those that a rate leads to.
+"""
+
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from proxytune.effects.trace import Trace
 from proxytune.space import Parameter
+
+
+class Cue(StrEnum):
+    """A signal that motion may depend on, as people call it."""
+
+    WHEEL_COMMAND = "wheel command"
+    COMMAND_DIFFERENCE = "difference of the wheel commands"
+    TRANSIENTS = "command transients"
+    REVERSAL = "distance since reversal"
+    TIME = "time in the episode"
+    USE = "cumulated use"
+    TURN_RATE = "turn rate"
+    HEADING = "heading"
+    POSITION = "position"
+    LEFT_ANGLE = "left wheel angle"
+    RIGHT_ANGLE = "right wheel angle"
+    DIRECTION = "direction of travel"
+
+
+MOTIONS = ("forward", "sideways", "turn", "left", "right")
+"""What a panel can show of the motion: of the body, or the speed of a wheel."""
+
+SIGNALS = ("", "x", "y", "heading", "left angle", "right angle", "bend", *MOTIONS)
+"""What a panel can have along its axis: the signal of the cue, or one of these."""
+
+
+class Panel(NamedTuple):
+    """What is drawn against what.
+
+    Attributes:
+        signal: Along the axis, one of SIGNALS; empty for that of the cue.
+        label: Its label.
+        motion: Which motion is added, one of MOTIONS.
+        share: Whether as a share of that motion instead of in its unit.
+    """
+
+    signal: str
+    label: str
+    motion: str
+    share: bool = False
+
+
+TURN = "turn rate [deg/s]"
+"""What an axis of turn rates is called."""
+
+
+class Means(NamedTuple):
+    """Motion that is added, as means over signals; the cue says which flexible curve is drawn beside it."""
+
+    cue: Cue
+    panels: tuple[Panel, ...]
+
+
+class WheelCurve(StrEnum):
+    """A curve of wheel speed that shows an effect."""
+
+    STEADY = "steady speed over the command"
+    STEP = "speed after a step of the command"
+    REVERSAL = "speed after a step of the command and its reversal"
+
+
+class Lateness(NamedTuple):
+    """How late a random effect makes commands: its mean [s], and a mixture of times about it.
+
+    Attributes:
+        mean_s: How late a command is on average [s].
+        commands: Times that a command may be later than that (K,), in commands.
+        log_weights: Logarithms of how often each happens (K,).
+    """
+
+    mean_s: float
+    commands: NDArray[Any]
+    log_weights: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Draws:
+    """What an effect of one parameter draws for each command.
+
+    Attributes:
+        lateness: From the parameter's value and the commands per second to how late commands are.
+        sizes: Least and greatest value that is looked for.
+    """
+
+    lateness: Callable[[float, float], Lateness]
+    sizes: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form that an effect may take.
+
+    Attributes:
+        free: The parameters that are fitted, by coordinate: those of one coordinate share a value.
+        name: What is special about it: `left wheel`; empty where nothing is.
+        fixed: Values of other parameters; those that are not named stay where the model has them.
+        moved: Parameters that a search sets out with, the others where the model has them; all where none is named.
+        present: Whether the model has to have the effect already, must not have it, or either.
+        shown: What shows it, where that is not what shows the effect's other forms.
+    """
+
+    free: tuple[tuple[str, ...], ...]
+    name: str = ""
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    moved: tuple[str, ...] = ()
+    present: bool | None = None
+    shown: WheelCurve | Means | None = None
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What a diagnosis has to know of an effect on motion.
+
+    Attributes:
+        cues: The signals through which it acts.
+        shown: What shows it in a figure.
+        forms: The forms that it can take; where there are none, a single one with every parameter free.
+        stepwise: Whether its parameters change the motion by steps, so that no slope leads to their best values.
+        draws: What it draws, if it strikes at random.
+        placed: Whether it acts in a part of the map: its parameters after the first are x, y [m] and a radius [m].
+    """
+
+    cues: tuple[Cue, ...]
+    shown: WheelCurve | Means
+    forms: tuple[Form, ...] = ()
+    stepwise: bool = False
+    draws: Draws | None = None
+    placed: bool = False
+
+    def shown_in(self, form: str) -> WheelCurve | Means:
+        """What shows the form of this name."""
+        own = next((one.shown for one in self.forms if one.name == form), None)
+        return own or self.shown
+
 
 Signal = NDArray[Any]
 """An array of shape (…, time, channels); a value holds, or is the mean, over one sample interval."""
@@ -101,3 +240,79 @@ class Recalling(Protocol):
     def recall(self, setting: Setting, signal: Signal, row: Signal, sample: Signal) -> Memory:
         """The memory as of a sample (W,) of a row (W,) of longer signals (rows, time, channels)."""
         ...
+
+
+FEW = 8
+"""Up to so many samples, a control step, a loop over them is faster than to set up a filter."""
+
+
+class Lag(NamedTuple):
+    """How much of a step is left after one sample, and on average over it."""
+
+    remainder: float
+    mean_remainder: float
+
+
+def lag_of(samples: float) -> Lag:
+    """The lag of a time constant that lasts so many samples."""
+    if samples == 0.0:
+        return Lag(0.0, 0.0)
+    remainder = float(np.exp(-1.0 / samples))
+    return Lag(remainder, samples * (1.0 - remainder))
+
+
+def follow(signal: Signal, value: Signal, lag: Lag) -> tuple[Signal, Signal]:
+    """What follows a signal (…, time, channels) from a value (…, channels) on.
+
+    Returns:
+        Its mean over each sample (…, time, channels), and its value after the last one (…, channels).
+    """
+    start = value[..., None, :]
+    few = signal.ndim == 2 and len(signal) <= FEW
+    ends = _ends_of_few(signal, value, lag) if few else _ends(signal, start, lag)
+    starts = np.concatenate((start, ends[..., :-1, :]), axis=-2)
+    return signal + lag.mean_remainder * (starts - signal), ends[..., -1, :]
+
+
+def _ends(signal: Signal, start: Signal, lag: Lag) -> Signal:
+    """What follows a signal from a value (…, 1, channels) on, at the end of each sample."""
+    ends: Signal = lfilter([1.0 - lag.remainder], [1.0, -lag.remainder], signal, axis=-2, zi=lag.remainder * start)[0]
+    return ends
+
+
+def _ends_of_few(signal: Signal, value: Signal, lag: Lag) -> Signal:
+    """The same of a signal (time, channels), in the filter's own arithmetic."""
+    gain, remainder = 1.0 - lag.remainder, lag.remainder
+    kept, ends = [remainder * before for before in value.tolist()], []
+    for sample in signal.tolist():
+        ends.append([rest + gain * new for rest, new in zip(kept, sample, strict=True)])
+        kept = [0.0 * new + remainder * end for new, end in zip(sample, ends[-1], strict=True)]
+    return np.array(ends)
+
+
+class Known(NamedTuple):
+    """Values known beforehand (…, n), number of the next sample, its value (…, 1), and samples per second."""
+
+    values: Signal
+    next: int
+    newest: Signal
+    rate_hz: float
+
+
+def beforehand(values: Signal, setting: Setting) -> Known:
+    """Values known beforehand (…, n) for every member of the batch that the setting's rest (…, channels) is of."""
+    known = np.asarray(values, dtype=float)
+    shape = np.broadcast_shapes(known.shape[:-1], np.shape(setting.rest)[:-1])
+    known = np.broadcast_to(known, (*shape, known.shape[-1]))
+    return Known(known, 0, known[..., :1], setting.rate_hz)
+
+
+def values_along(rates: Signal, memory: Known) -> tuple[Signal, Known]:
+    """Values at the start of each sample (…, time): known ones, and beyond them those that the rates lead to."""
+    length = rates.shape[-1]
+    known = memory.values[..., memory.next : memory.next + length]
+    given = known.shape[-1]
+    newest = known[..., -1:] if given else memory.newest
+    gained = np.cumsum(rates[..., max(0, given - 1) :], axis=-1) / memory.rate_hz
+    path = np.concatenate((known[..., :-1], newest, newest + gained), axis=-1)
+    return path[..., :length], memory._replace(next=memory.next + length, newest=path[..., length:])

@@ -4,6 +4,8 @@ Importing this package registers `proxytune/LaneFollowing-v0`, so that `gymnasiu
 be told to: `gymnasium.make("proxytune.environments:proxytune/LaneFollowing-v0")`.
 """
 
+import lazy_loader
+
 from proxytune.errors import ExtensionError
 
 try:
@@ -15,3 +17,5 @@ LANE_FOLLOWING = "proxytune/LaneFollowing-v0"
 
 if LANE_FOLLOWING not in gymnasium.registry:
     gymnasium.register(LANE_FOLLOWING, entry_point="proxytune.environments.lane_following:LaneFollowingEnv")
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

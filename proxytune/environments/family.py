@@ -1,27 +1,248 @@
-"""Any Gymnasium environment as a domain family: its own parameters and our effects are θ."""
+"""Any Gymnasium environment as a domain family: its own parameters and our effects are θ.
+
+A policy that was trained elsewhere, as an agent of a study.
+Agents of an environment by name: a function, what has `predict`, or one of the two that need no code.
+One episode of an environment: an agent acts through effects until the environment or the time ends it.
+"""
 
 import hashlib
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Protocol
+
+import numpy as np
 
 from proxytune.domain import Episode
-from proxytune.effects import Catalogue, Effect, effects_from
-from proxytune.effects.learnt.table import is_learnt
-from proxytune.environments.agents import load_agent
-from proxytune.environments.episode import play, score, wrap
+from proxytune.driving import Command, Picture, Robot
+from proxytune.effects import Catalogue, Effect, effects_from, is_learnt
 from proxytune.environments.identity import code_meaning, folder_meaning
-from proxytune.environments.making import make_environment
-from proxytune.environments.models import read_values
-from proxytune.environments.parameters import EnvironmentParameters
-from proxytune.environments.settings import EnvironmentSettings, read_domain
-from proxytune.environments.signals import figures
-from proxytune.environments.spaces import Spaces, look_at
-from proxytune.errors import EpisodeError, InputError, SettingsError
+from proxytune.environments.making import EnvironmentSettings, EpisodeMetric, make_environment, read_domain, read_values
+from proxytune.environments.signals import Actuators, EnvironmentParameters, Sensors, Spaces, figures, look_at
+from proxytune.errors import EpisodeError, ExtensionError, InputError, SettingsError
+from proxytune.extensions import ask, describe, load
 from proxytune.seeds import acting_seed, course_generator, reset_seed
-from proxytune.settings import Section
+from proxytune.settings import Section, nearest
 from proxytune.space import Theta
+
+
+class Policy(Protocol):
+    """What has learnt to act, as stable-baselines3's algorithms and policies."""
+
+    def predict(self, observation: Any, *, deterministic: bool) -> Any:
+        """The action for an observation, or the action and a state, which it is given back as `state=`."""
+        ...
+
+
+def ask_policy(policy: Policy, observation: Any, state: Any, *, deterministic: bool = True) -> tuple[Any, Any]:
+    """A policy's action, and its state for the next observation, None where it has none."""
+    known = {} if state is None else {"state": state}
+    answer = policy.predict(observation, deterministic=deterministic, **known)
+    return answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, state)
+
+
+@dataclass(frozen=True)
+class PolicyAgent:
+    """Does what a policy says to each picture.
+
+    Attributes:
+        policy: Trained on pictures as the environment shows them, (rows, columns, 3).
+        deterministic: Whether it takes its likeliest action; one that draws would make episodes differ at one seed.
+    """
+
+    policy: Policy
+    deterministic: bool = True
+
+    def begin(self, robot: Robot) -> None:
+        """No state yet."""
+
+    def act(self, picture: Picture, memory: Any) -> tuple[Command, Any]:
+        """The policy's duties, and its state for the next picture."""
+        action, memory = ask_policy(self.policy, picture, memory, deterministic=self.deterministic)
+        return np.clip(np.asarray(action, dtype=float), -1.0, 1.0), memory
+
+
+def agent_of(policy: Policy, *, deterministic: bool = True) -> PolicyAgent:
+    """An agent for studies of anything with `predict(observation, deterministic=…) -> (action, state)`.
+
+    Args:
+        policy: As `stable_baselines3.PPO.load` gives it; trained on the environment's pictures as they are.
+        deterministic: Whether it takes its likeliest action.
+
+    Raises:
+        ExtensionError: If it cannot predict.
+    """
+    if not callable(getattr(policy, "predict", None)):
+        raise ExtensionError(f"a {type(policy).__name__} has no predict(observation, deterministic=…); add it")
+    return PolicyAgent(policy, deterministic)
+
+
+Act = Callable[[Any], Any]
+"""From an observation to an action."""
+
+
+def _random(space: Any, seed: int) -> Act:
+    space.seed(seed)
+    return lambda observation: space.sample()
+
+
+def _zero(space: Any, seed: int) -> Act:
+    rest = np.clip(0, getattr(space, "low", 0), getattr(space, "high", 0)) if hasattr(space, "low") else 0
+    whole = int(getattr(space, "start", 0)) if space.shape == () else np.zeros(space.shape, dtype=space.dtype)
+    action = np.asarray(rest, dtype=space.dtype) if hasattr(space, "low") else whole
+    return lambda observation: action
+
+
+BUILT_IN: Mapping[str, Callable[[Any, int], Act]] = MappingProxyType({"random": _random, "zero": _zero})
+
+
+@dataclass
+class Predicting:
+    """What has `predict`, as the policies of stable-baselines3 do; a state that it answers with is handed back."""
+
+    policy: Any
+    state: Any = None
+
+    def __call__(self, observation: Any) -> Any:
+        """The action of its deterministic policy."""
+        action, self.state = ask_policy(self.policy, observation, self.state)
+        return action
+
+
+def load_agent(name: str, folder: Path, space: Any, seed: int) -> Act:
+    """An agent ready for one episode; a class is made anew for each.
+
+    Args:
+        name: "random", "zero", or `module:attribute`: a function, an object with `predict`, or a class of either.
+        folder: Where a user's modules lie.
+        space: The environment's actions.
+        seed: Of the agent "random".
+
+    Raises:
+        InputError: If there is no such agent, or the actions have no zero.
+    """
+    if name in BUILT_IN:
+        if name == "zero" and (space.shape is None or space.dtype is None):
+            raise InputError(f"agent 'zero': the actions are {space}, which have no zero; take another")
+        return BUILT_IN[name](space, seed)
+    found = load(name, kind="agent", beside=folder, shipped=BUILT_IN)
+    if inspect.isclass(found):
+        found = ask(f"agent '{name}'", found)
+    if hasattr(found, "predict"):
+        return Predicting(found)
+    if callable(found):
+        act: Act = found
+        return act
+    raise ExtensionError(f"agent '{name}' is a {type(found).__name__}; give a function, or what has predict")
+
+
+def ask_agent(act: Act, observation: Any, space: Any, step: int) -> Any:
+    """An agent's next action, checked.
+
+    Raises:
+        EpisodeError: If it raises, or answers with what is no action.
+    """
+    try:
+        answer = act(observation)
+    except Exception as problem:
+        raise EpisodeError(f"raised {describe(problem)} at step {step}") from problem
+    if hasattr(space, "low"):
+        return _in_box(answer, space, step)
+    action = np.asarray(answer).item() if np.ndim(answer) == 0 else answer
+    if not space.contains(action):
+        raise EpisodeError(f"answered {answer!r} at step {step}, which is not in {space}")
+    return action
+
+
+def _in_box(answer: Any, space: Any, step: int) -> Any:
+    """A Box action in its type; beyond its bounds it is cut off."""
+    try:
+        action = np.asarray(answer, dtype=space.dtype)
+        whole = action.reshape(space.shape) if action.size == np.prod(space.shape) else None
+    except (TypeError, ValueError):
+        raise EpisodeError(f"answered {answer!r} at step {step}, which is no array of numbers") from None
+    if whole is None or not np.isfinite(whole).all():
+        raise EpisodeError(f"answered {answer!r} at step {step}; an action is {space.shape} finite numbers")
+    return np.clip(whole, space.low, space.high)
+
+
+Infos = list[Mapping[str, Any]]
+FOLDS: Mapping[str, Any] = {"sum": np.sum, "mean": np.mean, "max": np.max, "min": np.min}
+
+
+class Wrapped:
+    """An environment behind effects, in the midst of an episode."""
+
+    def __init__(self, environment: Any, actuators: Actuators, sensors: Sensors) -> None:
+        self._environment, self._actuators, self._sensors = environment, actuators, sensors
+        self.rewards: list[float] = []
+        self.infos: Infos = []
+
+    def reset(self, seed: int, later: np.random.Generator) -> Any:
+        """Begin from the state that the seed gives; what is drawn later in the episode comes from `later`."""
+        try:
+            observation, _ = self._environment.reset(seed=seed)
+        except Exception as problem:
+            raise EpisodeError(f"the environment's reset raised {describe(problem)}") from problem
+        self._environment.unwrapped.np_random = later
+        return self._sensors.show(observation)
+
+    def step(self, action: Any) -> tuple[Any, bool]:
+        """The next observation, and whether the episode is over."""
+        try:
+            seen, reward, terminated, truncated, info = self._environment.step(self._actuators.pass_on(action))
+        except Exception as problem:
+            raise EpisodeError(f"the environment raised {describe(problem)} at step {len(self.rewards)}") from problem
+        self.rewards.append(float(reward))
+        self.infos.append(dict(info))
+        return self._sensors.show(seen), bool(terminated or truncated)
+
+
+def play(wrapped: Wrapped, act: Act, first: Any, space: Any, steps: int) -> None:
+    """Let an agent act from its first observation on, for so many steps at most.
+
+    Raises:
+        EpisodeError: If agent or environment fail.
+    """
+    observation = first
+    for step in range(steps):
+        observation, over = wrapped.step(ask_agent(act, observation, space, step))
+        if over:
+            return
+
+
+def score(wrapped: Wrapped, metrics: tuple[EpisodeMetric, ...]) -> dict[str, float]:
+    """The metrics of an episode that is over.
+
+    Raises:
+        EpisodeError: If info lacks an entry, or it is no number.
+    """
+    whole = {"return": float(np.sum(wrapped.rewards)), "length": float(len(wrapped.rewards))}
+    return {one.name: whole[one.source] if one.source in whole else _of_info(wrapped.infos, one) for one in metrics}
+
+
+def _of_info(infos: Infos, metric: EpisodeMetric) -> float:
+    steps = infos[-1:] if metric.fold == "last" else infos
+    try:
+        values = [float(info[metric.entry]) for info in steps]
+    except KeyError:
+        known = sorted({key for info in steps for key in info})
+        hint = nearest(metric.entry, known) if known else "info is empty"
+        raise EpisodeError(f"metric '{metric.name}': info has no '{metric.entry}' at every step; {hint}") from None
+    except (TypeError, ValueError):
+        raise EpisodeError(f"metric '{metric.name}': '{metric.entry}' of info is no number; name another") from None
+    return values[-1] if metric.fold == "last" else float(FOLDS[metric.fold](values))
+
+
+def wrap(
+    environment: Any, effects: tuple[Effect, ...], spaces: Spaces, state: tuple[int, ...] | None, seed: int
+) -> Wrapped:
+    """An environment behind the effects of a domain instance."""
+    return Wrapped(environment, Actuators(effects, spaces, seed), Sensors(effects, spaces, state, seed))
+
 
 STARTS = 1000
 """Each is an initial state of the environment, by a seed of its own."""

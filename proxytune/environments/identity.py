@@ -3,7 +3,7 @@
 import functools
 from pathlib import Path
 
-from proxytune.meaning import files_beside, meaning_of
+from proxytune.identity import files_beside, meaning_of
 
 PACKAGE = Path(__file__).resolve().parent.parent
 MODULES = (

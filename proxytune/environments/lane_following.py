@@ -1,24 +1,186 @@
-"""The lane-following domain as a Gymnasium environment: picture in, duties out."""
+"""The lane-following domain as a Gymnasium environment: picture in, duties out.
 
-from collections.abc import Mapping
+What an environment renders: the camera's picture beside the map from above, with the robot's way.
+θ of an environment: fixed values, and intervals to draw from at each reset.
+The task's metrics of an episode under way.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
 from proxytune.domain import Episode, make_episode
-from proxytune.driving.agents import Picture
-from proxytune.driving.episode import Course, Rollout, check_command
-from proxytune.driving.family import lane_following
-from proxytune.driving.lane_following import LaneFollowing
-from proxytune.driving.plant import Plant
-from proxytune.environments.drawing import render
-from proxytune.environments.randomisation import draw_theta, read_theta
-from proxytune.environments.tally import Tally
+from proxytune.driving import (
+    TICK_HZ,
+    Course,
+    LaneFollowing,
+    Picture,
+    Plant,
+    Road,
+    Rollout,
+    check_command,
+    draw_floor,
+    lane_following,
+    score_trajectory,
+)
+from proxytune.effects import Signal
 from proxytune.errors import InputError
 from proxytune.settings import Section, nearest
+from proxytune.space import Parameter, Theta
+
+ROWS = 480
+"""Height of what is rendered [pixel]."""
+
+WAY, ROBOT = (235, 70, 60), (70, 160, 255)
+"""Colours of the robot's way and of the robot."""
+
+ARROW_M = 0.09
+"""From the middle of the robot to the tip of what is drawn of it [m]."""
+
+
+def render(picture: Picture, road: Road, poses: Signal) -> NDArray[np.uint8]:
+    """A picture beside the map.
+
+    Args:
+        picture: What the camera sees, (rows, columns, 3).
+        road: The map.
+        poses: The robot's way until now, (ticks, 3): x [m], y [m], heading [rad].
+
+    Returns:
+        Red, green, blue, (ROWS, columns, 3); the number of columns is even, as video encoders ask for.
+    """
+    seen = Image.fromarray(picture)
+    seen = seen.resize((_even(ROWS * seen.width / seen.height), ROWS), Image.Resampling.NEAREST)
+    above = _map(road)
+    _draw_way(ImageDraw.Draw(above), poses, ROWS / road.size[1])
+    return np.concatenate((np.asarray(seen), np.asarray(above)), axis=1)
+
+
+def _map(road: Road) -> Image.Image:
+    """The map seen from above, north up."""
+    floor = draw_floor(road)
+    columns, rows = (
+        slice(*(round((end - floor.origin) * floor.pixels_per_metre) for end in (0.0, s))) for s in road.size
+    )
+    above = Image.fromarray(np.ascontiguousarray(floor.pixels[rows, columns][::-1]))
+    return above.resize((_even(ROWS * road.size[0] / road.size[1]), ROWS), Image.Resampling.BOX)
+
+
+def _draw_way(draw: ImageDraw.ImageDraw, poses: Signal, pixels_per_metre: float) -> None:
+    way = poses[:, :2] * (pixels_per_metre, -pixels_per_metre) + (0.0, ROWS)
+    draw.line([(float(x), float(y)) for x, y in way], fill=WAY, width=3)
+    angles = poses[-1, 2] + np.radians((0.0, 140.0, 220.0))
+    corners = way[-1] + ARROW_M * pixels_per_metre * np.stack((np.cos(angles), -np.sin(angles)), axis=-1)
+    draw.polygon([(float(x), float(y)) for x, y in corners], fill=ROBOT, outline=(255, 255, 255))
+
+
+def _even(number: float) -> int:
+    return 2 * round(number / 2.0)
+
+
+Interval = tuple[float, float]
+
+
+def read_theta(given: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Interval]:
+    """The interval of each parameter, of no width where its value is fixed.
+
+    Args:
+        given: A number, or low and high, by the parameter's name.
+        known: The parameters there are.
+
+    Raises:
+        InputError: With the parameter and the remedy.
+    """
+    if not isinstance(given, Mapping):
+        raise InputError(f"theta: must give a value or [low, high] by parameter, got {given!r}")
+    return {name: _interval(name, value, known) for name, value in given.items()}
+
+
+def draw_theta(intervals: Mapping[str, Interval], generator: np.random.Generator) -> Theta:
+    """θ with each parameter drawn evenly from its interval, in the order of their names."""
+    return {name: float(generator.uniform(*intervals[name])) for name in sorted(intervals)}
+
+
+def _interval(name: str, value: Any, known: Mapping[str, Parameter]) -> Interval:
+    if name not in known:
+        raise InputError(f"theta: unknown parameter '{name}'; {nearest(name, known)}")
+    parameter, ends = known[name], _numbers(value)
+    if len(ends) not in (1, 2) or not all(math.isfinite(end) for end in ends):
+        raise InputError(f"theta: {name} must be a finite number or [low, high], got {value!r}")
+    if ends[0] > ends[-1]:
+        raise InputError(f"theta: {name}: the lower bound must come first, got {value!r}")
+    if ends[0] < parameter.low or ends[-1] > parameter.high:
+        raise InputError(f"theta: {name} must lie within [{parameter.low:g}, {parameter.high:g}], got {value!r}")
+    return ends[0], ends[-1]
+
+
+def _numbers(value: Any) -> list[float]:
+    """The numbers of a value, none where it is not made of numbers."""
+    listed = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    try:
+        return [float(number) for number in (value if listed else [value])]
+    except (TypeError, ValueError):
+        return []
+
+
+TICK_S = 1.0 / TICK_HZ
+
+
+class Tally:
+    """Adds up the parts of a drive, each scored as the task scores a whole one.
+
+    Args:
+        road: The map.
+        seconds: When time is over [s].
+        start: Starting pose (3,): x [m], y [m], heading [rad].
+    """
+
+    def __init__(self, road: Road, seconds: float, start: Signal) -> None:
+        self._road, self._seconds = road, seconds
+        self._parts: list[Signal] = [start[None]]
+        self._ticks, self._distance, self._aside = 0, 0.0, 0.0
+
+    @property
+    def poses(self) -> Signal:
+        """The start, then the pose after every tick, (ticks + 1, 3)."""
+        return np.concatenate(self._parts)
+
+    def add(self, poses: Signal) -> float:
+        """The distance [m] along the lane in the next ticks' poses (ticks, 3).
+
+        Raises:
+            EpisodeError: If a pose is not finite.
+        """
+        part = self._score(np.concatenate((self._parts[-1][-1:], poses)), self._seconds - self._ticks * TICK_S)
+        ticks = round(part["survival_time"] / TICK_S)
+        self._parts.append(poses)
+        self._ticks += ticks
+        self._distance += part["distance"]
+        self._aside += part["deviation"] * ticks
+        return part["distance"]
+
+    def so_far(self) -> dict[str, float]:
+        """The distance, survival time and mean deviation until now."""
+        deviation = self._aside / self._ticks if self._ticks else self.whole()["deviation"]
+        return {"distance": self._distance, "survival_time": self._ticks * TICK_S, "deviation": deviation}
+
+    def whole(self) -> dict[str, float]:
+        """Every metric of the drive as a study scores it.
+
+        Raises:
+            EpisodeError: If a pose is not finite.
+        """
+        return self._score(self.poses, self._seconds)
+
+    def _score(self, poses: Signal, seconds: float) -> dict[str, float]:
+        return score_trajectory(self._road, poses, tick_s=TICK_S, seconds=seconds)
+
 
 OPTIONS = ("theta", "start", "episode_seed")
 """What `reset` may be told of the episode."""

@@ -8,8 +8,6 @@ the group `proxytune` that is called `KIND.NAME`, as in
     "effect.yaw_drift" = "my_package.effects:YawDrift"
 """
 
-from proxytune.extensions.door import ask, describe, load, make, one_line, place_of, require
-from proxytune.extensions.interrupting import is_users
-from proxytune.extensions.plugins import GROUP, plugins
+import lazy_loader
 
-__all__ = ["GROUP", "ask", "describe", "is_users", "load", "make", "one_line", "place_of", "plugins", "require"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,21 +5,91 @@ that of the first. A folder's modules are therefore imported under a name that b
 (`beside_my_study_1a2b3c4d.family`), and so are those of the folder that they import in turn by plain `import helper`.
 The folder is also added to the end of sys.path, for what imports by text (an environment registered as "module:Class"):
 what is found there, after all else, may be of any folder that this process has opened.
+
+Whose a KeyboardInterrupt is: the user's Ctrl-C, or an exception of that name raised by code that is not ours.
+Whose code may be run: who starts a command is asked before code beside a study runs for the first time.
+
+A caller of Python's API has chosen what to run: nothing is asked there.
+A user's modules as one value that another machine can import from.
 """
 
 import builtins
 import functools
 import hashlib
 import importlib
+import io
+import signal
 import sys
-from collections.abc import Mapping, Sequence
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import lru_cache
 from importlib.abc import Loader
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Any
 
-from proxytune.extensions.trust import check_permitted
+from proxytune.identity import modules_beside
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user has pressed Ctrl-C; raised in the main thread."""
+
+
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """What SIGINT does on the command line.
+
+    Raises:
+        Interrupted: Always.
+    """
+    raise Interrupted
+
+
+def is_users(problem: BaseException) -> bool:
+    """Whether what was raised is the user's Ctrl-C.
+
+    Where SIGINT raises Interrupted, or is ignored as in the processes that do pieces of work, any other
+    KeyboardInterrupt is not, unless it was raised on catching that one. Under another handler, as in a Python session,
+    every one is.
+    """
+    if not isinstance(problem, KeyboardInterrupt):
+        return False
+    if signal.getsignal(signal.SIGINT) not in (interrupt, signal.SIG_IGN):
+        return True
+    return isinstance(problem, Interrupted) or isinstance(problem.__context__, Interrupted)
+
+
+Permit = Callable[[Path, str], None]
+"""Raises an ExtensionError unless a module may be run that is named by something in a folder."""
+
+_permit: ContextVar[Permit | None] = ContextVar("permit", default=None)
+
+
+@contextmanager
+def permitting(permit: Permit) -> Iterator[None]:
+    """Have every module that is named beside a study permitted before it is imported."""
+    before = _permit.set(permit)
+    try:
+        yield
+    finally:
+        _permit.reset(before)
+
+
+def check_permitted(module: str, folder: Path) -> None:
+    """Refuse a module that a folder's files name, unless whoever is responsible permits it.
+
+    An installed plug-in is permitted by having been installed, and proxytune's own modules are ours.
+
+    Raises:
+        ExtensionError: If it is not permitted.
+    """
+    permit = _permit.get()
+    if permit is not None and module.partition(".")[0] != "proxytune":
+        permit(folder, module)
+
 
 PREFIX = "beside_"
 
@@ -124,3 +194,37 @@ def _import(
         return builtins.__import__(name, globals, locals, fromlist or (), level)
     found = builtins.__import__(f"{home}.{name}", globals, locals, fromlist or (), 0)
     return found if fromlist else sys.modules[f"{home}.{name.partition('.')[0]}"]
+
+
+Packed = tuple[tuple[str, bytes], ...]
+"""Folders, each with its modules as the bytes of a ZIP file."""
+
+
+def pack(folders: Sequence[str]) -> Packed:
+    """The modules of folders; other files stay where they are."""
+    return tuple((folder, _zipped(Path(folder))) for folder in folders)
+
+
+def unpack(packed: Packed) -> None:
+    """Let this process import packed modules by the names that they had where they were packed."""
+    for folder, content in packed:
+        open_folder(folder, _unzipped(content))
+
+
+def _zipped(folder: Path) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for path in modules_beside(folder):
+            # No dates: the same modules are the same bytes.
+            archive.writestr(zipfile.ZipInfo(path.relative_to(folder).as_posix()), path.read_bytes())
+    return content.getvalue()
+
+
+@lru_cache(maxsize=64)
+def _unzipped(content: bytes) -> str:
+    """A folder of this process's own with the files; it stays as long as the process does."""
+    digest = hashlib.sha256(content).hexdigest()[:8]
+    folder = tempfile.mkdtemp(prefix=f"proxytune_{digest}_")
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        archive.extractall(folder)
+    return folder

@@ -1,20 +1,64 @@
-"""Finding what a user's name stands for, and saying in one line why it cannot be used."""
+"""Finding what a user's name stands for, and saying in one line why it cannot be used.
+
+Plug-ins: entry points of installed packages that add something to proxytune.
+"""
 
 import importlib
 import inspect
+import sys
 import sysconfig
 import traceback
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any, TypeVar
 
 from proxytune.errors import ExtensionError, ProxytuneError
-from proxytune.extensions.beside import import_beside
-from proxytune.extensions.interrupting import is_users
-from proxytune.extensions.plugins import plugins
-from proxytune.extensions.trust import check_permitted
+from proxytune.extensions.beside import check_permitted, import_beside, is_users
 from proxytune.settings import nearest
+
+GROUP = "proxytune"
+"""The group of entry points; each is called `KIND.NAME`."""
+
+
+def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint]:
+    """The installed plug-ins of a kind by name, sorted; none of them is imported.
+
+    Args:
+        kind: What they add, as `effect`.
+        shipped: Names that proxytune itself has of that kind.
+
+    Raises:
+        ExtensionError: If two have one name, or one is called like something shipped.
+    """
+    found: dict[str, EntryPoint] = {}
+    for point in _installed(tuple(sys.path)):
+        of_kind, _, name = point.name.partition(".")
+        if of_kind != kind:
+            continue
+        if not name.replace("-", "_").isidentifier():
+            raise ExtensionError(f"plug-in '{point.name}' of {_package(point)} must be called {kind}.NAME, one word")
+        if name in shipped:
+            whose = f"plug-in '{point.name}' of {_package(point)}"
+            raise ExtensionError(f"{whose} has the name of a shipped {kind}; rename it or uninstall it")
+        if name in found:
+            both = f"{_package(found[name])} and {_package(point)}"
+            raise ExtensionError(f"plug-in '{point.name}' is in both {both}; uninstall one of them")
+        found[name] = point
+    return MappingProxyType(found)
+
+
+@lru_cache(maxsize=1)
+def _installed(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """The entry points of every kind; `path` is sys.path, on which they depend: looking for them takes 20 ms."""
+    return tuple(sorted(entry_points(group=GROUP), key=lambda point: (point.name, _package(point))))
+
+
+def _package(point: EntryPoint) -> str:
+    return point.dist.name if point.dist else point.value
+
 
 NOT_USERS = (
     Path(__file__).resolve().parents[1],

@@ -1,1 +1,5 @@
 """Bags, CSV files, trajectories and arrays of others, made a log."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,13 +1,146 @@
-"""What is wrong, or worth knowing, about the stamps and poses of a drive; what can be mended is."""
+"""What is wrong, or worth knowing, about the stamps and poses of a drive; what can be mended is.
+
+Units that cannot be: a robot that drives at hundreds of metres a second is measured in millimetres.
+Orientations as headings: quaternions of any length, checked.
+When a robot answers its commands, by cross-correlation: two clocks show before anything is fitted.
+"""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import correlate, correlation_lags
 
+from proxytune.arrays import Floats
 from proxytune.errors import LogError
-from proxytune.importing.orientation import MOST_LACKING
-from proxytune.importing.source import Commands, Drive, Floats, Poses
+from proxytune.importing.source import Commands, Drive, Poses
+
+FASTEST_M_S = 40.0
+"""No wheeled robot drives faster."""
+
+FASTEST_WHEEL_RAD_S = 2000.0
+
+SHORTEST_S = 1.0
+"""A drive that takes less is one whose times are in another unit."""
+
+CHORD_S = 0.2
+"""Speeds are taken over so long: noise of poses is none."""
+
+APART = 50.0
+"""Commanded and measured ways may differ by slip and gears, but not by such a factor."""
+
+MOVED_M = 0.1
+
+SPARSEST = 20.0
+"""A drive that lasts this many times as long as its poses at their usual interval has stamps of another unit."""
+
+
+def check_units(drive: Drive, where: str) -> None:
+    """Refuse a drive whose times, places or commands are plainly in another unit.
+
+    Raises:
+        LogError: With what is odd, and how units are stated.
+    """
+    about = f"{where}: drive {drive.name}"
+    times = drive.poses.times
+    lasts = float(times[-1] - times[0])
+    if lasts < SHORTEST_S:
+        short = f"takes {lasts:.3g} s with {len(times)} poses"
+        raise LogError(f"{about}: {short}; state the unit of time (--columns time=t:ms)")
+    usual = float(np.median(np.diff(times)))
+    if lasts > SPARSEST * usual * len(times):
+        raise LogError(
+            f"{about}: takes {lasts:.4g} s with {len(times)} poses usually {usual:.3g} s apart; leave out wrong "
+            "stamps, cut it at its gaps, or state the unit of time (--columns time=t:ms)"
+        )
+    speed = _usual_speed(drive.poses)
+    if speed > FASTEST_M_S:
+        raise LogError(f"{about}: drives at {speed:.3g} m/s; state the units of x, y and time (--columns x=pos_x:mm)")
+    if drive.commands is not None:
+        _check_commands(drive.commands, drive.poses, about)
+
+
+def _check_commands(commands: Commands, poses: Poses, about: str) -> None:
+    most = float(np.percentile(np.abs(commands.values[:, 0]), 95))
+    if commands.kind == "wheel_speed" and most > FASTEST_WHEEL_RAD_S:
+        raise LogError(f"{about}: asks a wheel for {most:.3g} rad/s; state the unit of its commands")
+    if commands.kind != "twist":
+        return
+    if most > FASTEST_M_S:
+        raise LogError(f"{about}: asks for {most:.3g} m/s; state the unit of its commands (--columns v=cmd_lin:mm/s)")
+    asked, driven = _commanded_way(commands, poses.times[-1]), _driven_way(poses)
+    if min(asked, driven) > MOVED_M / APART and max(asked, driven) > max(MOVED_M, APART * min(asked, driven)):
+        raise LogError(
+            f"{about}: the poses say that it drove {driven:.3g} m where its commands say {asked:.3g} m; state the "
+            "units of both (--columns x=pos_x:mm,v=cmd_lin:mm/s)"
+        )
+
+
+def _usual_speed(poses: Poses) -> float:
+    """The speed [m/s] that is exceeded for a tenth of the drive."""
+    later = np.searchsorted(poses.times, poses.times + CHORD_S)
+    here = np.flatnonzero(later < len(poses.times))
+    if not len(here):
+        return 0.0
+    chords = poses.places[later[here], :2] - poses.places[here, :2]
+    return float(np.percentile(np.hypot(*chords.T) / (poses.times[later[here]] - poses.times[here]), 90))
+
+
+def _driven_way(poses: Poses) -> float:
+    """The way along chords of CHORD_S [m]."""
+    grid = np.arange(poses.times[0], poses.times[-1], CHORD_S)
+    x, y = (np.interp(grid, poses.times, column) for column in poses.places[:, :2].T)
+    return float(np.hypot(np.diff(x), np.diff(y)).sum())
+
+
+def _commanded_way(commands: Commands, end: float) -> float:
+    lasts: Floats = np.clip(np.diff(np.append(commands.times, max(end, commands.times[-1]))), 0.0, 1.0)
+    return float((np.abs(commands.values[:, 0]) * lasts).sum())
+
+
+LEAST_NORM = 1e-3
+"""A shorter quaternion is no orientation: drivers publish zeros before they know one."""
+
+MOST_LACKING = 0.1
+"""A tracker that loses its markers now and then lacks no more of its poses than this share."""
+
+
+def headings_and_tilts(quaternions: Floats, where: str) -> tuple[Floats, Floats]:
+    """Headings about the upward axis and tilts away from it, (N,) each [rad]; NaN where a few are no rotation.
+
+    Args:
+        quaternions: Orientations in the world (N, 4): x, y, z, w.
+        where: What they come from, for a complaint.
+
+    Raises:
+        LogError: If more than a few are not finite or of length zero.
+    """
+    wrong = no_rotation(quaternions)
+    if wrong.mean() > MOST_LACKING:
+        raise complaint(quaternions, wrong, where)
+    known = np.where(wrong[:, None], np.nan, quaternions)
+    x, y, z, w = (known / np.linalg.norm(known, axis=1, keepdims=True)).T
+    headings = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    tilts = np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
+    return headings, tilts
+
+
+def no_rotation(quaternions: Floats) -> NDArray[np.bool_]:
+    """Which quaternions are not finite or of length zero (N,)."""
+    norms = np.linalg.norm(quaternions, axis=1)
+    return np.asarray(~(np.isfinite(norms) & (norms > LEAST_NORM)))
+
+
+def complaint(quaternions: Floats, wrong: NDArray[np.bool_], where: str) -> LogError:
+    """What is wrong with the first of them."""
+    number = int(np.argmax(wrong))
+    values = ", ".join(f"{value:g}" for value in quaternions[number])
+    return LogError(
+        f"{where}: orientation {number + 1} is the quaternion ({values}), which is no rotation, and so are "
+        f"{wrong.sum()} of {len(wrong)}; record poses whose orientation is set"
+    )
+
 
 FURTHEST_BACK_S = 0.5
 """Messages may arrive in another order than they were stamped in; a longer step back is a clock set anew."""
@@ -123,3 +256,64 @@ def _check_overlap(commands: Floats, poses: Floats, about: str) -> None:
             f"{about}: commands lie between {commands[0]:.3f} and {commands[-1]:.3f} s, poses between {poses[0]:.3f} "
             f"and {poses[-1]:.3f} s: two clocks; use --stamps receive, or say how far apart they are by --clock-offset"
         )
+
+
+STEP_S = 0.01
+FURTHEST_S = 2.0
+"""Answers are looked for so far from their commands."""
+
+CLEAR = 0.4
+"""A correlation below this tells no lag."""
+
+SMOOTH_S = 0.1
+"""Measured turns are taken over so long."""
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """How commanded and measured turning fit together in a drive.
+
+    Attributes:
+        lag_s: By how much the measured turning follows the commanded one [s]; below 0 it comes before.
+        correlation: How well they fit there, −1 to 1.
+    """
+
+    lag_s: float
+    correlation: float
+
+
+def reaction_of(drive: Drive) -> Reaction | None:
+    """The lag of measured behind commanded turning; None where the robot hardly turned, or without commands."""
+    if drive.commands is None:
+        return None
+    times = np.arange(drive.poses.times[0], drive.poses.times[-1], STEP_S)
+    if len(times) * STEP_S < 3.0 * FURTHEST_S:
+        return None
+    commanded, measured = _commanded_turn(drive, times), _measured_turn(drive, times)
+    size = np.linalg.norm(commanded) * np.linalg.norm(measured)
+    if not size > 0.0:
+        return None
+    lags = correlation_lags(len(measured), len(commanded)) * STEP_S
+    strength = correlate(measured, commanded) / size
+    near = np.abs(lags) <= FURTHEST_S
+    best = int(np.argmax(strength[near]))
+    found = Reaction(float(lags[near][best]), float(strength[near][best]))
+    return found if found.correlation > CLEAR else None
+
+
+def _commanded_turn(drive: Drive, times: Floats) -> Floats:
+    """The commanded turning at each time, in whatever unit, its mean taken out."""
+    commands = drive.commands
+    assert commands is not None
+    held = commands.values[np.maximum(np.searchsorted(commands.times, times, side="right") - 1, 0)]
+    turn = held[:, 1] if commands.kind == "twist" else held[:, 1] - held[:, 0]
+    return np.asarray(turn - turn.mean())
+
+
+def _measured_turn(drive: Drive, times: Floats) -> Floats:
+    """The measured yaw rate at each time, its mean taken out."""
+    heading = np.interp(times, drive.poses.times, np.unwrap(drive.poses.headings))
+    half = round(SMOOTH_S / STEP_S / 2.0)
+    rate = np.zeros(len(times))
+    rate[half:-half] = heading[2 * half :] - heading[: -2 * half]
+    return np.asarray(rate - rate.mean())

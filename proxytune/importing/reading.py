@@ -1,21 +1,81 @@
-"""Reading whatever a user has: the form is told by what is in it."""
+"""Opening a log, whatever form it comes in.
 
-from collections.abc import Callable
+A drive in numbers: how long, how often measured, what dropped out, and when it answers its commands.
+Reading whatever a user has: the form is told by what is in it.
+A source written as a log's folder: whole, or not at all.
+"""
+
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from proxytune.errors import LogError
-from proxytune.importing.checks import checked_drive
-from proxytune.importing.plausibility import check_units
-from proxytune.importing.ros import is_bag, read_bag
-from proxytune.importing.source import Source
-from proxytune.importing.survey import clock_notes, survey
-from proxytune.importing.tables.arrays import is_arrays, read_arrays
-from proxytune.importing.tables.csv_tables import is_csv_tables, read_csv_tables
-from proxytune.importing.tables.mrclam import is_mrclam, read_mrclam
-from proxytune.importing.tables.tum import is_tum, read_tum
-from proxytune.importing.wanted import Wanted
+import numpy as np
+import pandas as pd
+import tomlkit
+from PIL import Image
+
+from proxytune.arrays import Floats
+from proxytune.errors import InputError, LogError, RunError
+from proxytune.importing.arrays import is_arrays, read_arrays
+from proxytune.importing.bag import is_bag
+from proxytune.importing.checks import check_units, checked_drive, reaction_of
+from proxytune.importing.source import Commands, Drive, Facts, Pictures, Poses, Source, Survey, Wanted
+from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
+from proxytune.importing.topics import read_bag
+from proxytune.logs import COMMANDS, Log, read_log
+
+GAP_S = 0.5
+"""A longer time without a pose is a gap."""
+
+
+def survey(drive: Drive) -> Survey:
+    """The numbers of a drive whose stamps are in order."""
+    times = drive.poses.times
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    gaps = steps[steps > max(GAP_S, 3.0 * usual)]
+    answer = reaction_of(drive)
+    return Survey(
+        name=drive.name,
+        seconds=float(times[-1] - times[0]),
+        poses=len(times),
+        poses_hz=1.0 / usual,
+        lost=_lost(steps, usual),
+        gaps=len(gaps),
+        longest_gap_s=float(gaps.max(initial=0.0)),
+        jitter_s=float(steps[steps < 1.5 * usual].std()),
+        commands=0 if drive.commands is None else len(drive.commands.times),
+        frames=0 if drive.pictures is None else len(drive.pictures.times),
+        lag_s=None if answer is None else answer.lag_s,
+    )
+
+
+def _lost(steps: Floats, usual: float) -> float:
+    missing = float(np.maximum(np.rint(steps / usual) - 1.0, 0.0)[steps <= GAP_S].sum())
+    return missing / (missing + len(steps) + 1)
+
+
+def clock_notes(drives: Sequence[Survey]) -> list[str]:
+    """What the lags say of the clocks of commands and poses, in a sentence."""
+    lags = [(one.lag_s, one.name) for one in drives if one.lag_s is not None]
+    early = [pair for pair in lags if pair[0] < 0.0]
+    if early:
+        lag, first = min(early)
+        return [
+            f"{len(early)} of {len(drives)} drives turn before they are told to (up to {-lag:.2f} s, {first}): two "
+            "clocks stamped commands and poses; diagnose corrects that, --clock-offset declares it"
+        ]
+    if not lags:
+        return ["no drive turns enough to tell whether commands and poses share a clock"]
+    usual = float(np.median([lag for lag, _ in lags]))
+    return [
+        f"it turns {usual:.2f} s after its commands: delay, lag and an offset between the two clocks together, which "
+        "nothing here can tell apart"
+    ]
 
 
 class Form(NamedTuple):
@@ -75,3 +135,169 @@ def _checked(source: Source, path: Path, offset_s: float) -> Source:
     if kinds != {"none"}:
         notes += clock_notes(surveys)
     return replace(source, drives=tuple(drives), notes=tuple(notes), surveys=surveys)
+
+
+PICTURES = "frames/%06d.png"
+
+
+def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> None:
+    """Write log.toml, samples.csv, commands.csv and pictures.
+
+    Args:
+        source: What was read and checked.
+        folder: The log's folder, which must not exist or be empty.
+        facts: What only the user knows.
+        origin: Where it came from, for log.toml.
+
+    Raises:
+        InputError: If the folder is not free.
+        LogError: If what was read makes no log.
+        RunError: If it cannot be written.
+    """
+    folder = folder.resolve()
+    with _written_whole(folder) as draft:
+        fill_log(draft, source, facts, folder.name, origin)
+        read_as(draft, folder)
+
+
+def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str) -> None:
+    """Write a log's files into a folder that is there.
+
+    Args:
+        folder: Where to.
+        source: What was read and checked.
+        facts: What only the user knows.
+        name: What the log is called.
+        origin: Where it came from, for log.toml.
+    """
+    _write_table(folder / "samples.csv", [_samples(drive.name, drive.poses) for drive in source.drives])
+    commands = [_commands(drive.name, drive.commands) for drive in source.drives if drive.commands is not None]
+    if commands:
+        _write_table(folder / "commands.csv", commands)
+    pictures = [drive for drive in source.drives if drive.pictures is not None]
+    if pictures:
+        _write_pictures(folder, pictures)
+    text = _description(source, name, facts, origin, with_pictures=bool(pictures))
+    (folder / "log.toml").write_text(text, encoding="utf-8")
+
+
+def read_as(folder: Path, shown: Path) -> Log:
+    """Read a log that lies elsewhere for the moment; complaints name where the user knows it.
+
+    Raises:
+        LogError: If it is none.
+    """
+    try:
+        return read_log(folder)
+    except LogError as problem:
+        raise LogError(str(problem).replace(str(folder), str(shown))) from None
+
+
+@contextmanager
+def _written_whole(folder: Path) -> Iterator[Path]:
+    """A folder to fill that becomes the wanted one once it is whole."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: is there already; give a folder that is not")
+    with writable(folder):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as draft:
+            inside = Path(draft) / "log"
+            inside.mkdir()
+            yield inside
+            if folder.exists():
+                folder.rmdir()
+            shutil.move(inside, folder)
+
+
+@contextmanager
+def writable(folder: Path) -> Iterator[None]:
+    """Tell in one line what keeps a folder from being written.
+
+    Raises:
+        RunError: If something does.
+    """
+    try:
+        yield
+    except OSError as problem:
+        raise RunError(f"{folder}: cannot be written ({problem.strerror}); make room, or give another folder") from None
+
+
+def _samples(name: str, poses: Poses) -> pd.DataFrame:
+    columns = np.column_stack((poses.times, poses.places[:, :2], np.unwrap(poses.headings)))
+    return _named(name, columns, ("time", "x", "y", "heading"))
+
+
+def _commands(name: str, commands: Commands) -> pd.DataFrame:
+    return _named(name, np.column_stack((commands.times, commands.values)), ("time", *COMMANDS[commands.kind]))
+
+
+def _named(name: str, columns: np.ndarray, names: tuple[str, ...]) -> pd.DataFrame:
+    table = pd.DataFrame(columns, columns=list(names))
+    table.insert(0, "episode", name)
+    return table
+
+
+def _write_table(path: Path, tables: list[pd.DataFrame]) -> None:
+    pd.concat(tables).to_csv(path, index=False, lineterminator="\n")
+
+
+def _write_pictures(folder: Path, drives: list[Drive]) -> None:
+    """Every picture by its number, one in memory at a time, and frames.csv."""
+    (folder / "frames").mkdir()
+    rows: list[tuple[int, str, float]] = []
+    for drive in drives:
+        for time, picture in _timed(drive.pictures):
+            Image.fromarray(picture).save(folder / (PICTURES % len(rows)))
+            rows.append((len(rows), drive.name, time))
+    pd.DataFrame(rows, columns=["frame", "episode", "time"]).to_csv(folder / "frames.csv", index=False)
+
+
+def _timed(pictures: Pictures | None) -> Iterator[tuple[float, np.ndarray]]:
+    if pictures is not None:
+        yield from zip(pictures.times.tolist(), pictures.read(), strict=True)
+
+
+def _description(source: Source, name: str, facts: Facts, origin: str, *, with_pictures: bool) -> str:
+    """The text of log.toml."""
+    kinds = {drive.commands.kind for drive in source.drives if drive.commands is not None}
+    stated = {"format": 1, "name": name, "robot": facts.robot or name, "command": next(iter(kinds), "none")}
+    stated |= {"source": f"{origin}, {source.form}"} | dict(facts.figures)
+    if facts.clock_offset:
+        stated["clock_offset_s"] = facts.clock_offset if facts.clock_offset == "fit" else float(facts.clock_offset)
+    if with_pictures:
+        stated["map"] = facts.road
+    return tomlkit.dumps(stated | ({"camera": {"frames": PICTURES}} if with_pictures else {}))
+
+
+NOTHING = Wanted()
+NO_FACTS = Facts()
+
+
+@contextmanager
+def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> Iterator[tuple[Log, tuple[str, ...]]]:
+    """A log's folder, or a bag or table as the log that `import` would make of it, and what was found on the way.
+
+    What is imported lies in a temporary folder for as long as the log is open.
+
+    Raises:
+        LogError: If it is neither.
+    """
+    if (path / "log.toml").is_file() or (path / "samples.csv").is_file():
+        yield read_log(path), ()
+        return
+    source = read_source(path, wanted, facts.offset_s)
+    with tempfile.TemporaryDirectory(prefix="proxytune_") as home:
+        folder = Path(home)
+        named = source_without_unnamed_pictures(source, facts)
+        with writable(folder):
+            fill_log(folder, named, facts, path.resolve().stem, origin=path.name)
+        yield read_as(folder, path), source.notes
+
+
+def source_without_unnamed_pictures(source: Source, facts: Facts) -> Source:
+    """The source without its pictures where nobody says which map they show, and a note of it."""
+    if facts.road or all(drive.pictures is None for drive in source.drives):
+        return source
+    drives = tuple(replace(drive, pictures=None) for drive in source.drives)
+    note = "pictures are left out: name the map that they show with --map"
+    return replace(source, drives=drives, notes=(*source.notes, note))

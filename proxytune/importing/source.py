@@ -1,13 +1,21 @@
-"""What every importer makes of a source: drives with commands, poses and pictures, each at times of their own."""
+"""What every importer makes of a source: drives with commands, poses and pictures, each at times of their own.
 
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+What a user asks of an import, where the source alone does not say.
+What a log.toml is to say besides what the source holds.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from proxytune.arrays import Floats
+from proxytune.errors import InputError
+from proxytune.logs import GEOMETRY
 
 
 @dataclass(frozen=True)
@@ -152,3 +160,80 @@ class Source:
         """What a JSON document says of it."""
         channels = [{"name": c.name, "type": c.kind, "count": c.count, "role": c.role} for c in self.channels]
         return {"form": self.form, "channels": channels, "notes": list(self.notes)}
+
+
+NOTHING: Mapping[str, str] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to take from a source; whatever is left empty is chosen by what there is.
+
+    Attributes:
+        commands: Topic of the commands; "none" for a log without them.
+        poses: Topic of the poses, or parent and child of a transform as "map>base_link".
+        frames: Topic of the pictures; "none" to leave them out.
+        stamps: Whose times count: "header" (when it was measured) or "receive" (when it was written down).
+        columns: Of a table or of arrays: our name to theirs, with the unit where it is not ours, as in
+            {"time": "stamp_ns:ns", "x": "pos_x_mm:mm", "heading": "yaw_deg:deg", "v": "cmd_lin"}.
+        kind: Kind of the commands, one of `proxytune.logs.COMMANDS`, where the source does not say.
+    """
+
+    commands: str = ""
+    poses: str = ""
+    frames: str = ""
+    stamps: str = "header"
+    columns: Mapping[str, str] = field(default_factory=lambda: NOTHING)
+    kind: str = ""
+
+
+NONE: Mapping[str, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What only the user knows of a source.
+
+    Attributes:
+        robot: Name of the robot; empty: the log's own name.
+        figures: Its wheel_radius_m, baseline_m and full_speed_m_s, where there is no folder of it.
+        road: The map that pictures show: a name, or the path of a map file.
+        clock_offset: Seconds that poses are stamped later than commands, "fit", or empty.
+    """
+
+    robot: str = ""
+    figures: Mapping[str, float] = field(default_factory=lambda: NONE)
+    road: str = ""
+    clock_offset: str = ""
+
+    @property
+    def offset_s(self) -> float:
+        """Seconds that poses are known to be stamped later than commands."""
+        return 0.0 if self.clock_offset in ("", "fit") else float(self.clock_offset)
+
+
+def finite(text: str) -> float | None:
+    """The finite number that a text states, if it does."""
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def read_geometry(given: list[str]) -> dict[str, float]:
+    """Measures of a robot from texts such as baseline_m=0.16.
+
+    Raises:
+        InputError: If one is no such figure.
+    """
+    geometry = {}
+    for text in given:
+        key, _, value = text.partition("=")
+        if key.strip() not in GEOMETRY:
+            raise InputError(f"--figure {text}: write one of {', '.join(GEOMETRY)}, as in baseline_m=0.16")
+        number = finite(value)
+        if number is None or number <= 0.0:
+            raise InputError(f"--figure {text}: '{value}' is no length or speed; write it as in {key}=0.16")
+        geometry[key.strip()] = number
+    return geometry

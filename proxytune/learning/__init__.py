@@ -1,1 +1,5 @@
 """Learning from a proxy: demonstrations, learners, learning curves, and what a proxy is worth as a teacher (PLV)."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

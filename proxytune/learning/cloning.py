@@ -1,5 +1,9 @@
-"""Behaviour cloning: a small network from a small picture to the expert's command."""
+"""Behaviour cloning: a small network from a small picture to the expert's command.
 
+What learners see of a camera's picture: its grey values, averaged over cells.
+"""
+
+import functools
 import warnings
 from dataclasses import dataclass
 
@@ -9,12 +13,51 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
 from threadpoolctl import threadpool_limits
 
+from proxytune.arrays import Floats
 from proxytune.domain import Demonstration
 from proxytune.errors import LearnerError
 from proxytune.learning.learner import Weights
-from proxytune.learning.pictures import grey_cells
 
-Array = NDArray[np.float64]
+
+def grey_cells(pictures: NDArray[np.uint8], *, top: float, rows: int, columns: int) -> Floats:
+    """Grey cells (n, rows · columns) of pictures (n, rows, columns, 3), from −0.5 to 0.5.
+
+    Args:
+        pictures: As the camera gives them.
+        top: Share of the picture's rows, from the top, that is not looked at.
+        rows: Cells above one another in the rest.
+        columns: Cells beside one another.
+
+    Raises:
+        LearnerError: If the pictures are no colour pictures or have fewer pixels than there are cells.
+    """
+    height, width = pictures.shape[1:3] if pictures.ndim == 4 else (0, 0)
+    first = round(top * height)
+    if height - first < rows or width < columns:
+        raise LearnerError(
+            f"pictures have shape {pictures.shape[1:]}, and {rows} × {columns} cells below row {first} "
+            "do not fit in; give (rows, columns, 3) with more pixels, or take fewer cells"
+        )
+    seen = pictures[:, first:]
+    # Adding 16-bit channels is exact, and twice as fast as a mean over them
+    grey = (seen[..., 0].astype(np.uint16) + seen[..., 1] + seen[..., 2]) / 3.0
+    means = _cell_means(_cell_means(grey, rows, axis=1), columns, axis=2)
+    return means.reshape(len(pictures), -1) / 255.0 - 0.5
+
+
+def _cell_means(values: Floats, cells: int, axis: int) -> Floats:
+    """Means over cells of nearly equal size along an axis."""
+    firsts, sizes = _cells(values.shape[axis], cells)
+    shape = [1] * values.ndim
+    shape[axis] = cells
+    return np.asarray(np.add.reduceat(values, firsts, axis=axis) / sizes.reshape(shape))
+
+
+@functools.lru_cache
+def _cells(length: int, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each cell begins along an axis, and how many pixels it has."""
+    edges = np.linspace(0, length, cells + 1).round().astype(int)
+    return edges[:-1], np.diff(edges)
 
 
 @dataclass(frozen=True)
@@ -67,22 +110,22 @@ class BehaviourCloning:
             network.fit(seen, wanted)
         return {"centre": scale["centre"], "spread": scale["spread"], **_layers(network)}
 
-    def act(self, weights: Weights, observation: NDArray[np.uint8]) -> Array:
+    def act(self, weights: Weights, observation: NDArray[np.uint8]) -> Floats:
         """The command for one picture, within [−1, 1]."""
-        command: Array = self.act_many(weights, observation[None])[0]
+        command: Floats = self.act_many(weights, observation[None])[0]
         return command
 
-    def act_many(self, weights: Weights, observations: NDArray[np.uint8]) -> Array:
+    def act_many(self, weights: Weights, observations: NDArray[np.uint8]) -> Floats:
         """The commands (n, 2) for pictures (n, rows, columns, 3), each as `act` has it, to the bit."""
         # A product for each row: one over all rows rounds by how many there are
         signal = self.features(observations)[:, None]
         for layer in range(len(self.hidden)):
             signal = np.maximum(0.0, signal @ weights[f"weight{layer}"] + weights[f"bias{layer}"])
         signal = signal @ weights[f"weight{len(self.hidden)}"] + weights[f"bias{len(self.hidden)}"]
-        commands: Array = np.clip(weights["centre"] + weights["spread"] * signal[:, 0], -1.0, 1.0)
+        commands: Floats = np.clip(weights["centre"] + weights["spread"] * signal[:, 0], -1.0, 1.0)
         return commands
 
-    def features(self, pictures: NDArray[np.uint8]) -> Array:
+    def features(self, pictures: NDArray[np.uint8]) -> Floats:
         """Grey cells (n, rows · columns) of pictures (n, rows, columns, 3), from −0.5 to 0.5.
 
         Raises:
@@ -104,7 +147,7 @@ class BehaviourCloning:
         )
 
 
-def _settle(network: MLPRegressor, seen: Array, wanted: Array, start: Weights) -> None:
+def _settle(network: MLPRegressor, seen: Floats, wanted: Floats, start: Weights) -> None:
     """Put learnt weights into a network: scikit-learn lays it out in a first fit, and then goes on from there."""
     longest = network.max_iter
     layers = _layers(network.set_params(max_iter=1).fit(seen, wanted))
@@ -120,12 +163,12 @@ def _settle(network: MLPRegressor, seen: Array, wanted: Array, start: Weights) -
     network.intercepts_ = [np.array(start[name]) for name in layers if name.startswith("bias")]
 
 
-def _scale(commands: Array) -> dict[str, Array]:
+def _scale(commands: Floats) -> dict[str, Floats]:
     """Centre and spread of the commands; where they do not vary, spread 1."""
     spread = commands.std(axis=0)
     return {"centre": commands.mean(axis=0), "spread": np.where(spread > 1e-9, spread, 1.0)}
 
 
-def _layers(network: MLPRegressor) -> dict[str, Array]:
+def _layers(network: MLPRegressor) -> dict[str, Floats]:
     weights = {f"weight{layer}": values for layer, values in enumerate(network.coefs_)}
     return {**weights, **{f"bias{layer}": values for layer, values in enumerate(network.intercepts_)}}

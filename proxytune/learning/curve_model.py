@@ -2,8 +2,12 @@
 
 A score is the mean curve of its proxy, plus what this repetition's target samples do to every learner, plus what they
 do to this one, plus noise. The last three are larger where scores differ more, as they do where a curve rises.
+
+Learning curves: the scores of a learner in the target, by number of target samples and repetition.
+The posterior of learning curves: draws of all mean curves together, bounded, and rising where the data allow it.
 """
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,9 +15,45 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import minimize
+from scipy.optimize import isotonic_regression, minimize
 
-from proxytune.learning.curves import Array
+from proxytune.arrays import Floats
+from proxytune.errors import InputError
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A learning curve: scores in the target by number of target samples.
+
+    Attributes:
+        counts: Numbers of target samples, rising, the first 0.
+        scores: Scores (repetitions, counts); NaN where nobody was examined, or nothing could drive.
+
+    Raises:
+        InputError: If the counts do not rise from 0, or do not match the scores.
+    """
+
+    counts: tuple[int, ...]
+    scores: Floats
+
+    def __post_init__(self) -> None:
+        if not self.counts or self.counts[0] != 0:
+            raise InputError("a learning curve starts at 0 target samples; add 0 to the grid")
+        if any(later <= earlier for earlier, later in itertools.pairwise(self.counts)):
+            raise InputError(f"the grid of target samples must rise, got {list(self.counts)}")
+        if self.scores.ndim != 2 or self.scores.shape[1] != len(self.counts) or not len(self.scores):
+            raise InputError(f"scores have shape {self.scores.shape}; give (seeds, {len(self.counts)})")
+
+    @property
+    def examined(self) -> NDArray[np.intp]:
+        """Repetition and place in `counts` of every examination (examinations, 2)."""
+        return np.argwhere(np.isfinite(self.scores))
+
+    @property
+    def repetitions(self) -> int:
+        """How many repetitions have an examination."""
+        return int(np.isfinite(self.scores).any(axis=1).sum())
+
 
 PRIORS: Mapping[str, tuple[float, float]] = {
     "amplitude": (1.0, 1.0),
@@ -54,8 +94,8 @@ class Marks:
 
     curve: NDArray[np.intp]
     repetition: NDArray[np.intp]
-    place: Array
-    score: Array
+    place: Floats
+    score: Floats
 
     @cached_property
     def same(self) -> NDArray[np.bool_]:
@@ -68,17 +108,17 @@ class Marks:
         return np.asarray(self.repetition[:, None] == self.repetition)
 
     @cached_property
-    def apart(self) -> Array:
+    def apart(self) -> Floats:
         """How many doublings two are apart."""
         return np.asarray(np.abs(self.place[:, None] - self.place))
 
 
-def places(counts: Array, first: float) -> Array:
+def places(counts: Floats, first: float) -> Floats:
     """Numbers of target samples as doublings: 0 for none, 1 for the first count, nearly one more for each twofold."""
     return np.asarray(np.log2(1.0 + np.asarray(counts, dtype=float) / first))
 
 
-def counts_at(place: Array, first: float) -> Array:
+def counts_at(place: Floats, first: float) -> Floats:
     """The numbers of target samples at these places."""
     return np.asarray(first * (np.exp2(place) - 1.0))
 
@@ -98,27 +138,29 @@ class CurveModel:
     values: Mapping[str, float]
     centre: float
     unit: float
-    _factor: tuple[Array, bool] = field(repr=False)
-    _weights: Array = field(repr=False)
+    _factor: tuple[Floats, bool] = field(repr=False)
+    _weights: Floats = field(repr=False)
 
-    def mean_curves(self, curve: NDArray[np.intp], place: Array) -> tuple[Array, Array]:
+    def mean_curves(self, curve: NDArray[np.intp], place: Floats) -> tuple[Floats, Floats]:
         """Mean (places,) and covariance (places, places) of the mean curves at these places."""
         across = self._means_covariance(curve, place, self.marks.curve, self.marks.place)
         mean = self.centre + self.unit * (across @ self._weights)
         left = self._means_covariance(curve, place, curve, place) - across @ cho_solve(self._factor, across.T)
         return mean, np.asarray(self.unit**2 * left)
 
-    def noise_at(self, curve: NDArray[np.intp], place: Array) -> Array:
+    def noise_at(self, curve: NDArray[np.intp], place: Floats) -> Floats:
         """Variance of one more examination's score about the mean curve, at these places."""
         values = self.values
         one = values["shared"] ** 2 + values["own"] ** 2 + values["noise"] ** 2
         relative = _spread(self.marks, self._residuals(), curve, place) ** 2
         return np.asarray(self.unit**2 * one * relative)
 
-    def _residuals(self) -> Array:
+    def _residuals(self) -> Floats:
         return _residuals(self.marks, self.values, (self.marks.score - self.centre) / self.unit, self._weights)
 
-    def _means_covariance(self, curve: NDArray[np.intp], place: Array, other: NDArray[np.intp], there: Array) -> Array:
+    def _means_covariance(
+        self, curve: NDArray[np.intp], place: Floats, other: NDArray[np.intp], there: Floats
+    ) -> Floats:
         return _means(self.values, curve[:, None] == other, np.abs(place[:, None] - there))
 
 
@@ -145,11 +187,11 @@ def _bounds(marks: Marks) -> list[tuple[float, float]]:
     return [(np.log(median) - far[name], np.log(median) + far[name]) for name, (median, _) in PRIORS.items()]
 
 
-def _named(logarithms: Array) -> dict[str, float]:
+def _named(logarithms: Floats) -> dict[str, float]:
     return dict(zip(PRIORS, np.exp(logarithms).tolist(), strict=True))
 
 
-def _misfit(logarithms: Array, marks: Marks, scaled: Array, spread: Array) -> float:
+def _misfit(logarithms: Floats, marks: Marks, scaled: Floats, spread: Floats) -> float:
     """Negative logarithm of the posterior of the hyperparameters, up to a constant."""
     factor = cho_factor(_covariance(marks, _named(logarithms), spread), lower=True)
     medians, widths = np.array(list(PRIORS.values())).T
@@ -157,7 +199,7 @@ def _misfit(logarithms: Array, marks: Marks, scaled: Array, spread: Array) -> fl
     return float(0.5 * scaled @ cho_solve(factor, scaled) + np.sum(np.log(np.diag(factor[0]))) + prior)
 
 
-def _covariance(marks: Marks, values: Mapping[str, float], spread: Array) -> Array:
+def _covariance(marks: Marks, values: Mapping[str, float], spread: Floats) -> Floats:
     drift = _matern(marks.apart, values["drift"]) * marks.together
     about = drift * (values["shared"] ** 2 + values["own"] ** 2 * marks.same) + values["noise"] ** 2 * np.eye(
         len(spread)
@@ -166,25 +208,142 @@ def _covariance(marks: Marks, values: Mapping[str, float], spread: Array) -> Arr
     return np.asarray(_means(values, marks.same, marks.apart) + spread[:, None] * spread * about + sure)
 
 
-def _means(values: Mapping[str, float], same: NDArray[np.bool_], apart: Array) -> Array:
+def _means(values: Mapping[str, float], same: NDArray[np.bool_], apart: Floats) -> Floats:
     """Prior covariance of mean curves."""
     return np.asarray(LEVEL**2 + values["amplitude"] ** 2 * same * _matern(apart, values["length"]))
 
 
-def _matern(apart: Array, length: float) -> Array:
+def _matern(apart: Floats, length: float) -> Floats:
     """The Matérn kernel of smoothness 5/2."""
     scaled = np.sqrt(5.0) * apart / length
     return np.asarray((1.0 + scaled + scaled**2 / 3.0) * np.exp(-scaled))
 
 
-def _residuals(marks: Marks, values: Mapping[str, float], scaled: Array, weights: Array) -> Array:
+def _residuals(marks: Marks, values: Mapping[str, float], scaled: Floats, weights: Floats) -> Floats:
     """What the mean curves leave of the scores, scaled."""
     return np.asarray(scaled - _means(values, marks.same, marks.apart) @ weights)
 
 
-def _spread(marks: Marks, residuals: Array, curve: NDArray[np.intp], place: Array) -> Array:
+def _spread(marks: Marks, residuals: Floats, curve: NDArray[np.intp], place: Floats) -> Floats:
     """How much scores differ at these places, relative to all: what is left nearby, drawn towards that of all."""
     pooled = float(np.mean(residuals**2)) or 1.0
     near = np.exp(-0.5 * ((place[:, None] - marks.place) / NEAR) ** 2) * (curve[:, None] == marks.curve)
     local = (POOLED * pooled + near @ residuals**2) / (POOLED + near.sum(axis=1))
     return np.asarray(np.sqrt(local / pooled))
+
+
+POSTERIOR_DRAWS = 2000
+STEPS = 8
+"""Places of a drawn curve per doubling of target samples."""
+LEAST_VARIANCE = 1e-9
+DOUBT = 2.5
+"""A curve falls where its mean falls by more standard deviations: the greatest of many falls is partly luck."""
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Mean curves drawn from their posterior, all proxies' together.
+
+    Attributes:
+        counts: Numbers of target samples (counts,), rising from 0.
+        scores: Mean scores by name of the curve, (draws, counts) each; NaN before anything can have been learnt.
+        monotone: Whether the data allow a curve to rise only, by name; then it is drawn so.
+        model: What they are drawn from; its curves are numbered in the order of `scores`.
+        first: The smallest number of target samples after which something has been learnt.
+    """
+
+    counts: Floats
+    scores: Mapping[str, Floats]
+    monotone: Mapping[str, bool]
+    model: CurveModel
+    first: float
+
+
+def draw_curves(
+    curves: Mapping[str, Curve], bounds: tuple[float, float], draws: int = POSTERIOR_DRAWS, seed: int = 0
+) -> Draws:
+    """Draw the mean curves that the examinations allow: a pure function of these.
+
+    Args:
+        curves: Scores by name of the learning curve.
+        bounds: Lowest and highest score there can be.
+        draws: How many.
+        seed: Of what is drawn.
+    """
+    first = float(min(curve.counts[1] for curve in curves.values()))
+    last = max(curve.counts[-1] for curve in curves.values())
+    place = np.linspace(0.0, end := float(places(np.array(last), first)), 1 + round(STEPS * end))
+    model = fit_curve_model(_marks(curves, first))
+    which = np.repeat(np.arange(len(curves)), len(place))
+    mean, covariance = model.mean_curves(which, np.tile(place, len(curves)))
+    normal = np.random.default_rng(seed).standard_normal((draws, len(mean)))
+    drawn = np.clip(mean + normal @ _root(covariance).T, *bounds).reshape(draws, len(curves), -1)
+    rising = {
+        name: _may_rise_only(mean[which == number], covariance[np.ix_(which == number, which == number)])
+        for number, name in enumerate(curves)
+    }
+    sure = 1.0 / np.maximum(np.diag(covariance), LEAST_VARIANCE).reshape(len(curves), -1)
+    scores = {
+        name: _rising(drawn[:, number], sure[number]) if rising[name] else drawn[:, number].copy()
+        for number, name in enumerate(curves)
+    }
+    for name, curve in curves.items():
+        if not np.isfinite(curve.scores[:, 0]).any():
+            scores[name][:, place < 1.0 - 1e-9] = np.nan
+    return Draws(counts_at(place, first), scores, rising, model, first)
+
+
+def _marks(curves: Mapping[str, Curve], first: float) -> Marks:
+    rows = []
+    for number, curve in enumerate(curves.values()):
+        at = places(np.array(curve.counts), first)
+        rows += [
+            (number, repetition, at[place], curve.scores[repetition, place]) for repetition, place in curve.examined
+        ]
+    number, repetition, place, score = np.array(rows).T
+    return Marks(number.astype(np.intp), repetition.astype(np.intp), place, score)
+
+
+def _root(covariance: Floats) -> Floats:
+    """A matrix whose product with its transpose is a covariance, even one that rounding has made indefinite."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _may_rise_only(mean: Floats, covariance: Floats) -> bool:
+    """Whether the greatest fall of the mean is within doubt."""
+    fall = np.triu(mean[:, None] - mean)
+    early, late = np.unravel_index(np.argmax(fall), fall.shape)
+    variance = covariance[early, early] + covariance[late, late] - 2.0 * covariance[early, late]
+    return bool(fall[early, late] <= DOUBT * np.sqrt(max(variance, 0.0)))
+
+
+def _rising(drawn: Floats, sure: Floats) -> Floats:
+    """The rising curves nearest to those drawn (draws, counts), where these are surest above all.
+
+    Projecting a draw of a Gaussian process is a draw of a posterior of rising curves (Lin and Dunson 2014).
+    """
+    return np.array([isotonic_regression(one, weights=sure).x for one in drawn])
+
+
+def crossing(counts: Floats, scores: Floats, threshold: Floats, first: float) -> Floats:
+    """η of each draw: the number of target samples from which on the mean score stays converged; infinite where none.
+
+    Args:
+        counts: Numbers of target samples (counts,).
+        scores: Mean scores (draws, counts); NaN where there is no learner yet.
+        threshold: The lowest score that counts (draws,).
+        first: The number of target samples after which there is a learner.
+    """
+    above = scores - threshold[:, None]
+    below = ~(above >= 0.0)
+    last = np.where(below.any(axis=1), len(counts) - 1 - np.argmax(below[:, ::-1], axis=1), -1)
+    here, after = np.clip(last, 0, None), np.clip(last + 1, None, len(counts) - 1)
+    rows = np.arange(len(scores))
+    low, high = above[rows, here], above[rows, after]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(high > low, -low / (high - low), 1.0)
+    # Before anything is learnt there is no score to rise from, and the next place drawn may lie beyond the first count
+    rising = counts[here] + share * (counts[after] - counts[here])
+    between = np.where(np.isnan(low), np.maximum(first, counts[here]), rising)
+    return np.asarray(np.where(last < 0, counts[0], np.where(last == len(counts) - 1, np.inf, between)))

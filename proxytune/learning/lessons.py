@@ -1,14 +1,34 @@
-"""Lessons: θ drawn from p(θ) for each, and the expert's samples of many, whether it drives itself or a learner does."""
+"""Lessons: θ drawn from p(θ) for each, and the expert's samples of many, whether it drives itself or a learner does.
 
-from collections.abc import Mapping
+Arrays kept on disk by what determines them: made once, found again after any interruption.
+Examinations: what a policy scores in several episodes.
+Rehearsal: what a proxy taught is gone over again beside the target's samples, so that it is not forgotten.
+What target samples cost: those that the expert's driving gives, those that the learner's own gives, and labels.
+Which learner it was: a digest under which what it has learnt is kept.
+"""
+
+import hashlib
+import inspect
+import json
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
+from proxytune.arrays import Floats
 from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
-from proxytune.errors import LearnerError
+from proxytune.errors import EpisodeError, LearnerError, StoreError
+from proxytune.files import draft_of
+from proxytune.identity import meaning_of
+from proxytune.learning.learner import Learner
+from proxytune.learning.plv import general_plv
 from proxytune.seeds import lesson_seeds
+from proxytune.settings import Section
 from proxytune.space import Theta
 
 EXPERT = "expert"
@@ -118,3 +138,188 @@ def describe(where: Distribution) -> str:
         for name, (low, high) in where.bounds.items()
     ]
     return ", ".join(spans) or "nominal θ"
+
+
+Arrays = Mapping[str, NDArray[Any]]
+FACTS = "facts"
+"""The array in each file that says, as JSON, what determines the others."""
+
+
+@dataclass(frozen=True)
+class Cache:
+    """A folder of `KIND-DIGEST.npz`, each with its arrays and, as JSON, what determines them.
+
+    Attributes:
+        folder: Where it is; made when first written to.
+    """
+
+    folder: Path
+
+    def get(self, kind: str, facts: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
+        """The arrays that these facts determine, made and kept where they are not there yet.
+
+        A file is whole or not there at all, so several processes may use one cache, and a killed one leaves no harm.
+
+        Args:
+            kind: What they are, the beginning of the file's name.
+            facts: All that determines them, as JSON has it.
+            make: Makes them.
+
+        Raises:
+            StoreError: If the folder cannot be written, or a file in it is damaged.
+        """
+        path = self.path(kind, facts)
+        if not path.exists():
+            _write(path, {**make(), FACTS: np.array(_text(facts))})
+        return _read(path)
+
+    def path(self, kind: str, facts: Mapping[str, Any]) -> Path:
+        """Where the arrays of these facts are, or would be."""
+        return self.folder / f"{kind}-{digest(facts)}.npz"
+
+    def has(self, kind: str, facts: Mapping[str, Any]) -> bool:
+        """Whether they are there."""
+        return self.path(kind, facts).exists()
+
+
+def digest(facts: Mapping[str, Any]) -> str:
+    """A short name for facts, the same whatever their order."""
+    return hashlib.sha256(_text(facts).encode()).hexdigest()[:20]
+
+
+def _text(facts: Mapping[str, Any]) -> str:
+    return json.dumps(facts, sort_keys=True, allow_nan=False)
+
+
+def _write(path: Path, arrays: Arrays) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with draft_of(path) as draft, draft.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+    except OSError as problem:
+        raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
+
+
+def _read(path: Path) -> Arrays:
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files if name != FACTS}
+    # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.
+    except Exception as problem:
+        raise StoreError(f"{path}: is damaged ({problem}); delete it, and run again to make it anew") from None
+
+
+def examine(classroom: Classroom, episodes: Sequence[Episode], policy: Policy) -> list[float]:
+    """The score of a policy in each episode, all at once where the classroom can do that.
+
+    Raises:
+        EpisodeError: If the domain or the policy fails, or a score is missing or no finite number.
+    """
+    together = getattr(classroom, "examine_together", None)
+    if together is None:
+        scores = [classroom.examine(episode, policy) for episode in episodes]
+    else:
+        scores = list(together(episodes, policy))
+    if len(scores) != len(episodes):
+        raise EpisodeError(
+            f"examine_together gave {len(scores)} scores for {len(episodes)} episodes; give each its own"
+        )
+    for start, score in enumerate(scores):
+        if not math.isfinite(score):
+            raise EpisodeError(f"the examination from start {start} gave {score!r}; give a finite score")
+    return scores
+
+
+def mix_samples(new: Demonstration, earlier: Demonstration, share: float) -> Demonstration:
+    """The new samples, then so many of the earlier ones that these are this share of all, or all that there are.
+
+    Those taken lie evenly over the earlier ones, and so over their lessons.
+
+    Args:
+        new: Samples of the target.
+        earlier: Samples of the proxy.
+        share: Share of the earlier ones among all, from 0 to below 1.
+    """
+    wanted = min(len(earlier.commands), round(len(new.commands) * share / (1.0 - share)))
+    rows = np.linspace(0, len(earlier.commands) - 1, wanted).round().astype(int)
+    return Demonstration(
+        np.concatenate((new.observations, earlier.observations[rows])),
+        np.concatenate((new.commands, earlier.commands[rows])),
+    )
+
+
+KEYS = ("off_policy", "on_policy", "label")
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What one target sample costs, in any one unit.
+
+    Attributes:
+        off_policy: One that the expert's driving gives.
+        on_policy: One that the learner's own driving gives.
+        label: One answer of the expert, on top of either.
+    """
+
+    off_policy: float = 1.0
+    on_policy: float = 1.0
+    label: float = 0.0
+
+    @property
+    def per_sample(self) -> tuple[float, float]:
+        """All that one on-policy sample costs, and one off-policy sample."""
+        return self.on_policy + self.label, self.off_policy + self.label
+
+
+def read_costs(section: Section) -> Costs:
+    """Read the table [teaching.costs].
+
+    Raises:
+        SettingsError: With file, key and remedy.
+    """
+    section.only(KEYS)
+    return Costs(**{key: section.number(key, getattr(Costs, key), low=0.0) for key in KEYS})
+
+
+def split_samples(count: Floats | float, expert_drives: float) -> tuple[Floats, Floats]:
+    """On-policy and off-policy samples among so many, of which the expert drives for the first ones.
+
+    Args:
+        count: How many samples, of any shape.
+        expert_drives: The number from which on the learner drives itself; infinite where it never does.
+    """
+    off = np.minimum(count, expert_drives)
+    with np.errstate(invalid="ignore"):
+        return np.where(off < count, np.subtract(count, off), 0.0), off
+
+
+def cost_saved(costs: Costs, *, without: tuple[Floats, Floats], with_proxy: tuple[Floats, Floats]) -> Floats:
+    """PLV in cost: what the target samples cost that are needed without a proxy, less those needed with it.
+
+    Args:
+        costs: Of one sample and label.
+        without: On-policy and off-policy samples needed without the proxy, as `split_samples` has them.
+        with_proxy: The same with it.
+    """
+    cost_on, cost_off = costs.per_sample
+    paid, paid_with = _with_a_price(costs, without), _with_a_price(costs, with_proxy)
+    return general_plv(without=paid, with_proxy=paid_with, cost_on=cost_on, cost_off=cost_off)  # eq. (6)
+
+
+def _with_a_price(costs: Costs, samples: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Samples without those that cost nothing, of which there may be infinitely many."""
+    on, off = (np.where(price > 0.0, count, 0.0) for price, count in zip(costs.per_sample, samples, strict=True))
+    return on, off
+
+
+def learner_identity(learner: Learner) -> str:
+    """A digest of a learner's settings, as its `repr` tells them, and of what its code means.
+
+    Its code is its class's module and the modules in the same folder from which that has taken classes or functions.
+    """
+    module = sys.modules[type(learner).__module__]
+    source = Path(inspect.getfile(type(learner)))
+    taken = {getattr(value, "__module__", None) for value in vars(module).values()}
+    files = {Path(file) for name in taken if (file := getattr(sys.modules.get(str(name)), "__file__", None))}
+    code = meaning_of({source, *(file for file in files if file.parent == source.parent)}, source.parent)
+    return hashlib.sha256(code.encode() + repr(learner).encode()).hexdigest()[:16]

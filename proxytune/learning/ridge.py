@@ -9,12 +9,11 @@ from sklearn.kernel_approximation import RBFSampler
 from sklearn.linear_model import Ridge
 from threadpoolctl import threadpool_limits
 
+from proxytune.arrays import Floats
 from proxytune.domain import Demonstration
 from proxytune.errors import LearnerError
+from proxytune.learning.cloning import grey_cells
 from proxytune.learning.learner import Weights
-from proxytune.learning.pictures import grey_cells
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -61,9 +60,9 @@ class RandomFeatures:
             fitted = Ridge(alpha=self.penalty, fit_intercept=False, solver="cholesky").fit(seen, left)
         return {**before, "slopes": before["slopes"] + fitted.coef_.T}
 
-    def act(self, weights: Weights, observation: NDArray[np.uint8]) -> Array:
+    def act(self, weights: Weights, observation: NDArray[np.uint8]) -> Floats:
         """The command for one picture, within [−1, 1]."""
-        command: Array = weights["centre"] + self._waves(weights, observation[None])[0] @ weights["slopes"]
+        command: Floats = weights["centre"] + self._waves(weights, observation[None])[0] @ weights["slopes"]
         return np.clip(command, -1.0, 1.0)
 
     def _nothing(self, samples: Demonstration, seed: int) -> Weights:
@@ -71,17 +70,17 @@ class RandomFeatures:
         slopes = np.zeros((self.features, samples.commands.shape[1]))
         return {"seed": np.array(seed), "centre": samples.commands.mean(axis=0), "slopes": slopes}
 
-    def _waves(self, weights: Weights, pictures: NDArray[np.uint8]) -> Array:
+    def _waves(self, weights: Weights, pictures: NDArray[np.uint8]) -> Floats:
         """Random features (n, features) of pictures, always the same for the same weights."""
         cells = grey_cells(pictures, top=self.top, rows=self.rows, columns=self.columns)
         gamma = 0.5 / (cells.shape[1] * self.reach**2)
         directions, phases = _draw_waves(cells.shape[1], self.features, gamma, int(weights["seed"]))
-        waves: Array = np.sqrt(2.0 / self.features) * np.cos(cells @ directions + phases)
+        waves: Floats = np.sqrt(2.0 / self.features) * np.cos(cells @ directions + phases)
         return waves
 
 
 @functools.lru_cache(maxsize=8)
-def _draw_waves(cells: int, features: int, gamma: float, seed: int) -> tuple[Array, Array]:
+def _draw_waves(cells: int, features: int, gamma: float, seed: int) -> tuple[Floats, Floats]:
     """Directions (cells, features) and phases (features,) of the waves that approximate a Gaussian kernel."""
     sampler = RBFSampler(gamma=gamma, n_components=features, random_state=seed).fit(np.zeros((1, cells)))
     return sampler.random_weights_, sampler.random_offset_

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from proxytune.learning.costs import Array, Costs, cost_saved, read_costs, split_samples
-from proxytune.learning.lessons import Distribution
-from proxytune.learning.published import Published, read_published
-from proxytune.learning.spending import FIRST_COUNTS, FIRST_REPETITIONS
+from proxytune.arrays import Floats
+from proxytune.learning.lessons import Costs, Distribution, cost_saved, read_costs, split_samples
+from proxytune.learning.plv import FIRST_COUNTS, FIRST_REPETITIONS, Published, read_published
 from proxytune.settings import Section
 
 DEFAULT_LEARNER = "proxytune.learning.cloning:BehaviourCloning"
@@ -88,7 +87,7 @@ class TeachingSettings:
             return math.inf
         return 0.0 if with_proxy else float(self.target_samples[1])
 
-    def cost_saved(self, *, without: Array | float, needed: Array | float) -> Array:
+    def cost_saved(self, *, without: Floats | float, needed: Floats | float) -> Floats:
         """PLV in cost (eq. 6), from the target samples needed without a proxy and with it, of any shape."""
         alone = split_samples(without, self.expert_drives(with_proxy=False))
         helped = split_samples(needed, self.expert_drives(with_proxy=True))

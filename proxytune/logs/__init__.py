@@ -1,6 +1,5 @@
 """Logs: commands and measured poses of a robot, as a folder with log.toml, samples.csv and maybe commands.csv."""
 
-from proxytune.logs.log import COMMANDS, GEOMETRY, Frames, Log, LogEpisode, Measured
-from proxytune.logs.reading import read_log
+import lazy_loader
 
-__all__ = ["COMMANDS", "GEOMETRY", "Frames", "Log", "LogEpisode", "Measured", "read_log"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,10 +7,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
+from proxytune.arrays import Floats, Whole
 
 COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {

@@ -17,8 +17,8 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 from PIL import Image
 
-from proxytune.drafts import draft_of
 from proxytune.errors import RunError
+from proxytune.files import draft_of
 
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """What is left out of files, so that the same figure gives the same bytes."""

@@ -1,1 +1,5 @@
 """Running episodes: in this process or several, with progress."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

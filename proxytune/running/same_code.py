@@ -7,7 +7,7 @@ from pathlib import Path
 from platform import node, python_version
 
 from proxytune.errors import InputError
-from proxytune.versions import version_changes, versions_of
+from proxytune.identity import version_changes, versions_of
 
 PACKAGES = ("numpy", "scipy", "scikit-learn", "pybullet", "joblib", "distributed")
 HOME = Path(__file__).resolve().parent.parent

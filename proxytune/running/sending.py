@@ -13,9 +13,7 @@ from functools import lru_cache
 from typing import Any, cast
 
 from proxytune.errors import RunError
-from proxytune.extensions import describe, place_of
-from proxytune.extensions.beside import folders, open_folders
-from proxytune.extensions.travelling import Packed, pack, unpack
+from proxytune.extensions import Packed, describe, folders, open_folders, pack, place_of, unpack
 from proxytune.running.same_code import check_code
 
 WATCH_S = 0.5

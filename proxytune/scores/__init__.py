@@ -1,18 +1,5 @@
 """Score tables: how well each agent did, episode by episode, and the metrics that judge it."""
 
-from proxytune.scores.cells import column_names
-from proxytune.scores.files import read_domains, read_scores, write_scores
-from proxytune.scores.metric import ROUNDING, Array, Metric, varies
-from proxytune.scores.table import ScoreTable
+import lazy_loader
 
-__all__ = [
-    "ROUNDING",
-    "Array",
-    "Metric",
-    "ScoreTable",
-    "column_names",
-    "read_domains",
-    "read_scores",
-    "varies",
-    "write_scores",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,26 +1,32 @@
-"""A Gaussian process of the score over the search box: what the finished trials say of every θ."""
+"""A Gaussian process of the score over the search box: what the finished trials say of every θ.
+
+Bayesian optimisation: expected improvement over a Gaussian process of the finished trials.
+
+Of a pending trial it believes the posterior mean given the finished ones (Ginsbourger, Le Riche and Carraro, Kriging is
+well-suited to parallelize optimization, 2010): nothing is left to be learnt there, so the next proposal goes elsewhere.
+"""
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 from threadpoolctl import threadpool_limits
 
+from proxytune.arrays import Floats
 from proxytune.errors import RunError
-from proxytune.search.design import to_unit
-from proxytune.search.proposer import Trial, Values
+from proxytune.search.engine import Engine, Look, from_unit, to_unit, unit_points
+from proxytune.search.loop import Trial, Values, with_failures_as_worst
+from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 
-# Loading scikit-optimize takes longer than all else that a figure needs, so it waits for the first fit.
 if TYPE_CHECKING:
     from skopt.learning import GaussianProcessRegressor
     from skopt.learning.gaussian_process.kernels import ConstantKernel
 
-Array = NDArray[np.float64]
+# Loading scikit-optimize takes longer than all else that a figure needs, so it waits for the first fit.
 
 
 @dataclass(frozen=True)
@@ -72,26 +78,26 @@ class Surrogate:
         """Standard deviation of one score around the mean, the steps included; in the score's unit."""
         return float(np.sqrt(self.model.noise_) * self.model.y_train_std_)
 
-    def predict(self, unit: Array) -> tuple[Array, Array]:
+    def predict(self, unit: Floats) -> tuple[Floats, Floats]:
         """Posterior mean and standard deviation, noise excluded, at points (n, parameters) of the unit cube."""
         with threadpool_limits(limits=1), warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Predicted variances smaller than 0")
             mean, deviation = self.model.predict(unit, return_std=True)
         return mean, deviation
 
-    def mean(self, unit: Array) -> Array:
+    def mean(self, unit: Floats) -> Floats:
         """Posterior mean (n,) at points (n, parameters) of the unit cube."""
         with threadpool_limits(limits=1):
-            mean: Array = self.model.predict(unit)
+            mean: Floats = self.model.predict(unit)
         return mean
 
-    def joint(self, unit: Array) -> tuple[Array, Array]:
+    def joint(self, unit: Floats) -> tuple[Floats, Floats]:
         """Posterior mean (n,) and covariance (n, n), noise excluded, at points (n, parameters) of the unit cube."""
         with threadpool_limits(limits=1):
             mean, covariance = self.model.predict(unit, return_cov=True)
         return mean, covariance
 
-    def at_visited(self) -> tuple[Array, Array]:
+    def at_visited(self) -> tuple[Floats, Floats]:
         """Posterior mean and standard deviation at the visited trials."""
         return self.predict(unit_array(self.space, [trial.values for trial in self.visited]))
 
@@ -125,7 +131,7 @@ def fit_surrogate(space: Space, trials: Sequence[Trial]) -> Surrogate:
         return Surrogate(space, model.fit(unit, scores), visited)
 
 
-def unit_array(space: Space, points: Sequence[Values]) -> Array:
+def unit_array(space: Space, points: Sequence[Values]) -> Floats:
     """Points of the box as an array (n, parameters) of the unit cube."""
     return np.array([to_unit(space, values) for values in points]).reshape(-1, len(space.intervals))
 
@@ -139,7 +145,9 @@ def prior_kernel(dimensions: int) -> "ConstantKernel":
     return ConstantKernel(AMPLITUDE.median, AMPLITUDE.bounds) * smooth + WhiteKernel(NOISE.median, NOISE.bounds)
 
 
-def most_probable(misfit: Callable[[Array], tuple[float, Array]], start: Array, bounds: Array) -> tuple[Array, float]:
+def most_probable(
+    misfit: Callable[[Floats], tuple[float, Floats]], start: Floats, bounds: Floats
+) -> tuple[Floats, float]:
     """The hyperparameters' logarithms of highest posterior density, as the regressor's optimiser.
 
     Args:
@@ -149,10 +157,105 @@ def most_probable(misfit: Callable[[Array], tuple[float, Array]], start: Array, 
     """
     spread = np.array([AMPLITUDE.spread, *[LENGTH_SCALE.spread] * (len(start) - 2), NOISE.spread])
 
-    def improbable(logarithms: Array) -> tuple[float, Array]:
+    def improbable(logarithms: Floats) -> tuple[float, Floats]:
         value, gradient = misfit(logarithms)
         distance = (logarithms - start) / spread
         return value + 0.5 * float(distance @ distance), gradient + distance / spread
 
     found = minimize(improbable, start, jac=True, bounds=Bounds(bounds[:, 0], bounds[:, 1]), method="L-BFGS-B")
     return np.asarray(found.x), float(found.fun)
+
+
+CLOUD = 2048
+REFINED = 8
+WIDTHS = (0.05, 0.015, 0.005)
+SAME = 0.1
+"""Points closer than this, divided by the number of trials, in every parameter (in widths of the box) are the same
+point: a deterministic score has nothing new to say there."""
+
+
+@dataclass(frozen=True)
+class GaussianProcess:
+    """Proposes where the score is expected to improve most.
+
+    The improvement is measured from the best posterior mean among the visited points: the lowest score itself is
+    partly luck.
+    """
+
+    def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
+        """The next point, a function of the set of trials and the seed alone; never a point visited or pending.
+
+        Raises:
+            RunError: If no trial has a score.
+        """
+        with threadpool_limits(limits=1):
+            return from_unit(space, _most_promising(_believing(space, trials), proposal_seed(seed, len(trials)))[0])
+
+
+def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tuple[float, float]:
+    """The most that any θ is expected to improve the score, and the standard deviation of the score's noise.
+
+    Raises:
+        RunError: If no trial has a score.
+    """
+    surrogate = fit_surrogate(space, with_failures_as_worst(trials))
+    with threadpool_limits(limits=1):
+        _, gain = _most_promising(surrogate, proposal_seed(seed, len(trials)))
+    return gain, surrogate.noise_deviation
+
+
+def _believing(space: Space, trials: Sequence[Trial]) -> Surrogate:
+    """The surrogate of the trials, a pending one taken for one that scored what is expected of it."""
+    surrogate = fit_surrogate(space, trials)
+    pending = [trial for trial in trials if trial.pending]
+    if not pending:
+        return surrogate
+    means = surrogate.mean(unit_array(space, [trial.values for trial in pending]))
+    believed = [replace(trial, score=float(mean)) for trial, mean in zip(pending, means, strict=True)]
+    return fit_surrogate(space, [*surrogate.visited, *believed])
+
+
+def _most_promising(surrogate: Surrogate, seed: int) -> tuple[Floats, float]:
+    """The point of the unit cube with the highest expected improvement, and that."""
+    # Takes a second to load, so only where a point is looked for.
+    from skopt.acquisition import gaussian_ei
+
+    _, incumbent = surrogate.incumbent()
+    visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
+    return highest(lambda points: gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0), visited, seed)
+
+
+def highest(gain: Callable[[Floats], Floats], visited: Floats, seed: int) -> tuple[Floats, float]:
+    """The unvisited point of the unit cube that promises the highest gain, and that: a Sobol cloud, then closer looks.
+
+    Args:
+        gain: What points (n, parameters) promise, shape (n,).
+        visited: The points that are not to be proposed again, shape (trials, parameters).
+        seed: Seeds the clouds.
+    """
+    dimensions = visited.shape[1]
+    points = _new(unit_points(dimensions, CLOUD, seed), visited)
+    gains = gain(points)
+    offsets = 2.0 * unit_points(dimensions, CLOUD // 16, seed + 1) - 1.0
+    for width in WIDTHS:
+        leaders = points[np.argsort(-gains, kind="stable")[:REFINED]]
+        around = np.clip(leaders[:, None, :] + width * offsets, 0.0, 1.0).reshape(-1, dimensions)
+        points = np.concatenate([leaders, _new(around, visited)])
+        gains = gain(points)
+    best = int(np.argmax(gains))
+    return points[best], float(gains[best])
+
+
+def _new(points: Floats, visited: Floats) -> Floats:
+    """The points that are not the same as a visited one."""
+    distances = np.abs(points[:, None, :] - visited[None, :, :]).max(axis=2)
+    return np.asarray(points[distances.min(axis=1) > SAME / len(visited)])
+
+
+GAUSSIAN_PROCESS = Engine(
+    name="gp",
+    label="Gaussian process of the score",
+    summary="the θ whose score is expected to improve most, by a Gaussian process of the score",
+    make=GaussianProcess,
+    look=Look("#0072B2"),
+)

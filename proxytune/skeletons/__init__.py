@@ -1,1 +1,5 @@
 """What `new` writes: a working robot, study or family to start from."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

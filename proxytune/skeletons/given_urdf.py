@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.body import AXLES, Body, add_little_mass, origin_of, parse_urdf, read_body, sound_urdf
+from proxytune.driving import AXLES, Body, add_little_mass, origin_of, parse_urdf, read_body, sound_urdf
 from proxytune.errors import InputError
-from proxytune.skeletons.robot import Known, check_figures, completed, robot_text, then
-from proxytune.skeletons.skeleton import Skeleton
+from proxytune.skeletons.writing import Known, Skeleton, check_figures, completed, robot_text, then
 
 WHEELS = ("wheel_radius", "wheel_distance")
 """Of these robot.toml and URDF must say the same: the bullet plant drives by both."""

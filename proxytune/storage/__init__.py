@@ -1,1 +1,5 @@
 """What a study keeps: study.db, its rows and its lock."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

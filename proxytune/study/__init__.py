@@ -1,1 +1,5 @@
 """A study: settings, episodes in parallel, the database that remembers them, and the loop."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

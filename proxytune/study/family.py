@@ -1,19 +1,117 @@
-"""The domain family that a study names, loaded and checked."""
+"""The domain family that a study names, loaded and checked.
+
+A domain family that is not proxytune's own, as a study asks it: guarded, and by the study's names of agents.
+What the code means that a user brings to a study: its failures are remembered until it changes.
+"""
 
 import functools
+import hashlib
 import inspect
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from proxytune.domain import DomainFamily
+from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import ExtensionError, InputError, ProxytuneError
 from proxytune.extensions import ask, describe, is_users, load, place_of
+from proxytune.identity import meaning_of, modules_beside
 from proxytune.settings import nearest
 from proxytune.space import Parameter
 from proxytune.study.settings import StudySettings
-from proxytune.study.user_family import UserFamily, has_member
+
+MISSING = object()
+ON_EPISODES = ("run", "record", "drive", "replay", "demonstrate", "guide", "examine")
+"""Methods whose first argument is an episode."""
+ON_SEVERAL = ("examine_together",)
+"""Methods whose first argument is a list of them."""
+
+
+@dataclass(frozen=True)
+class UserFamily:
+    """A domain family whose members are asked for one by one; what one of them raises is one line.
+
+    Attributes:
+        family: The family.
+        name: Where it comes from, as a complaint names it.
+        aliases: Pairs of an agent's name in the study and the name by which the family loads it.
+    """
+
+    family: Any
+    name: str
+    aliases: tuple[tuple[str, str], ...] = ()
+
+    def __getattr__(self, member: str) -> Any:
+        """Any member of the family.
+
+        Raises:
+            AttributeError: If it has no such member.
+            ExtensionError: If asking for it raises.
+        """
+        if member.startswith("__"):
+            raise AttributeError(member)
+        value = ask(f"{member} of {self.name}", functools.partial(self._member, member))
+        if value is MISSING:
+            raise AttributeError(f"{self.name} has no '{member}'")
+        if self.aliases and member in ON_EPISODES:
+            return functools.partial(self._on_episode, value)
+        return functools.partial(self._on_several, value) if self.aliases and member in ON_SEVERAL else value
+
+    @property
+    def identity(self) -> str:
+        """The family's; other agents behind the same names make it another."""
+        return self._named(self._text("identity"))
+
+    @property
+    def earlier_identities(self) -> tuple[str, ...]:
+        """The family's, if it has any."""
+        earlier = ask(f"earlier_identities of {self.name}", lambda: self._member("earlier_identities"))
+        return () if earlier is MISSING else tuple(map(self._named, earlier))
+
+    def check_agent(self, name: str) -> None:
+        """Refuse an agent that the family cannot run.
+
+        Raises:
+            InputError: If there is no such agent, or looking for it raises.
+        """
+        loaded = self._loaded(name)
+        ask(f"check_agent('{loaded}') of {self.name}", functools.partial(self.family.check_agent, loaded))
+
+    def _member(self, member: str) -> Any:
+        # A property that raises AttributeError is no missing one.
+        if has_member(self.family, member):
+            return getattr(self.family, member)
+        return MISSING
+
+    def _text(self, member: str) -> str:
+        value = ask(f"{member} of {self.name}", functools.partial(getattr, self.family, member))
+        if not isinstance(value, str):
+            raise ExtensionError(f"{member} of {self.name} must be text, got {type(value).__name__}")
+        return value
+
+    def _loaded(self, agent: str) -> str:
+        return dict(self.aliases).get(agent, agent)
+
+    def _named(self, identity: str) -> str:
+        text = repr((identity, sorted(self.aliases))).encode()
+        return hashlib.sha256(text).hexdigest()[:16] if self.aliases else identity
+
+    def _on_episode(self, method: Callable[..., Any], episode: Episode, *rest: Any, **named: Any) -> Any:
+        return method(self._loaded_in(episode), *rest, **named)
+
+    def _on_several(self, method: Callable[..., Any], episodes: Sequence[Episode], *rest: Any, **named: Any) -> Any:
+        return method([self._loaded_in(episode) for episode in episodes], *rest, **named)
+
+    def _loaded_in(self, episode: Episode) -> Episode:
+        return replace(episode, agent=self._loaded(episode.agent))
+
+
+def has_member(family: Any, member: str) -> bool:
+    """Whether there is such a member, be it a property that raises."""
+    return inspect.getattr_static(family, member, MISSING) is not MISSING or hasattr(family, member)
+
 
 MEMBERS: Mapping[str, tuple[type, str]] = {
     "identity": (str, "text"),
@@ -147,3 +245,20 @@ def check_bounds(
         raise settings.error("family", f"parameters['{name}'] of {settings.family} must be a Parameter, got {kind}")
     if bounds[0] < known.low or bounds[1] > known.high:
         raise settings.error(key, f"must lie within [{known.low:g}, {known.high:g}], got {given}")
+
+
+def code_of(settings: StudySettings) -> str:
+    """A digest of the modules in a study's folder, and of installed ones that its family and its agents come from.
+
+    Modules that these import in turn are not looked at where they lie elsewhere.
+    """
+    names = {name.partition(":")[0] for name in (settings.family, *settings.loaded_agents) if ":" in name}
+    installed = [_meaning_of_installed(name) for name in sorted(names) if not name.startswith("proxytune.")]
+    own = meaning_of(modules_beside(settings.folder), settings.folder)
+    return hashlib.sha256(repr((own, installed)).encode()).hexdigest()[:16]
+
+
+def _meaning_of_installed(name: str) -> str:
+    """What an imported module means; empty where it has no file, or lies in the study's folder."""
+    file = getattr(sys.modules.get(name), "__file__", None)
+    return meaning_of([Path(file)], Path(file).parent) if file and Path(file).is_file() else ""

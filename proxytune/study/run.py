@@ -1,26 +1,26 @@
-"""The search of a study: its trials proposed, simulated and scored, until the budget is spent or a rule says stop."""
+"""The search of a study: its trials proposed, simulated and scored, until the budget is spent or a rule says stop.
+
+A study scored anew by other metrics or tolerances, from the episodes it has; nothing is simulated.
+Trials with failed episodes, once the code that failed has been corrected.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from proxytune.errors import RunError, SettingsError, StoreError
-from proxytune.search.loop import Propose, Search
-from proxytune.search.proposer import Proposer, Trial
-from proxytune.storage.records import State, TrialRecord
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import Evaluation
-from proxytune.study.founded import check_scores
-from proxytune.study.objective import Objective
-from proxytune.study.provenance import CODE, SEARCH, adopt, differ
+from proxytune.errors import InputError, RunError, SettingsError, StoreError
+from proxytune.scores import Metric
+from proxytune.search import Propose, Proposer, Search, Trial
+from proxytune.settings import nearest
+from proxytune.storage import State, Store, TrialRecord
+from proxytune.study.facts import CODE, DESCRIBED, SEARCH, adopt, check_scores, describe, differ
+from proxytune.study.opening import Objective, Study, changes, read_target, study_facts
+from proxytune.study.preflight import FACT as NOT_REPEATABLE
+from proxytune.study.preflight import check_some_work
+from proxytune.study.pruning import Cut, by_other_metrics, reference, run_or_cut, stopped
+from proxytune.study.result import StudyResult, result_of
 from proxytune.study.settings import LEARNING
-from proxytune.study.stages.cutting import Cut, reference, run_or_cut
-from proxytune.study.stages.failing import check_some_work
-from proxytune.study.stages.repeatable import FACT as NOT_REPEATABLE
-from proxytune.study.stages.stopping import stopped
-from proxytune.study.study import Study, changes, facts
-from proxytune.study.study_run import StudyRun
-from proxytune.study.without_code import DESCRIBED, describe
+from proxytune.study.study_run import Evaluation, StudyRun, plan
 
 OTHERS = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE)
 """Facts that trials do not depend on: of a search for learning value, which code proposed what, looks, and agents."""
@@ -137,7 +137,7 @@ def check_facts(run: StudyRun) -> None:
     """
     study, store = run.study, run.store
     adopt(study, store)
-    before, after = _facts_before(study, store), facts(study)
+    before, after = _facts_before(study, store), study_facts(study)
     if before == after:
         describe(study, store)
         check_scores(run)
@@ -169,7 +169,7 @@ def as_stored(study: Study, store: Store) -> Study:
     """
     before = _facts_before(study, store)
     then = replace(study, identity=before.get("identity", study.identity))
-    after = facts(then)
+    after = study_facts(then)
     if before and differ(before, after):
         raise _changed(then, store, {**before, **{key: after[key] for key in CODE if key in after}})
     return then
@@ -188,7 +188,7 @@ def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsE
     where = f"{settings.path}: {settings.family_name and f'families.{settings.family_name}: '}"
     database = store.path if settings.family_name else store.path.name
     return SettingsError(
-        f"{where}changed since the first trial: {', '.join(changes(before, facts(study)))}; "
+        f"{where}changed since the first trial: {', '.join(changes(before, study_facts(study)))}; "
         f"put it back, or move {database} away to start again"
     )
 
@@ -199,3 +199,58 @@ def record(number: int, evaluation: Evaluation) -> TrialRecord:
     score, measures = evaluation.score, evaluation.measures if state == "finished" else {}
     failed = len(evaluation.failures)
     return TrialRecord(number, evaluation.theta, state, score, measures, failed, evaluation.failure)
+
+
+def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:
+    """The study with its agents compared by these metrics instead.
+
+    Raises:
+        InputError: If the domain family or the target's table lacks one, or one is named twice.
+    """
+    names = [metric.name for metric in metrics]
+    for name in names:
+        if name not in study.family.metrics:
+            raise InputError(f"--metric {name}: no such metric; {nearest(name, study.family.metrics)}")
+        if names.count(name) > 1:
+            raise InputError(f"--metric {name}: is given twice; give each metric once")
+    settings = replace(study.settings, metrics=tuple(metrics))
+    return replace(study, settings=settings, target=read_target(settings, study.family)[0])
+
+
+def rescored(run: StudyRun, metrics: Sequence[Metric]) -> StudyResult:
+    """The result that the study's trials give by these metrics; they remain those that its own metrics led to.
+
+    Raises:
+        InputError: If a metric cannot be used.
+        RunError: If no trial has a score, or episodes are missing.
+    """
+    own, other = run.finished_trials(), run.of(with_metrics(run.study, metrics))
+    trials = [_rescored(other, trial) for trial in own]
+    return replace(result_of(other, trials), stopped=stopped(run, own))
+
+
+def _rescored(other: StudyRun, trial: TrialRecord) -> TrialRecord:
+    if trial.state == "cut":
+        return by_other_metrics(other, trial)
+    return record(trial.number, other.evaluation_of(trial))
+
+
+def retry_failed(run: StudyRun) -> None:
+    """Drive failed episodes of ended trials again where the user's code has changed since, and score these trials anew.
+
+    Such a trial is driven in full, also if it was cut off before. θ of later trials stay what they are.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+    """
+    for trial in run.finished_trials():
+        if trial.failed_episodes and _has_changed(run, trial):
+            run.outcomes(plan(run.settings, trial.theta, run.settings.seed), f"trial {trial.number} again")
+            run.save_trials(record(trial.number, run.evaluation_of(trial)))
+
+
+def _has_changed(run: StudyRun, trial: TrialRecord) -> bool:
+    """Whether episodes are to be tried again, or were before this process and are not in the trial yet."""
+    known = run.known(run.episodes_of(trial))
+    failed = [episode for episode, outcome in known.items() if outcome.metrics is None]
+    return len(failed) != trial.failed_episodes or any(episode in run.corrected for episode in failed)

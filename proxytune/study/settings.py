@@ -1,20 +1,193 @@
-"""What study.toml says, read strictly."""
+"""What study.toml says, read strictly.
 
+What a study.toml compares: metrics, agents, and the files of the target's scores.
+Rules that end a study before its budget is spent, as study.toml gives them.
+Files beside a study that its agents may read, and whose changes nobody notices.
+The table [families] of a study.toml: each of them is the same study of another simulator.
+"""
+
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from proxytune.errors import InputError
-from proxytune.learning.settings import TeachingSettings, read_teaching
+from proxytune.identity import files_beside, is_module
+from proxytune.learning import TeachingSettings, read_teaching
 from proxytune.scores import Metric
-from proxytune.search.engines.registry import DEFAULT_ENGINE, SCORE_ENGINE
+from proxytune.search import DEFAULT_ENGINE, SCORE_ENGINE
 from proxytune.settings import Section, nearest, read_settings
 from proxytune.space import Interval, Space
-from proxytune.storage.own_files import FAMILIES
-from proxytune.study.families.reading import family_tables, study_around
-from proxytune.study.sides import agents_of, aliases_of, metrics_of, targets_of, texts_of
-from proxytune.study.stop_rules import StopRules, positive, read_stop_rules
+from proxytune.storage import FAMILIES
+
+
+def metrics_of(read: Section) -> tuple[Metric, ...]:
+    """How agents are compared."""
+    try:
+        metrics = tuple(Metric.parse(text) for text in read.texts("metrics"))
+    except InputError as problem:
+        raise read.error("metrics", str(problem)) from None
+    names = [metric.name for metric in metrics]
+    if not names:
+        raise read.error("metrics", 'is empty; give at least one, as in ["distance:max"]')
+    if len(set(names)) < len(names):
+        raise read.error("metrics", f"names a metric twice: {', '.join(names)}")
+    return metrics
+
+
+def agents_of(read: Section) -> tuple[str, ...]:
+    """The agents, as tables have them."""
+    agents = tuple(aliases_of(read)) or read.texts("agents")
+    if len(agents) < 2:
+        raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
+    return agents
+
+
+def targets_of(read: Section) -> tuple[str, ...]:
+    """The file of the target's scores, or several."""
+    if not isinstance(read.values.get("target"), list):
+        return (read.text("target"),)
+    return read.texts("target") or (read.text("target"),)
+
+
+def aliases_of(read: Section) -> dict[str, str]:
+    """The table [agents], where it is one: name in tables to what is loaded."""
+    return texts_of(read.section("agents")) if isinstance(read.values.get("agents"), dict) else {}
+
+
+def texts_of(table: Section) -> dict[str, str]:
+    """The texts of a table, by key."""
+    return {name: table.text(name) for name in table.values}
+
+
+@dataclass(frozen=True)
+class StopRules:
+    """When a study ends before its budget is spent; None where a rule is not asked for.
+
+    Attributes:
+        wall_time_s: After the trial with which its episodes have taken so long [s], all runs together.
+        no_improvement: Once the most that any θ is expected to improve the score is less than this, in standard
+            deviations of the score's noise.
+    """
+
+    wall_time_s: float | None = None
+    no_improvement: float | None = None
+
+
+def read_stop_rules(rules: Section) -> StopRules:
+    """The rules of a table [stop].
+
+    Raises:
+        SettingsError: With the key and the remedy.
+    """
+    rules.only(("wall_time_s", "no_improvement"))
+    return StopRules(positive(rules, "wall_time_s"), positive(rules, "no_improvement"))
+
+
+def positive(table: Section, key: str) -> float | None:
+    """A number above 0; None where it is missing.
+
+    Raises:
+        SettingsError: If it is none.
+    """
+    if key not in table.values:
+        return None
+    value = table.number(key)
+    if value <= 0.0:
+        raise table.error(key, f"must be above 0, got {value:g}; remove it to have no such rule")
+    return value
+
+
+SUFFIXES = (
+    ".ckpt",
+    ".h5",
+    ".joblib",
+    ".keras",
+    ".npy",
+    ".npz",
+    ".onnx",
+    ".pickle",
+    ".pkl",
+    ".pt",
+    ".pth",
+    ".safetensors",
+    ".tflite",
+)
+MADE = ("families", "figures", "loop", "rescored", "teaching")
+"""Folders that running a study makes."""
+NAMED = 3
+"""So many files are named at most."""
+
+
+def unnoticed(folder: Path) -> tuple[str, ...]:
+    """One line on files of weights beside a study that has modules of its own; none where there are none."""
+    files = files_beside(folder)
+    names = [path.relative_to(folder).as_posix() for path in files if path.suffix.lower() in SUFFIXES]
+    names = [name for name in names if name.split("/")[0] not in MADE]
+    if not names or not any(is_module(path) for path in files):
+        return ()
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return (
+        f"{', '.join(names[:NAMED])}{more}: if agents read this, a change in it is not noticed; "
+        "give agents whose weights change another name",
+    )
+
+
+FAMILY_KEYS = ("family", "proxy", "domain", "parameters")
+OF_ONE_FAMILY = ("domain", "proxy", "truth")
+"""Keys of a study that say nothing to another domain family than its own."""
+FEWEST = 2
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+
+
+def study_around(folder: Path, file_name: str) -> Path | None:
+    """The study.toml of which this folder is a family's; None if it is none."""
+    home = folder if folder.name and folder.parent.name else folder.absolute()
+    around = home.parent.parent / file_name
+    own = (home / file_name).exists()
+    return around if home.parent.name == FAMILIES and not own and around.is_file() else None
+
+
+def family_tables(read: Section, family: str, name: str) -> dict[str, Section]:
+    """The study.toml of each family, by its name: the study's own keys, those of its table over them.
+
+    Args:
+        read: The study.toml.
+        family: The study's own domain family: of [domain], `proxy` and `truth` another one knows nothing.
+        name: What the study is called.
+
+    Raises:
+        SettingsError: With file, key and remedy.
+    """
+    if FAMILIES not in read.values:
+        return {}
+    tables = read.section(FAMILIES)
+    for one in tables.values:
+        _check_name(tables, one)
+    if len(tables.values) < FEWEST:
+        told = f"comparing takes at least two families, got {len(tables.values)}"
+        raise read.error(FAMILIES, f"{told}; add one, as in [families.planar]")
+    lower = [one.lower() for one in tables.values]
+    if len(set(lower)) < len(lower):
+        raise read.error(FAMILIES, "two names differ in nothing but capitals, as folders' names cannot everywhere")
+    return {one: _overlaid(read, tables.section(one), family, f"{name}_{one}") for one in tables.values}
+
+
+def _check_name(tables: Section, name: str) -> None:
+    if not NAME.fullmatch(name):
+        raise tables.error(name, "is the name of a folder too; use up to 64 letters, digits, - and _, no other sign")
+
+
+def _overlaid(read: Section, table: Section, family: str, name: str) -> Section:
+    table.only(FAMILY_KEYS)
+    alike = table.text("family", family) == family
+    kept = {key: value for key, value in read.values.items() if alike or key not in OF_ONE_FAMILY}
+    own = {key: table.values[key] for key in ("family", "proxy", "parameters") if key in table.values}
+    domain: Mapping[str, Any] = {**kept.get("domain", {}), **table.section("domain").values}
+    values = {**kept, **own, "domain": domain, "name": name}
+    return Section(read.path, f"{table.name.removesuffix('.')}: ", {k: v for k, v in values.items() if k != FAMILIES})
+
 
 DEFAULT_FAMILY = "proxytune.driving.family:lane_following"
 FILE_NAME = "study.toml"

@@ -1,31 +1,185 @@
-"""A study under way: what it needs of its domain family is simulated once, kept in the store, and remembered."""
+"""A study under way: what it needs of its domain family is simulated once, kept in the store, and remembered.
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+Scoring one domain instance: all agents from all starts, compared with the target.
+A study as a search sees it: its trials' scores, and each agent's mean of every metric that both sides have.
+A study with another budget or other jobs than its study.toml says: its trials do not depend on either.
+Scoring a study's agents in one fixed domain: how a twin's target.csv is made.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 
-from proxytune.domain import Episode, Instance, Outcome, instance_of
-from proxytune.errors import EpisodeError, RunError
-from proxytune.running.episodes import ENDED, ENDLESS, Watch, running
-from proxytune.running.progress import Silent, Watcher
-from proxytune.search.proposer import Trial
-from proxytune.space import Theta
-from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import (
-    Evaluation,
-    Spent,
-    failure_of,
-    longest_first,
-    needed_metrics,
-    plan,
-    score,
-    with_metrics_needed,
-)
-from proxytune.study.outputs import outputs_of
-from proxytune.study.settings import StudySettings
-from proxytune.study.study import Study
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.domain import DomainFamily, Episode, Instance, Outcome, instance_of
+from proxytune.errors import EpisodeError, InputError, RunError
+from proxytune.running import ENDED, ENDLESS, Silent, Watch, Watcher, running
+from proxytune.scores import ScoreTable
+from proxytune.search import Compose, Trial, Values
+from proxytune.seeds import episode_seed, fresh_seed
+from proxytune.space import Space, Theta
+from proxytune.storage import Store, TrialRecord
+from proxytune.study.family import load_family
+from proxytune.study.opening import Study
+from proxytune.study.settings import LEARNING, StudySettings
+from proxytune.usefulness import dominance
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """How useful a domain instance is.
+
+    Attributes:
+        theta: The instance.
+        proxy: The agents' scores in it, over the episodes that worked; None if an agent has none.
+        measures: Every measure by name, the objective's among them; one that is undefined is None. Empty if an agent
+            has no episode that worked.
+        score: What the study makes small; None if there is none.
+        failures: The outcomes that failed.
+        failure: Why there is no score, empty if there is one.
+        disagreement: |α_proxy − α_target| of each pair of agents, in the order of their names, shape (agents, agents).
+    """
+
+    theta: Theta
+    proxy: ScoreTable | None
+    measures: Mapping[str, float | None]
+    score: float | None
+    failures: tuple[Outcome, ...]
+    failure: str = ""
+    disagreement: Floats | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def prpv(self) -> float | None:
+        """PRPV; None if an agent has no episode that worked."""
+        return self.measures.get("prpv")
+
+
+def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
+    """The episodes that score a domain instance: every agent from every start."""
+    instance, seeds = instance_of(theta), [episode_seed(seed, start) for start in range(settings.starts)]
+    return [Episode(instance, agent, start, own) for agent in settings.agents for start, own in enumerate(seeds)]
+
+
+def needed_metrics(settings: StudySettings, family: DomainFamily) -> list[str]:
+    """The metrics of a family that agents are compared by: an episode without one of them has failed."""
+    return [metric.name for metric in settings.metrics if metric.name in family.metrics]
+
+
+def with_metrics_needed(outcome: Outcome, needed: Sequence[str]) -> Outcome:
+    """The outcome; a failure where it lacks a metric that agents are compared by, as when these are others now."""
+    lacks = [name for name in needed if outcome.metrics is not None and name not in outcome.metrics]
+    return replace(outcome, metrics=None, failure=f"it has no finite '{lacks[0]}'") if lacks else outcome
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What a run has cost: episodes simulated, their time summed over all processes, and how many of them in vain."""
+
+    episodes: int = 0
+    seconds: float = 0.0
+    unused: int = 0
+
+    def __add__(self, other: "Spent") -> "Spent":
+        return Spent(self.episodes + other.episodes, self.seconds + other.seconds, self.unused + other.unused)
+
+
+def longest_first(episodes: Sequence[Episode], seconds: Mapping[tuple[str, int], float]) -> list[Episode]:
+    """The episodes in the order that keeps several processes busy to the end, by how long their like took before."""
+    return sorted(episodes, key=lambda episode: -seconds.get((episode.agent, episode.start), float("inf")))
+
+
+def score(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation:
+    """Compare the outcomes of a domain instance's episodes with the target; a pure function.
+
+    Each agent is scored over its own episodes that worked. A failed episode has no score, so none is made up for it;
+    an agent without any cannot be compared, and then the instance has no score either.
+    """
+    failures = tuple(outcome for outcome in outcomes if outcome.metrics is None)
+    worked = {outcome.episode.agent for outcome in outcomes if outcome.metrics is not None}
+    for failed in failures:
+        if failed.episode.agent not in worked:
+            reason = f"agent '{failed.episode.agent}' failed from every start, first with: {failed.failure}"
+            return Evaluation(theta, None, {}, None, failures, reason)
+    proxy, objective = table(outcomes), study.objective
+    measures = objective.measure(proxy=proxy, target=study.target, metrics=study.settings.metrics)
+    value = measures[objective.name]
+    reason = "" if value is not None else f"{objective.label} is undefined here"
+    pairs = disagreement_of(study, proxy, sorted(study.settings.agents))
+    cost = None if value is None else objective.sign * value
+    return Evaluation(theta, proxy, measures, cost, failures, reason, pairs)
+
+
+def disagreement_of(study: Study, proxy: ScoreTable, agents: Sequence[str]) -> Floats:
+    """|α_proxy − α_target| of each pair of these agents, in their order; eq. (4) sums it up to PRPV."""
+    metrics = study.settings.metrics
+    names = [metric.name for metric in metrics]
+    sides = [table.select(names).arrange(agents=agents).means for table in (proxy, study.target)]
+    ranked = [dominance(means, metrics) for means in sides]
+    return np.abs(ranked[0] - ranked[1])
+
+
+def table(outcomes: Sequence[Outcome]) -> ScoreTable:
+    """The scores of the episodes that worked, labelled by their start, in the metrics that all of them have."""
+    worked = {(one.episode.agent, str(one.episode.start)): one.metrics for one in outcomes if one.metrics is not None}
+    return ScoreTable.from_episodes(in_common(worked))
+
+
+def in_common(scored: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[tuple[str, str | int], dict[str, float]]:
+    """Scores by agent and episode, in the metrics that every one of them has."""
+    whole = [name for name in next(iter(scored.values()), {}) if all(name in scores for scores in scored.values())]
+    return {key: {name: scores[name] for name in whole} for key, scores in scored.items()}
+
+
+def failure_of(outcome: Outcome) -> str:
+    """Which episode failed and why, in one phrase."""
+    episode = outcome.episode
+    return f"agent '{episode.agent}' failed from start {episode.start}: {outcome.failure}"
+
+
+def score_trials(space: Space, done: Iterable[TrialRecord]) -> list[Trial]:
+    """Finished trials as a search sees them that learns from scores alone."""
+    return [Trial(space.values(trial.theta), trial.score) for trial in done]
+
+
+def outputs_of(study: Study, outcomes: Collection[Outcome]) -> Values | None:
+    """Every agent's mean metrics, in the order of the target's table, NaN where no episode tells of one.
+
+    None where no episode tells of any. Where an agent failed from some starts, its mean is over the others; where some
+    episodes lack a metric, that mean is over the others too.
+    """
+    means = _means(study, outcomes)
+    return None if np.isnan(means).all() else tuple(means.ravel().tolist())
+
+
+def _means(study: Study, outcomes: Collection[Outcome]) -> Floats:
+    names = study.target.metrics
+    rows = {agent: row for row, agent in enumerate(study.target.agents)}
+    sums, counts = np.zeros(study.target.means.shape), np.zeros(study.target.means.shape)
+    # In the order of the starts, so that a sum has the same last bit whatever came in first.
+    for outcome in sorted(outcomes, key=lambda one: one.episode.start):
+        if outcome.metrics is not None:
+            row, known = rows[outcome.episode.agent], [name in outcome.metrics for name in names]
+            sums[row] += [outcome.metrics.get(name, 0.0) for name in names]
+            counts[row] += known
+    return np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan)
+
+
+def compose_of(study: Study) -> Compose:
+    """What the study makes small, of outputs against the study's target."""
+    metrics, table, objective = study.settings.metrics, study.target, study.objective
+    compared = table.means[:, : len(metrics)]
+
+    def compose(outputs: Floats) -> Floats:
+        means = outputs.reshape(*outputs.shape[:-1], *table.means.shape)
+        return objective.sign * objective.of_means(means[..., : len(metrics)], compared, metrics)
+
+    return compose
+
 
 Enough = Callable[[Instance, Mapping[Episode, Outcome]], bool]
 """Whether the outcomes so far are enough of a domain instance, so that no more of its episodes begin."""
@@ -206,3 +360,73 @@ class StudyRun:
     def _lacks_episodes(self, trial: TrialRecord) -> RunError:
         path = self.store.path
         return RunError(f"{path}: lacks episodes of trial {trial.number}; move it away and run the study again")
+
+
+MOST_TRIALS, MOST_JOBS = 100_000, 1024
+
+
+def with_spending(study: Study, *, budget: int | None = None, jobs: int | None = None) -> Study:
+    """The study with this budget [trials] and this many processes; None leaves what study.toml says.
+
+    Raises:
+        InputError: If one is out of bounds, or the study's trials are not the ones that a budget counts.
+    """
+    for name, value, most in (("budget", budget, MOST_TRIALS), ("jobs", jobs, MOST_JOBS)):
+        if value is not None and not 1 <= value <= most:
+            raise InputError(f"{name} must be between 1 and {most}, got {value}")
+    settings = study.settings
+    if budget is not None and settings.objective == LEARNING:
+        raise settings.error(
+            "budget", f"a search for '{LEARNING}' has its own; set teaching.budget in this file instead"
+        )
+    spending = replace(settings, budget=budget or settings.budget, jobs=jobs or settings.jobs)
+    return replace(study, settings=spending)
+
+
+def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
+    """Score the study's agents over its starts in the domain that a model describes.
+
+    Every metric of the family is kept that all episodes have. Rows are in the order of the study's agents and starts,
+    whatever the number of jobs: the same model, settings and seed give the same table. Of several repeats, each has
+    placement noise of its own, and episodes are labelled START/REPEAT; the first repeat is what a single one would be.
+
+    Raises:
+        InputError: If the settings, the model or the family cannot be used.
+        EpisodeError: If any episode fails: a target has no holes.
+    """
+    family = load_family(settings, model)
+    labels = _labelled(settings, seed, repeats)
+    watcher.begin(f"measuring {model.name}", 0)
+    metrics = _drive(family, settings, list(labels), watcher)
+    scored = {(episode.agent, label): metrics[episode] for episode, label in labels.items()}
+    return ScoreTable.from_episodes(in_common(scored))
+
+
+def _drive(
+    family: DomainFamily, settings: StudySettings, episodes: list[Episode], watcher: Watcher
+) -> dict[Episode, Mapping[str, float]]:
+    """The metrics of every episode; an agent's last one is told."""
+    needed, left = needed_metrics(settings, family), Counter(episode.agent for episode in episodes)
+    metrics: dict[Episode, Mapping[str, float]] = {}
+    watch = Watch(settings.episode_timeout_s, waits=watcher.waiting)
+    with running(family, longest_first(episodes, {}), settings.jobs, needed=needed, watch=watch) as outcomes:
+        for outcome in outcomes:
+            if outcome.metrics is None:
+                raise EpisodeError(failure_of(outcome))
+            agent = outcome.episode.agent
+            metrics[outcome.episode] = outcome.metrics
+            watcher.episode()
+            left[agent] -= 1
+            if not left[agent]:
+                watcher.finished(f"agent {agent} measured")
+    return metrics
+
+
+def _labelled(settings: StudySettings, seed: int, repeats: int) -> dict[Episode, str]:
+    """Every episode with its label: by agent, then start, then repeat."""
+    runs = [plan(settings, {}, fresh_seed(seed, repeat)) for repeat in range(repeats)]
+    return {
+        episode: f"{episode.start}/{repeat}" if repeats > 1 else str(episode.start)
+        for alike in zip(*runs, strict=True)
+        for repeat, episode in enumerate(alike)
+    }

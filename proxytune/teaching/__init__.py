@@ -1,1 +1,5 @@
 """What a proxy is worth as a teacher: the learning experiment and the search for the best teacher."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

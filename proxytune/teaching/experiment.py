@@ -1,26 +1,60 @@
-"""The learning experiment: learning curves with and without each proxy, and what each is worth as a teacher."""
+"""The learning experiment: learning curves with and without each proxy, and what each is worth as a teacher.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+What each of several families is worth as a teacher: all at their best θ, for one target and one learner.
+Whether one figure ranks proxies as another does: Kendall's τ with its interval, from draws of both.
+How well each proxy of a learning experiment predicts: PRPV beside PLV, since the one does not tell the other.
+The paper's two observations, held against a learning experiment: what zero-shot scores and PRPV tell of PLV.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import cast
 
-from proxytune.domain import Classroom
-from proxytune.errors import InputError
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.domain import Classroom, Episode
+from proxytune.errors import InputError, LearnerError
 from proxytune.extensions import make
-from proxytune.learning.cache import Cache
-from proxytune.learning.curves import Array, Curve
-from proxytune.learning.identity import learner_identity
-from proxytune.learning.learner import Learner
-from proxytune.learning.lessons import Distribution
-from proxytune.learning.plv import Convergence, Estimate, SampleNeeds, Teaching, estimate, mean_score, teaching
-from proxytune.learning.settings import EXPERT, LEARNER, NONE, TeachingSettings
-from proxytune.learning.spending import curves_of
-from proxytune.running.progress import Watcher
-from proxytune.study.family import check_bounds, load_family
-from proxytune.study.settings import StudySettings
-from proxytune.teaching.examining import examine_curves, needs_of
+from proxytune.learning import (
+    EXPERT,
+    LEARNER,
+    LEVELS,
+    NONE,
+    POSTERIOR_DRAWS,
+    Cache,
+    Convergence,
+    Curve,
+    Distribution,
+    Estimate,
+    Learner,
+    SampleNeeds,
+    Teaching,
+    TeachingSettings,
+    curves_of,
+    difference,
+    estimate,
+    learner_identity,
+    mean_score,
+    teaching,
+)
+from proxytune.running import Watcher
+from proxytune.space import Theta
+from proxytune.study import Lesson, StudyRun, StudySettings, best_teacher, check_bounds, load_family, plan, score
+from proxytune.teaching.examining import count_examinations, examine_curves, needs_of
 from proxytune.teaching.points import TeachingSetup
+from proxytune.usefulness import (
+    Chance,
+    bootstrap_means,
+    chance,
+    compare,
+    in_blocks,
+    interval,
+    prpv_of_means,
+    why_not_repeated,
+)
 
 CACHE = "teaching"
 """The folder, within a study's, where all that was taught is kept."""
@@ -141,7 +175,7 @@ def _teacher(taught: TeachingSettings, needs: SampleNeeds, name: str, proxy: Dis
 def _cost_saved(taught: TeachingSettings, needs: SampleNeeds, name: str) -> Estimate:
     """PLV in cost (eq. 6)."""
 
-    def saved(without: Array, needed: Array) -> Array:
+    def saved(without: Floats, needed: Floats) -> Floats:
         return taught.cost_saved(without=without, needed=needed)
 
     return estimate(saved, needs, more=NONE, less=name)
@@ -187,3 +221,241 @@ def _load_learner(settings: StudySettings, name: str) -> tuple[Learner, str]:
         raise settings.error("teaching.learner", str(problem)) from None
     learner = cast(Learner, made)
     return learner, learner_identity(learner)
+
+
+def classrooms(settings: StudySettings) -> dict[str, Classroom]:
+    """Every family of a study as one that can teach; none where the study has no [teaching].
+
+    Raises:
+        SettingsError: If one cannot, with its name.
+    """
+    if settings.teaching is None:
+        return {}
+    load_setup(settings)
+    return {name: classroom(one, one.proxy, "proxy_lessons") for name, one in settings.families.items()}
+
+
+def teach_families(
+    settings: StudySettings,
+    thetas: Mapping[str, Theta],
+    watching: Callable[[int], AbstractContextManager[Watcher]],
+) -> dict[str, Lesson]:
+    """Teach a learner in each family at its best θ, from wherever an earlier run was left.
+
+    The target is the study's own family, with its [domain] and the model that [teaching] names. The learner without a
+    proxy, its lessons and its examinations are the same for all.
+
+    Args:
+        settings: Of the study of all families.
+        thetas: The best θ of each, by name.
+        watching: Gives what hears of so many points.
+
+    Raises:
+        LearnerError: If none can teach.
+        RunError: If a domain, the learner or the machine fails; all that was finished is kept.
+    """
+    rooms = classrooms(settings)
+    if not rooms:
+        return {}
+    setup = load_setup(settings)
+    with watching(count_examinations(setup.settings, 1)) as watcher:
+        alone = examine_curves(setup, {NONE: None}, settings.jobs, watcher)
+    scores, failed = dict(alone), dict[str, LearnerError]()
+    for name, room in rooms.items():
+        there = replace(setup, proxy=room)
+        try:
+            with watching(count_examinations(setup.settings, 1)) as watcher:
+                scores |= examine_curves(there, {name: _fixed(thetas[name])}, settings.jobs, watcher, alone)
+        except LearnerError as problem:
+            failed[name] = problem
+    if len(failed) == len(rooms):
+        raise next(iter(failed.values()))
+    needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
+    lessons = {name: _lesson(needs, name, thetas[name]) for name in rooms if name not in failed}
+    best = best_teacher(lessons)
+    if best is not None:
+        lessons = {
+            name: lesson if name == best else replace(lesson, more=difference(needs, more=name, less=best))
+            for name, lesson in lessons.items()
+        }
+    lessons |= {name: Lesson(thetas[name], failure=str(problem)) for name, problem in failed.items()}
+    return {name: lessons[name] for name in thetas if name in lessons}
+
+
+def _fixed(theta: Theta) -> Distribution:
+    """One θ as a distribution."""
+    return Distribution({parameter: (value, value) for parameter, value in sorted(theta.items())})
+
+
+def _lesson(needs: SampleNeeds, name: str, theta: Theta) -> Lesson:
+    zero_shot = mean_score(needs, name, 0).value or 0.0
+    if not needs.settled:
+        return Lesson(theta, zero_shot)
+    worth = teaching(needs, none=NONE, proxy=name)
+    return Lesson(theta, zero_shot, worth.needed, worth.plv)
+
+
+SURE = 0.95
+"""Two proxies are ordered where so many of the draws order them so."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How far two rankings of the same proxies agree.
+
+    Attributes:
+        tau: Kendall's τ, the median over draws: 1 the same ranking, −1 its reverse.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+        reversed: Pairs of proxies, by name, that the two figures order otherwise, each order sure; the first of a pair
+            is ahead by the second figure.
+        proxies: How many are ranked.
+    """
+
+    tau: float
+    low: float
+    high: float
+    reversed: tuple[tuple[str, str], ...]
+    proxies: int
+
+
+def agreement(names: Sequence[str], first: Floats, second: Floats) -> Agreement:
+    """Compare two rankings, each from draws (draws, proxies) in which more is better; ties count for neither order."""
+    one, other = _orders(first), _orders(second)
+    above, below = np.triu_indices(len(names), 1)
+    pairs = one[:, above, below] * other[:, above, below]
+    taus = pairs.sum(axis=1) / np.sqrt(_untied(one[:, above, below]) * _untied(other[:, above, below]))
+    contrary = _sure(one) * _sure(other) < 0
+    ahead = np.argwhere(contrary & (_sure(other) > 0))
+    low, middle, high = np.quantile(taus, (LEVELS[0], 0.5, LEVELS[1]))
+    named = tuple((names[better], names[worse]) for better, worse in ahead)
+    return Agreement(float(middle), float(low), float(high), named, len(names))
+
+
+def _orders(values: Floats) -> Floats:
+    """1 where the first proxy is ahead of the second, −1 where it is behind, 0 where they are tied."""
+    return np.asarray((values[:, :, None] > values[:, None]).astype(float) - (values[:, :, None] < values[:, None]))
+
+
+def _untied(orders: Floats) -> Floats:
+    return np.asarray(np.maximum(np.abs(orders).sum(axis=1), 1.0))
+
+
+def _sure(orders: Floats) -> Floats:
+    """1 or −1 where nearly all draws order two proxies so, else 0."""
+    return np.asarray(((orders > 0).mean(axis=0) >= SURE).astype(float) - ((orders < 0).mean(axis=0) >= SURE))
+
+
+@dataclass(frozen=True)
+class Predictivity:
+    """How well a proxy predicts.
+
+    Attributes:
+        prpv: PRPV of its episodes as they are.
+        chance: PRPV of a proxy that ranks the agents at random.
+        resampled: PRPV of resampled episodes, the same resample for all proxies (DRAWS,); None where episodes are not
+            repeated.
+    """
+
+    prpv: float
+    chance: Chance
+    resampled: Floats | None = field(repr=False, compare=False)
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The 95 % interval of PRPV, which holds the value."""
+        if self.resampled is None:
+            return None
+        low, high = interval(self.resampled)
+        return min(low, self.prpv), max(high, self.prpv)
+
+
+def predictivity(run: StudyRun, proxies: Mapping[str, Distribution]) -> dict[str, Predictivity | None]:
+    """PRPV of every proxy, by name; None where an agent failed there from every start.
+
+    A proxy that draws θ anew for every lesson draws it anew for every start, the same for all agents.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+    """
+    return {name: _predictivity(run, name, proxy) for name, proxy in proxies.items()}
+
+
+def _predictivity(run: StudyRun, name: str, proxy: Distribution) -> Predictivity | None:
+    study, planned = run.study, _planned(run, proxy)
+    found = run.outcomes(planned, f"agents in {name}")
+    evaluation = score(study, proxy.centre, [found[episode] for episode in planned])
+    if evaluation.proxy is None or evaluation.prpv is None:
+        return None
+    inputs = compare(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
+    by_chance = chance(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
+    if why_not_repeated(inputs):
+        return Predictivity(evaluation.prpv, by_chance, None)
+    means = bootstrap_means(inputs, resamples=POSTERIOR_DRAWS, seed=0)
+    resampled = in_blocks(lambda here, there: prpv_of_means(here, there, inputs.metrics), *means)
+    return Predictivity(evaluation.prpv, by_chance, resampled)
+
+
+def _planned(run: StudyRun, proxy: Distribution) -> list[Episode]:
+    """Every agent from every start, θ drawn for each start where it is not fixed."""
+    settings = run.settings
+    drawn = [plan(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
+    return [episode for start, planned in enumerate(drawn) for episode in planned if episode.start == start]
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What a learning experiment says of the paper's two observations.
+
+    Attributes:
+        zero_shot: Whether proxies rank by zero-shot score (first) as they do by PLV (second); None of a single one.
+        prpv: Whether they rank by PRPV, low first, as they do by PLV; None without intervals of PRPV.
+        poor_predictors: Proxies that save samples though their PRPV is such as chance gives.
+    """
+
+    zero_shot: Agreement | None
+    prpv: Agreement | None
+    poor_predictors: tuple[str, ...]
+
+
+def observe(experiment: Experiment, prpv: Mapping[str, Predictivity | None]) -> Observations | None:
+    """Hold the two observations against an experiment; None where PLV is unknown.
+
+    Args:
+        experiment: With the posterior of its learning curves.
+        prpv: How well each proxy predicts, by name.
+    """
+    names = [teacher.name for teacher in experiment.teachers]
+    if not experiment.settled:
+        return None
+    starts = {name: experiment.needs.draws.scores[name][:, 0] for name in names}
+    lowest = {name: -one.resampled for name in names if (one := prpv.get(name)) and one.resampled is not None}
+    return Observations(
+        zero_shot=_agreement(experiment, starts),
+        prpv=_agreement(experiment, lowest),
+        poor_predictors=tuple(one.name for one in experiment.teachers if _saves(one) and _by_chance(prpv, one.name)),
+    )
+
+
+def _agreement(experiment: Experiment, figures: Mapping[str, Floats]) -> Agreement | None:
+    """How proxies rank by a figure of which more is better, its draws by name, and by PLV; None of fewer than two."""
+    names = list(figures)
+    if len(names) < 2:
+        return None
+    return agreement(names, np.column_stack(list(figures.values())), _plv(experiment, names))
+
+
+def _plv(experiment: Experiment, names: Sequence[str]) -> Floats:
+    """PLV of each proxy in every draw (draws, proxies); what is not reached is the worst there is."""
+    needed = experiment.needs.needed
+    alone = np.minimum(needed[NONE], experiment.needs.last)
+    return np.column_stack([alone - needed[name] for name in names])
+
+
+def _saves(teacher: TeacherResult) -> bool:
+    return teacher.worth is not None and teacher.worth.plv.above_zero
+
+
+def _by_chance(prpv: Mapping[str, Predictivity | None], name: str) -> bool:
+    known = prpv.get(name)
+    return known is not None and known.chance.explains

@@ -1,7 +1,12 @@
-"""The pieces of a learning experiment, each cached by all that determines it: samples, weights, scores."""
+"""The pieces of a learning experiment, each cached by all that determines it: samples, weights, scores.
+
+Trainings, lessons and examinations run code that is not ours: what it raises is named, and what hangs is ended.
+Learning in one domain: its lessons' samples, and the weights they lead to, each cached by what determines it.
+The box that is searched for learning value: centre and width of each parameter's distribution p(θ).
+"""
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, cast
@@ -9,16 +14,264 @@ from typing import Any, cast
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from proxytune.domain import Classroom, OnPolicyClassroom, make_episode
-from proxytune.errors import EpisodeError, LearnerError
-from proxytune.learning.cache import Arrays, Cache, digest
-from proxytune.learning.examination import examine
-from proxytune.learning.learner import Learner, policy_of
-from proxytune.learning.lessons import Distribution
-from proxytune.learning.settings import TeachingSettings
-from proxytune.seeds import exam_seed, proxy_lessons_seed, target_lessons_seed
-from proxytune.teaching.stages import Lessons, Stage, Trainee, equal_rounds
-from proxytune.teaching.supervision import Supervised, watching
+from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
+from proxytune.errors import EpisodeError, LearnerError, ProxytuneError
+from proxytune.extensions import describe, is_users, place_of
+from proxytune.learning import (
+    LEARNER,
+    Arrays,
+    Cache,
+    Distribution,
+    Learner,
+    TeachingSettings,
+    Weights,
+    collect_samples,
+    digest,
+    examine,
+    mix_samples,
+    policy_of,
+)
+from proxytune.running import check_machine, limited, was_ended_in
+from proxytune.seeds import exam_seed, proxy_lessons_seed, round_seed, target_lessons_seed
+from proxytune.space import Interval, Space, Theta
+from proxytune.study import StudySettings
+
+TOGETHER = " and the others beside it"
+"""How it is named what several episodes do at once: which of them fails is not known then."""
+
+
+@contextmanager
+def watching(what: str, timeout_s: float | None = None) -> Iterator[None]:
+    """Raise in one line what code that is not ours raises meanwhile, and end what takes longer than it may.
+
+    Args:
+        what: What is under way.
+        timeout_s: How long it may take [s], where processes may be ended (`limited`).
+
+    Raises:
+        EpisodeError: With what was under way.
+        RunError: If memory, disk or descriptors run out.
+    """
+    try:
+        with limited(what, timeout_s):
+            yield
+    except BaseException as problem:
+        if is_users(problem):
+            raise
+        check_machine(what, problem, "with more room")
+        if isinstance(problem, ProxytuneError):
+            raise
+        raise EpisodeError(f"{what} raised {describe(problem)}{place_of(problem)}; correct it") from problem
+
+
+@dataclass(frozen=True)
+class Supervised:
+    """A classroom of which each lesson and examination is named where it fails, and ended where it takes too long.
+
+    Attributes:
+        room: The classroom.
+        domain: What it is, "proxy" or "target".
+        timeout_s: How long an episode may take [s]; None for as long as it takes.
+    """
+
+    room: Any
+    domain: str
+    timeout_s: float | None
+
+    def __getattr__(self, member: str) -> Any:
+        """Any other member of the classroom."""
+        if member.startswith("__") or member == "room":
+            raise AttributeError(member)
+        return getattr(self.room, member)
+
+    def demonstrate(self, episode: Episode, seconds: float) -> tuple[Demonstration, int]:
+        """As the classroom does."""
+        with watching(self._named("the expert's lesson", episode), self.timeout_s):
+            return self.room.demonstrate(episode, seconds)  # type: ignore[no-any-return]
+
+    def guide(self, episode: Episode, policy: Policy, seconds: float) -> tuple[Demonstration, int]:
+        """As the classroom does."""
+        with watching(self._named("the learner's lesson", episode), self.timeout_s):
+            return self.room.guide(episode, policy, seconds)  # type: ignore[no-any-return]
+
+    def examine(self, episode: Episode, policy: Policy) -> float:
+        """As the classroom does."""
+        with watching(self._named("the learner's examination", episode), self.timeout_s):
+            return self.room.examine(episode, policy)  # type: ignore[no-any-return]
+
+    def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> Sequence[float]:
+        """As the classroom does, in so many times as long; where that ended a process, one after the other."""
+        together = getattr(self.room, "examine_together", None)
+        what = self._named("the learner's examination", episodes[0]) + TOGETHER
+        if together is None or was_ended_in(what):
+            return [self.examine(episode, policy) for episode in episodes]
+        with watching(what, self.timeout_s and self.timeout_s * len(episodes)):
+            return together(episodes, policy)  # type: ignore[no-any-return]
+
+    def _named(self, what: str, episode: Episode) -> str:
+        theta = "".join(f"{name} = {value:.3g}, " for name, value in episode.theta)
+        return f"{what} in the {self.domain} at {theta}start {episode.start}"
+
+
+@dataclass(frozen=True)
+class Trainee:
+    """Who learns, and where what it has learnt is kept.
+
+    Attributes:
+        learner: What is trained.
+        identity: A digest of its code and settings.
+        seed: Of its initial weights and the order of its samples.
+        cache: Where samples and weights are kept.
+    """
+
+    learner: Learner
+    identity: str
+    seed: int
+    cache: Cache
+
+
+@dataclass(frozen=True)
+class Lessons:
+    """The lessons in one domain, in rounds: one where the expert drives, several where the learner does.
+
+    Attributes:
+        room: The domain family.
+        domain: Its identity.
+        where: p(θ), drawn anew for every lesson.
+        seed: Of the lessons.
+        lesson_s: How long each takes [s].
+        grid: Number of samples after each round, rising.
+        by: Who drives. LEARNER: in each round as it has learnt to in those before, as long as there is nothing, the
+            expert. EXPERT: there is one round.
+    """
+
+    room: Classroom
+    domain: str
+    where: Distribution
+    seed: int
+    lesson_s: float
+    grid: tuple[int, ...]
+    by: str
+
+    @property
+    def on_policy(self) -> bool:
+        """Whether the learner drives."""
+        return self.by == LEARNER
+
+    @property
+    def ends(self) -> tuple[int, ...]:
+        """Number of samples after each round."""
+        return self.grid if self.on_policy else self.grid[-1:]
+
+    def begin(self, number: int) -> int:
+        """Number of samples before a round, counted from 0."""
+        return self.ends[number - 1] if number else 0
+
+    def rounds(self, count: int) -> range:
+        """The rounds that the first samples, so many, come from."""
+        return range(sum(self.begin(number) < count for number in range(len(self.ends))))
+
+    def facts(self, number: int) -> dict[str, Any]:
+        """All that determines a round's samples, but for who drives."""
+        return {
+            "domain": self.domain,
+            "theta": {name: list(pair) for name, pair in self.where.bounds.items()},
+            "count": self.ends[number] - self.begin(number),
+            "seed": round_seed(self.seed, number),
+            "lesson_s": self.lesson_s,
+        }
+
+    def collect(self, number: int, policy: Policy | None) -> Demonstration:
+        """A round's samples: of the policy's driving, labelled by the expert, or without one of the expert's own."""
+        facts, lesson_s = self.facts(number), self.lesson_s
+        return collect_samples(
+            self.room, self.where, count=facts["count"], seed=facts["seed"], lesson_s=lesson_s, policy=policy
+        )
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a trainee learns in one domain, after what it has learnt in another.
+
+    Facts of what comes before enter those of what comes after as their digest: each key is short and complete.
+
+    Attributes:
+        trainee: Who learns.
+        lessons: From what.
+        before: The stage from whose weights it goes on; None from scratch.
+        rehearsal: Share of that stage's samples among those it learns from here.
+    """
+
+    trainee: Trainee
+    lessons: Lessons
+    before: "Stage | None" = None
+    rehearsal: float = 0.0
+
+    def weights_facts(self, count: int) -> dict[str, Any] | None:
+        """All that determines the weights after so many samples; None where nothing has been learnt."""
+        start = self.before.final_facts() if self.before else None
+        if not count:
+            return start
+        return {
+            "learner": self.trainee.identity,
+            "seed": self.trainee.seed,
+            "start": digest(start) if start else None,
+            "samples": digest(self.round_facts(self.lessons.rounds(count)[-1])),
+            "count": count,
+            **({"rehearsal": self.rehearsal} if self.before and self.rehearsal else {}),
+        }
+
+    def final_facts(self) -> dict[str, Any] | None:
+        """All that determines the weights after its last sample."""
+        return self.weights_facts(self.lessons.ends[-1])
+
+    def weights(self, count: int) -> Weights | None:
+        """The weights after so many samples; None where nothing has been learnt."""
+        if not count:
+            return self.before.weights(self.before.lessons.ends[-1]) if self.before else None
+        facts = self.weights_facts(count)
+        assert facts is not None
+        return self.trainee.cache.get("weights", facts, lambda: self._train(count))
+
+    def samples(self, count: int) -> Demonstration:
+        """The first samples, so many; more of them begin with the same ones."""
+        rounds = [self.collect(number) for number in self.lessons.rounds(count)]
+        observations = np.concatenate([one.observations for one in rounds])[:count]
+        return Demonstration(observations, np.concatenate([one.commands for one in rounds])[:count])
+
+    def round_facts(self, number: int) -> dict[str, Any]:
+        """All that determines a round's samples: the policy that drives stands for the rounds before."""
+        policy = self.weights_facts(self.lessons.begin(number)) if self.lessons.on_policy else None
+        return {**self.lessons.facts(number), **({"policy": digest(policy)} if policy else {})}
+
+    def collect(self, number: int) -> Demonstration:
+        """The samples of a round."""
+
+        def make() -> Arrays:
+            policy = self._policy(number)
+            with watching("a lesson"):
+                return self.lessons.collect(number, policy)._asdict()
+
+        return Demonstration(**self.trainee.cache.get("samples", self.round_facts(number), make))
+
+    def _policy(self, number: int) -> Policy | None:
+        """Who drives in a round; None for the expert."""
+        weights = self.weights(self.lessons.begin(number)) if self.lessons.on_policy else None
+        return None if weights is None else policy_of(self.trainee.learner, weights)
+
+    def _train(self, count: int) -> Weights:
+        samples = self.samples(count)
+        if self.before and self.rehearsal:
+            samples = mix_samples(samples, self.before.samples(self.before.lessons.ends[-1]), self.rehearsal)
+        start = self.weights(0)
+        with watching("the learner's training"):
+            return self.trainee.learner.train(samples, start, self.trainee.seed)
+
+
+def equal_rounds(count: int, rounds: int) -> tuple[int, ...]:
+    """Number of samples after each of so many equal rounds; fewer where there are too few samples."""
+    return tuple(sorted({round(count * number / rounds) for number in range(1, rounds + 1)} - {0}))
+
 
 PUPIL = "pupil"
 """Who drives in an examination, in place of an agent."""
@@ -145,3 +398,61 @@ def _name_proxy_in_errors(point: Point) -> Iterator[None]:
         yield
     except (LearnerError, EpisodeError) as problem:
         raise type(problem)(f"{point.name}: {problem}") from None
+
+
+WIDTH = " width"
+"""What the width of a parameter's distribution is called, after the parameter."""
+
+ROUNDING = 1e-9
+"""Share of a box by which a width may be larger."""
+
+SLACK = 1.0 / 30.0
+"""A parameter that PRPV has pinned down is still searched over this share of its box, to both sides."""
+
+
+def search_space(
+    settings: StudySettings, widths: Mapping[str, tuple[float, float]], left: Mapping[str, tuple[float, float]]
+) -> Space:
+    """The box that is searched for PLV: centres where PRPV cannot tell θ from the best, and widths as asked for.
+
+    Args:
+        settings: Of the study.
+        widths: Bounds of the width of each parameter's distribution, by parameter.
+        left: The ends of what PRPV cannot tell from the best, by parameter; empty where the box is not narrowed.
+
+    Raises:
+        SettingsError: If a width is of a parameter that is not searched, or wider than its box.
+    """
+    for name, (_, widest) in widths.items():
+        _check_width(settings, name, widest)
+    centres = [_narrowed(box, left.get(box.name)) for box in settings.space.intervals]
+    return Space((*centres, *(Interval(name + WIDTH, *bounds) for name, bounds in sorted(widths.items()))))
+
+
+def _check_width(settings: StudySettings, name: str, widest: float) -> None:
+    key = f"teaching.width.{name}"
+    box = next((box for box in settings.space.intervals if box.name == name), None)
+    if box is None:
+        raise settings.error(key, "is not among [parameters]; add it there, or take this out")
+    whole = box.high - box.low
+    # 0.3 − 0.1 is a little less than 0.2.
+    if widest > whole * (1.0 + ROUNDING):
+        raise settings.error(key, f"must be at most {whole:g}, all of its box in [parameters], got {widest:g}")
+
+
+def _narrowed(box: Interval, left: tuple[float, float] | None) -> Interval:
+    if left is None:
+        return box
+    step = SLACK * (box.high - box.low)
+    slack = step if left[1] - left[0] < step else 0.0
+    return Interval(box.name, max(box.low, left[0] - slack), min(box.high, left[1] + slack), box.unit)
+
+
+def distribution(setup: TeachingSetup, theta: Theta) -> Distribution:
+    """p(θ) with these centres and widths, cut off at what each parameter can be."""
+    bounds = {}
+    for name, centre in theta.items():
+        if not name.endswith(WIDTH):
+            half, known = theta.get(name + WIDTH, 0.0) / 2.0, setup.proxy.parameters[name]
+            bounds[name] = (max(known.low, centre - half), min(known.high, centre + half))
+    return Distribution(bounds)

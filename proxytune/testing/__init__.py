@@ -8,10 +8,7 @@ Each returns nothing, or raises one ConformanceError that names what is broken a
 """
 
 from proxytune.errors import ConformanceError
-from proxytune.testing.agent import check_agent
 from proxytune.testing.effect import check_effect
-from proxytune.testing.engine import check_engine
-from proxytune.testing.family import check_family
-from proxytune.testing.measure import check_measure
+from proxytune.testing.extension import check_agent, check_engine, check_family, check_measure
 
 __all__ = ["ConformanceError", "check_agent", "check_effect", "check_engine", "check_family", "check_measure"]

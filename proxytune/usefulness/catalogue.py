@@ -1,14 +1,126 @@
-"""The measures of usefulness, each with all that is to be known of it."""
+"""The measures of usefulness, each with all that is to be known of it.
+
+What a measure of usefulness says of itself: nothing that reports one knows it from another.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from proxytune.scores import Array, Metric
+from proxytune.arrays import Floats
+from proxytune.errors import InputError
+from proxytune.scores import Metric
 from proxytune.usefulness.assessment import Assessment
-from proxytune.usefulness.measure import ALL, Measure, Measured
-from proxytune.usefulness.ppv import ppv_of_means, weights_of_spread
-from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.usefulness.pairs import prpv_of_means
+from proxytune.usefulness.predictivity import ppv_of_means, weights_of_spread
+from proxytune.usefulness.resampling import Ends, bootstrap_means, in_blocks, interval_where_defined
+
+ALL = ""
+"""Stands in for the metric's name where a measure has one value for all metrics."""
+
+
+class Measured(NamedTuple):
+    """A measure's value and its 95 % interval; None where it is undefined or has no interval."""
+
+    value: float | None
+    interval: Ends | None
+
+
+OnMeans = Callable[[Floats, Floats, Sequence[Metric]], Floats]
+"""Of mean scores in the proxy and on the target, both (…, agents, metrics): values (…), or (…, metrics) of a measure
+per metric; NaN where it is undefined."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measure of usefulness with all that is to be known of it.
+
+    It needs one of `read` and `on_means`, unless it is not measured on score tables, as POD is not.
+
+    Attributes:
+        key: Its name in files; of a measure per metric, followed by the metric's.
+        name: Its name for people.
+        title: That name spelt out.
+        better: Which direction is better.
+        meaning: Its range and unit in a few words.
+        digits: How a value is formatted where there is little room.
+        unit: Its unit; empty if it has none, or that of its metric.
+        per_metric: Whether each metric has a value of its own.
+        in_paper: Whether the paper has it: those come first where there is little room.
+        on_means: The measure of mean scores alone; None if it takes more than these.
+        read: Where an assessment holds it, by metric; None if `on_means` is all there is to it.
+    """
+
+    key: str
+    name: str
+    title: str
+    better: Literal["lower", "higher"]
+    meaning: str
+    digits: str
+    unit: str = ""
+    per_metric: bool = False
+    in_paper: bool = False
+    on_means: OnMeans | None = None
+    read: Callable[[Assessment], Mapping[str, Measured]] | None = None
+
+    @property
+    def lower_is_better(self) -> bool:
+        """Whether a search would make it small."""
+        return self.better == "lower"
+
+    def key_for(self, metric: str) -> str:
+        """What files call it for a metric, or for ALL."""
+        return "_".join(filter(None, (self.key, metric)))
+
+    def name_for(self, metric: str) -> str:
+        """What people call it for a metric, or for ALL."""
+        return " ".join(filter(None, (self.name, metric)))
+
+    def measured(self, assessment: Assessment) -> Mapping[str, Measured]:
+        """Value and interval by metric; by ALL if there is one for all metrics."""
+        if self.read is not None:
+            return self.read(assessment)
+        values, resampled = self._values(*assessment.inputs.means, assessment), self._resampled(assessment)
+        names = [metric.name for metric in assessment.inputs.metrics] if self.per_metric else [ALL]
+        ends = [None] * len(names) if resampled is None else [interval_where_defined(one) for one in resampled.T]
+        pairs = zip(values, ends, strict=True)
+        found = [Measured(None if np.isnan(value) else float(value), inner) for value, inner in pairs]
+        return dict(zip(names, found, strict=True))
+
+    def of_means(self, *, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> float:
+        """Measure mean scores alone, as an objective of a search does.
+
+        Args:
+            proxy: Mean scores in the proxy, shape (agents, metrics).
+            target: Mean scores on the target, same shape.
+            metrics: How each of the metrics compares.
+
+        Returns:
+            NaN where the measure is undefined.
+
+        Raises:
+            InputError: If the measure has no single value of mean scores.
+        """
+        if self.per_metric or self.on_means is None:
+            raise InputError(f"{self.name} is no single number of mean scores; take a measure that is, as PRPV")
+        return float(self.on_means(proxy, target, metrics))
+
+    def _values(self, proxy: Floats, target: Floats, assessment: Assessment) -> Floats:
+        """Of means (…, agents, metrics), shape (…, metrics or 1)."""
+        if self.on_means is None:
+            raise InputError(f"{self.name} is not measured on score tables")
+        values = self.on_means(proxy, target, assessment.inputs.metrics)
+        return values if self.per_metric else values[..., None]
+
+    def _resampled(self, assessment: Assessment) -> Floats | None:
+        """Values of resampled episodes, shape (resamples, metrics or 1); None where episodes are not repeated."""
+        if assessment.intervals is None:
+            return None
+        resamples, seed = assessment.prpv_interval.resamples, assessment.seed
+        means = bootstrap_means(assessment.inputs, resamples=resamples, seed=seed)
+        return in_blocks(lambda proxy, target: self._values(proxy, target, assessment), *means)
 
 
 def _prpv(assessment: Assessment) -> Mapping[str, Measured]:
@@ -21,7 +133,7 @@ def _ppv(assessment: Assessment) -> Mapping[str, Measured]:
     return {ALL: Measured(assessment.ppv.value, assessment.intervals.ppv if assessment.intervals else None)}
 
 
-def _ppv_of_means(proxy: Array, target: Array, metrics: Sequence[Metric]) -> Array:
+def _ppv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
     weights = weights_of_spread(target)
     return np.where((weights > 0.0).any(axis=-1), ppv_of_means(proxy, target, weights), np.nan)
 

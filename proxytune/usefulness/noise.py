@@ -1,15 +1,28 @@
-"""The noise floor: the PRPV that a domain gets against itself from the same starts, or what stands in for it."""
+"""The noise floor: the PRPV that a domain gets against itself from the same starts, or what stands in for it.
 
-from collections.abc import Sequence
+Success rates: metrics of zeros and ones, each agent's rate with an interval of its own, and how often agents tie.
+Chance: the PRPV of a proxy that ranks the agents at random.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from proxytune.scores import Array, Metric, ScoreTable
-from proxytune.usefulness.comparison import Comparison, compare
-from proxytune.usefulness.prpv import prpv_of_means
-from proxytune.usefulness.repeats import Choice, by_start, is_repeated, split_repeats, start_places
+from proxytune.arrays import Floats
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness.pairs import (
+    Choice,
+    Comparison,
+    by_start,
+    compare,
+    is_repeated,
+    prpv_of_means,
+    split_repeats,
+    stand,
+    start_places,
+)
 from proxytune.usefulness.resampling import agent_blocks, counted_means, draw_counts, in_blocks, interval, too_few
 
 FloorKind = Literal["same starts", "halves", "none"]
@@ -113,7 +126,7 @@ def floor_of_repeats(
     return NoiseFloor("same starts", value, *ends, resamples, inputs.target, inputs.metrics, inputs.proxy)
 
 
-def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_starts: bool) -> tuple[Array, Array]:
+def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_starts: bool) -> tuple[Floats, Floats]:
     """Mean scores of two sets of each agent's episodes, each of shape (splits, agents, metrics)."""
     places, keys = start_places(table), rng.random((splits, len(table.episodes))) if same_starts else None
     means = []
@@ -151,5 +164,136 @@ def _shared_starts(inputs: Comparison) -> tuple[ScoreTable, ScoreTable]:
     return first, second
 
 
-def _prpv(one: Array, other: Array, metrics: Sequence[Metric]) -> Array:
+def _prpv(one: Floats, other: Floats, metrics: Sequence[Metric]) -> Floats:
     return in_blocks(lambda p, t: prpv_of_means(p, t, metrics), one, other)
+
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Rate:
+    """The share of an agent's episodes that succeeded.
+
+    Attributes:
+        value: The share.
+        low: Lower end of Wilson's 95 % interval, which takes episodes for independent.
+        high: Upper end.
+        episodes: How many there were.
+    """
+
+    value: float
+    low: float
+    high: float
+    episodes: int
+
+
+@dataclass(frozen=True)
+class SuccessRates:
+    """One metric of zeros and ones on both sides.
+
+    Attributes:
+        metric: Its name.
+        proxy: Rate of each agent in the proxy.
+        target: The same on the target.
+        ties: How many pairs of agents tie, in the proxy and on the target.
+        pairs: How many pairs there are.
+    """
+
+    metric: str
+    proxy: Mapping[str, Rate]
+    target: Mapping[str, Rate]
+    ties: tuple[int, int]
+    pairs: int
+
+    @property
+    def note(self) -> str:
+        """How many pairs tie and what that does; empty where none does."""
+        if not any(self.ties):
+            return ""
+        count = f"{self.ties[0]} of {self.pairs} pairs of agents tie in the proxy, {self.ties[1]} on the target"
+        return f"{self.metric} is a success rate: {count}; a tie counts half: on one side alone it adds 1 to PRPV"
+
+
+def success_rates(inputs: Comparison) -> tuple[SuccessRates, ...]:
+    """The metrics that are nothing but zeros and ones, and not all alike, in their order."""
+    return tuple(
+        _rates(inputs, metric, column) for column, metric in enumerate(inputs.metrics) if _is_rate(inputs, column)
+    )
+
+
+def _is_rate(inputs: Comparison, column: int) -> bool:
+    known = [np.unique(side.values[side.driven][:, column]) for side in (inputs.proxy, inputs.target)]
+    return bool(np.array_equal(np.union1d(*known), (0.0, 1.0)))
+
+
+def _rates(inputs: Comparison, metric: Metric, column: int) -> SuccessRates:
+    proxy, target = (_of_agents(side, column) for side in (inputs.proxy, inputs.target))
+    ties = _ties(inputs.proxy, metric, column), _ties(inputs.target, metric, column)
+    agents = len(inputs.agents)
+    return SuccessRates(metric.name, proxy, target, ties, agents * (agents - 1) // 2)
+
+
+def _of_agents(table: ScoreTable, column: int) -> dict[str, Rate]:
+    # Loading scipy.stats takes longer than all else of most commands.
+    from scipy.stats import binomtest
+
+    rates = {}
+    for row, agent in enumerate(table.agents):
+        episodes = int(table.counts[row])
+        test = binomtest(round(float(np.nansum(table.values[row, :, column]))), episodes)
+        ends = test.proportion_ci(CONFIDENCE, method="wilson")
+        rates[agent] = Rate(float(test.statistic), float(ends.low), float(ends.high), episodes)
+    return rates
+
+
+def _ties(table: ScoreTable, metric: Metric, column: int) -> int:
+    merits, tie = metric.merits(table.means[:, column])
+    agents = len(merits)
+    return agents * (agents - 1) // 2 - int(stand(merits, float(tie[0])).below.sum())
+
+
+LEVEL = 0.05
+"""Chance explains a PRPV as low as is found by chance at least so often."""
+
+
+@dataclass(frozen=True)
+class Chance:
+    """PRPV when the proxy's scores are handed out to the agents at random.
+
+    Attributes:
+        mean: Mean over permutations.
+        deviation: Standard deviation over permutations.
+        p_value: How probable a PRPV as low as the proxy's is by chance, the proxy's own order counted as one.
+        permutations: How many were drawn.
+        inputs: What was compared, with its sample sizes.
+    """
+
+    mean: float
+    deviation: float
+    p_value: float
+    permutations: int
+    inputs: Comparison
+
+    @property
+    def explains(self) -> bool:
+        """Whether a random ranking does as well too often to be ruled out."""
+        return self.p_value >= LEVEL
+
+
+def chance(
+    *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], permutations: int = 1000, seed: int = 0
+) -> Chance:
+    """Permute which agent got which of the proxy's scores; the metrics of one agent stay together.
+
+    Raises:
+        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
+    """
+    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    in_proxy, on_target = inputs.means
+    rng = np.random.default_rng(seed)
+    shuffled = in_proxy[np.stack([rng.permutation(len(in_proxy)) for _ in range(permutations)])]
+    values = in_blocks(lambda proxy, _: prpv_of_means(proxy, on_target, inputs.metrics), shuffled, shuffled)
+    as_low = (values <= prpv_of_means(in_proxy, on_target, inputs.metrics)).sum()
+    p_value = float((1 + as_low) / (1 + permutations))
+    return Chance(float(values.mean()), float(values.std(ddof=1)), p_value, permutations, inputs)

@@ -1,21 +1,24 @@
-"""Bootstrap over episodes: what the measures would be, had the same agents driven other episodes."""
+"""Bootstrap over episodes: what the measures would be, had the same agents driven other episodes.
 
-from collections.abc import Callable, Iterator, Sequence
+Bootstrap intervals of the measures beside PRPV.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.scores import Array, Metric, ScoreTable
-from proxytune.usefulness.comparison import Comparison, compare
-from proxytune.usefulness.prpv import prpv_of_means
-from proxytune.usefulness.repeats import start_of, start_places
+from proxytune.arrays import Floats
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness.pairs import Comparison, compare, prpv_of_means, start_of, start_places
+from proxytune.usefulness.predictivity import Ppv, kendall_of_means, mmrv_of_means, pearson_of_means, ppv_of_means
 
 CONFIDENCE = 0.95
 BLOCK = 4_000_000
 """Most numbers held at once by a measure over many resamples."""
 
-Means = tuple[Array, Array]
+Means = tuple[Floats, Floats]
 """Mean scores of resampled episodes, in the proxy and on the target, each of shape (resamples, agents, metrics)."""
 
 
@@ -87,7 +90,7 @@ def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:
     return _means_of_draws(inputs.proxy, rng, resamples), on_target
 
 
-def _means_of_draws(table: ScoreTable, rng: np.random.Generator, resamples: int) -> Array:
+def _means_of_draws(table: ScoreTable, rng: np.random.Generator, resamples: int) -> Floats:
     if table.complete:
         return counted_means(table.values, draw_counts(table, rng, resamples))
     blocks = agent_blocks(table, resamples)
@@ -142,15 +145,15 @@ def _alike(inputs: Comparison, target_counts: NDArray[np.int64]) -> NDArray[np.i
     return target_counts[..., [columns.get(label, columns[start_of(label)]) for label in inputs.proxy.episodes]]
 
 
-def counted_means(values: Array, counts: NDArray[np.int64] | NDArray[np.bool_]) -> Array:
+def counted_means(values: Floats, counts: NDArray[np.int64] | NDArray[np.bool_]) -> Floats:
     """Mean scores (agents, episodes, metrics) when episodes count as often as drawn: (resamples, agents, metrics)."""
     sums = counts.astype(np.float64) @ np.nan_to_num(values)
     return np.asarray(np.swapaxes(sums / counts.sum(axis=-1)[..., None], 0, 1), dtype=np.float64)
 
 
 def in_blocks(
-    measure: Callable[[Array, Array], Array], proxy: Array, target: Array, *, numbers: int | None = None
-) -> Array:
+    measure: Callable[[Floats, Floats], Floats], proxy: Floats, target: Floats, *, numbers: int | None = None
+) -> Floats:
     """Apply a measure to many tables without holding at once all that it takes.
 
     Args:
@@ -164,7 +167,7 @@ def in_blocks(
     return np.concatenate([measure(proxy[start : start + size], target[start : start + size]) for start in starts])
 
 
-def interval(values: Array, confidence: float = CONFIDENCE) -> tuple[float, float]:
+def interval(values: Floats, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """The central interval that holds this share of the values."""
     tail = (1 - confidence) / 2
     low, high = np.quantile(values, [tail, 1 - tail])
@@ -191,3 +194,51 @@ def prpv_interval(inputs: Comparison, means: Means | None) -> PrpvInterval:
     values = in_blocks(lambda p, t: prpv_of_means(p, t, inputs.metrics), *means)
     low, high = interval(values)
     return PrpvInterval(value, float(values.mean()), min(low, value), max(high, value), len(values), inputs)
+
+
+Ends = tuple[float, float]
+UNDEFINED_SHARE = 0.05
+"""A measure undefined in more of the resamples than this gets no interval."""
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Percentile bootstrap intervals of the measures beside PRPV; None where one is undefined."""
+
+    ppv: Ends | None
+    srcc: Mapping[str, Ends | None]
+    kendall_tau: Mapping[str, Ends | None]
+    mmrv: Mapping[str, Ends | None]
+
+
+def intervals(*, inputs: Comparison, error: Ppv, means: Means | None) -> Intervals | None:
+    """The interval of every measure at once; None where episodes are not repeated.
+
+    Args:
+        inputs: What is compared.
+        error: PPV, with the weights that it has.
+        means: Mean scores of resampled episodes, None where there are none.
+    """
+    if means is None:
+        return None
+    weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])
+    each = inputs.target.means.size
+    return Intervals(
+        ppv=None
+        if error.value is None
+        else interval(in_blocks(lambda p, t: ppv_of_means(p, t, weights), *means, numbers=each)),
+        srcc=_per_metric(inputs.metrics, in_blocks(pearson_of_means, *means, numbers=each)),
+        kendall_tau=_per_metric(inputs.metrics, in_blocks(kendall_of_means, *means)),
+        mmrv=_per_metric(inputs.metrics, in_blocks(lambda p, t: mmrv_of_means(p, t, inputs.metrics), *means)),
+    )
+
+
+def _per_metric(metrics: Sequence[Metric], values: Floats) -> dict[str, Ends | None]:
+    """Intervals of values of shape (resamples, metrics)."""
+    return {metric.name: interval_where_defined(column) for metric, column in zip(metrics, values.T, strict=True)}
+
+
+def interval_where_defined(values: Floats) -> Ends | None:
+    """The interval of values of resamples, the undefined ones left out; None if these are too many."""
+    undefined = np.isnan(values)
+    return interval(values[~undefined]) if undefined.mean() <= UNDEFINED_SHARE else None

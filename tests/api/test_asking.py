@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune import Engine, InputError, SearchBox
-from proxytune.search.engines.random_points import RandomPoints
-from proxytune.search.engines.registry import ENGINES
+from proxytune.api.asking import SearchBox
+from proxytune.errors import InputError
+from proxytune.search import ENGINES, Engine
+from proxytune.search.engine import RandomPoints
 
 BOX = {"trim": (-0.3, 0.3), "delay": (0.0, 0.3)}
 

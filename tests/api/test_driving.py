@@ -4,8 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from proxytune import InputError, RunError, drive, run_study
-from proxytune.errors import EpisodeError, SettingsError
+from proxytune.api.driving import drive
+from proxytune.api.studies import run_study
+from proxytune.errors import EpisodeError, InputError, RunError, SettingsError
 
 PLANAR = {"plant": '"planar"', "seconds": "2.0", "position_noise_m": "0.0"}
 THETA = {"trim": 0.1}

@@ -1,31 +1,155 @@
-"""A log from DataFrames is the log of the same files, and its faults are told by row and column."""
+"""A diagnosis from Python: what is found, as tables, figures and files, and errors in Python's words.
 
-import sys
-from pathlib import Path
+A diagnosis of frames from Python: the camera's figures beside those of motion, and errors in Python's words.
+A log from DataFrames is the log of the same files, and its faults are told by row and column.
+"""
+
+import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
-
-sys.path.append(str(Path(__file__).parent.parent / "diagnosis"))
-
+from matplotlib.figure import Figure
+from pictured import lane_poses, write_still_frames
 from planted import CALM, TRUTH, planted_log, write_log
 
-from proxytune import InputError, log_of, read_log
-from proxytune.errors import LogError
+from proxytune.api.diagnosing import diagnose
+from proxytune.api.logs import log_of
+from proxytune.effects import read_model
+from proxytune.errors import InputError, LogError
+from proxytune.logs import read_log
+
+
+@pytest.fixture(scope="module")
+def planted():
+    """A log of a robot whose effective baseline nobody declared."""
+    return planted_log({**TRUTH, "yaw_scrub": 0.12}, episodes=4, seconds=12.0, noise=CALM)
+
+
+@pytest.fixture(scope="module")
+def report(planted):
+    return diagnose(planted)
+
+
+def test_the_planted_effect_is_found_with_its_value(report):
+    assert (report.verdict, report.effects) == ("explained", ("yaw_scrub",))
+    row = report.parameters().loc["yaw_scrub"]
+    assert row.low < row.value < row.high
+    assert abs(row.value - 0.12) < row.high - row.low
+    assert row.unit == "m"
+    assert np.isnan(row.before)
+    assert repr(report) == "DiagnosisReport of planted: explained: with the effects added, only noise is left"
+
+
+def test_the_errors_are_those_of_the_document_by_horizon(report):
+    errors = report.errors()
+    assert list(errors.index) == [1.0, 2.0, 5.0]
+    for one in report.document()["errors"]:
+        row = errors.loc[one["horizon_s"]]
+        assert (row.before, row.after, row.noise_floor) == (one["before"], one["after"], one["noise_floor"])
+    assert (errors.after < 0.2 * errors.before).all()
+
+
+def test_what_is_found_is_drawn_and_written_as_the_command_does(report, tmp_path):
+    assert all(isinstance(figure, Figure) for figure in report.figures().values())
+    paths = report.write(str(tmp_path / "found"))
+    assert [path.name for path in paths] == [
+        "diagnosis.json",
+        "model.toml",
+        *(f"{name}.png" for name in report.figures()),
+        "report.html",
+    ]
+    assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report.document()))
+    assert read_model(paths[1]).theta["yaw_scrub"] == pytest.approx(report.parameters().value["yaw_scrub"])
+    assert any("yaw_scrub" in note for note in report.notes)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"declared": ["trimm"]}, "^declared: trimm: no effect on motion has this name; did you mean 'trim'"),
+        ({"robot": "duckybot"}, "robot 'duckybot'.* did you mean 'duckiebot'|'duckybot'"),
+        ({"effects": ["nobodys:Slip"]}, "effect 'nobodys:Slip': no module 'nobodys'"),
+        ({"seed": -1}, "seed must be at least 0, got -1"),
+    ],
+)
+def test_options_that_cannot_be_used_are_one_line_in_python_s_words(planted, options, words):
+    with pytest.raises(InputError, match=words) as problem:
+        diagnose(planted, **options)
+    assert "\n" not in str(problem.value)
+    assert "--" not in str(problem.value)
+
+
+def test_a_robot_that_nobody_knows_is_asked_for_by_its_argument(planted):
+    with pytest.raises(LogError, match="state wheel_radius_m and baseline_m.*or name a robot with robot=") as problem:
+        diagnose(replace(planted, robot="unheard_of"))
+    assert "--robot" not in str(problem.value)
+
+
+def test_a_folder_that_is_no_log_is_refused(tmp_path):
+    with pytest.raises(LogError, match="no such folder; check the path"):
+        diagnose(str(tmp_path / "nowhere"))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    theta = {"camera_pitch": 19.15, "camera_roll": 4.0}
+    return write_still_frames(tmp_path_factory.mktemp("rolled") / "log", theta, lane_poses(30), columns=96)
+
+
+@pytest.fixture(scope="module")
+def report_of_diagnosing_frames(folder):
+    return diagnose(read_log(folder))
+
+
+def test_the_camera_speaks_where_there_is_no_motion(report_of_diagnosing_frames):
+    assert (report_of_diagnosing_frames.verdict, report_of_diagnosing_frames.effects) == ("explained", ("camera_roll",))
+    assert report_of_diagnosing_frames.diagnosis is None
+    assert report_of_diagnosing_frames.camera.verdict == "explained"
+    assert repr(report_of_diagnosing_frames).startswith("DiagnosisReport of pictured: camera: explained: ")
+
+
+def test_parameters_and_errors_are_those_of_the_document(report_of_diagnosing_frames):
+    camera = report_of_diagnosing_frames.document()["camera"]
+    row = report_of_diagnosing_frames.parameters().loc["camera_roll"]
+    told = camera["effects"][0]["parameters"]["camera_roll"]
+    assert (row.value, [row.low, row.high], row.unit) == (told["value"], told["interval"], "deg")
+    errors = report_of_diagnosing_frames.camera_errors()
+    assert errors.loc["markings", "after"] == camera["error"]["after"] < errors.loc["markings", "before"]
+    assert errors.loc["brightness", "before"] == camera["grey_error"]["before"]
+    assert list(errors.unit) == ["px", "grey levels"]
+    assert report_of_diagnosing_frames.errors().empty
+
+
+@pytest.mark.slow
+def test_what_is_written_is_what_is_said(report_of_diagnosing_frames, tmp_path):
+    paths = report_of_diagnosing_frames.write(tmp_path / "found")
+    assert json.loads(paths[0].read_text()) == json.loads(json.dumps(report_of_diagnosing_frames.document()))
+    assert {path.stem for path in paths[2:]} == {*report_of_diagnosing_frames.figures(), "report_of_diagnosing_frames"}
+    assert any("camera_roll" in note for note in report_of_diagnosing_frames.notes)
+
+
+def test_errors_are_in_python_s_words(folder):
+    with pytest.raises(InputError, match="^declared: camera_rol: .*did you mean 'camera_roll'") as problem:
+        diagnose(folder, declared=["camera_rol"])
+    assert "--" not in str(problem.value)
+    with pytest.raises(InputError, match="^test: pictured has no commands"):
+        diagnose(folder, test=folder)
+
 
 DESCRIPTION = {"robot": "duckiebot", "command": "duty", "rate_hz": 20}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder_of_logs(tmp_path_factory):
     log = planted_log(TRUTH, episodes=4, seconds=5.0, noise=CALM)
     return write_log(log, tmp_path_factory.mktemp("logs") / "planted")
 
 
 @pytest.fixture(scope="module")
-def samples(folder):
-    return pd.read_csv(folder / "samples.csv", dtype={"episode": str})
+def samples(folder_of_logs):
+    return pd.read_csv(folder_of_logs / "samples.csv", dtype={"episode": str})
 
 
 def same(one, other):
@@ -38,8 +162,8 @@ def same(one, other):
     )
 
 
-def test_a_log_of_dataframes_is_the_log_of_the_files(folder, samples):
-    assert same(log_of(samples, {**DESCRIPTION, "name": "planted"}), read_log(str(folder)))
+def test_a_log_of_dataframes_is_the_log_of_the_files(folder_of_logs, samples):
+    assert same(log_of(samples, {**DESCRIPTION, "name": "planted"}), read_log(str(folder_of_logs)))
 
 
 def test_a_log_without_a_name_has_one(samples):

@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from proxytune import InputError, ProxytuneError, RunError, read_study, run_study
+from proxytune.api.studies import read_study, run_study
 from proxytune.cli.main import main
+from proxytune.errors import InputError, ProxytuneError, RunError
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +126,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
             totals.append(total)
 
         def __enter__(self):
-            from proxytune.running.progress import Silent
+            from proxytune.running import Silent
 
             return Silent()
 

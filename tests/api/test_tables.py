@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune import InputError, Metric, read_scores, score
+from proxytune.api.tables import score
 from proxytune.cli.main import main
-from proxytune.errors import ScoresError
+from proxytune.errors import InputError, ScoresError
 from proxytune.report.scores.document import document_of
+from proxytune.scores import Metric, read_scores
 
 METRICS = ["distance:max", "time:min:5%"]
 

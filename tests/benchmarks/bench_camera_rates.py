@@ -9,12 +9,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from joblib import Parallel, delayed
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "fakes"))
-
 from camera_truth.answers import Answer, append, diagnosed, read_answers
 from camera_truth.rates import accuracy, all_sets, confusion, coverage, rates
+from joblib import Parallel, delayed
 
 
 def arguments(words: Sequence[str] | None = None) -> argparse.Namespace:

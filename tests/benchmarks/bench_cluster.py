@@ -19,12 +19,9 @@ import numpy as np
 from distributed import LocalCluster
 
 from proxytune.domain import DomainFamily, Episode, make_episode
-from proxytune.running.cluster import on_cluster
-from proxytune.running.episodes import run_episode
-from proxytune.running.workers import working
+from proxytune.running import on_cluster, run_episode, working
 from proxytune.seeds import episode_seed
-from proxytune.study.family import load_family
-from proxytune.study.settings import StudySettings, read_study_settings
+from proxytune.study import StudySettings, load_family, read_study_settings
 
 STUDIES = Path(__file__).resolve().parents[2] / "studies"
 NOTHING = 400

@@ -1,20 +1,15 @@
 """What a diagnosis costs: `python -m pytest tests/benchmarks/bench_diagnosis.py -o addopts= -s`."""
 
-import sys
-from pathlib import Path
-
+import hidden
 import pytest
 
-from proxytune.diagnosis.diagnose import diagnose
-from proxytune.diagnosis.measured.drives import gather
-from proxytune.diagnosis.measured.split import split
-from proxytune.diagnosis.model.innovations import FIRST_GUESS, fit_noise, whitener
-from proxytune.diagnosis.model.replay import increments
-from proxytune.diagnosis.naming.search import fit_declared, search
-from proxytune.driving.robot import read_robot
-
-sys.path.append(str(Path(__file__).parent.parent / "diagnosis"))
-import hidden
+from proxytune.diagnosis import increments
+from proxytune.diagnosis.motion.clocks import split
+from proxytune.diagnosis.motion.diagnose import diagnose
+from proxytune.diagnosis.motion.drives import gather
+from proxytune.diagnosis.motion.innovations import FIRST_GUESS, fit_noise, whitener
+from proxytune.diagnosis.motion.selection import fit_declared, search
+from proxytune.driving import read_robot
 
 ROBOT = read_robot("duckiebot")
 THETA = {"trim": 0.0, "delay": 0.15}

@@ -7,16 +7,15 @@ Times are of the processor, best of ROUNDS.
 
 import time
 
+import gymnasium
 import pytest
 
 from proxytune.domain import make_episode
-from proxytune.driving.agents import AGENTS
+from proxytune.driving import AGENTS
+from proxytune.environments import LANE_FOLLOWING
 
 pytest.importorskip("gymnasium")
 
-import gymnasium
-
-from proxytune.environments import LANE_FOLLOWING
 
 AGENT, START, SEED, ROUNDS, EPISODES = "steady", 1, 0, 5, 3
 OPTIONS = {"start": START, "episode_seed": SEED}

@@ -6,17 +6,12 @@ import numpy as np
 import pytest
 
 from proxytune.domain import make_episode
-from proxytune.driving import ground_plane
-from proxytune.driving.agents.loading import load_agent
-from proxytune.driving.bullet.plant import BulletPlant
-from proxytune.driving.drivetrain import drivetrain
-from proxytune.driving.episode import TICK_HZ
-from proxytune.driving.family import lane_following
-from proxytune.driving.planar import PlanarPlant, integrate
-from proxytune.driving.robot import read_robot
-from proxytune.driving.texels import plain
-from proxytune.driving.texels.choosing import by_numba
-from proxytune.driving.view import View
+from proxytune.driving import TICK_HZ, BulletPlant, drivetrain, lane_following, load_agent, read_robot
+from proxytune.driving import cameras as ground_plane
+from proxytune.driving import plain_texels as plain
+from proxytune.driving.cameras import View
+from proxytune.driving.plants import PlanarPlant, integrate
+from proxytune.driving.texels import by_numba
 from proxytune.effects import Setting, effects_from
 from proxytune.settings import Section
 

@@ -4,15 +4,11 @@ import resource
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "diagnosis"))
-
 from planted import ROBOT, TRUTH, planted_log
 
-from proxytune.diagnosis.diagnose import declared_effects, diagnose
+from proxytune.diagnosis.motion.diagnose import declared_effects, diagnose
 from proxytune.logs import Log, LogEpisode
 
 HOUR, SECONDS = 60, 60.0

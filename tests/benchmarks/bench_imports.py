@@ -14,16 +14,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import foreign_robot
 from joblib import Parallel, delayed
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "fakes"))
-
-import foreign_robot
-
-from proxytune.diagnosis.log_diagnosis import diagnose_log
-from proxytune.diagnosis.measured.vehicle import robot_of
-from proxytune.importing.facts import Facts
-from proxytune.importing.opening import open_log
+from proxytune.diagnosis import diagnose_log, robot_of
+from proxytune.importing import Facts, open_log
 
 OFFSETS_S = (0.0, -0.25, 0.1)
 FACTS = Facts(robot="nobodys", figures=foreign_robot.FIGURES)

@@ -9,14 +9,11 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import spearmanr
 
-from proxytune.search.engines.composite import composed_scores
-from proxytune.search.knowledge.output_model import fit_outputs
-from proxytune.search.surrogate import fit_surrogate, unit_array
-from proxytune.storage.store import Store
-from proxytune.study.knowledge import goal_of
-from proxytune.study.run import as_stored
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.search import fit_surrogate, unit_array
+from proxytune.search.likelihood import fit_outputs
+from proxytune.search.outcomes import composed_scores
+from proxytune.storage import Store
+from proxytune.study import StudyRun, as_stored, goal_of, open_study
 
 
 def main():

@@ -20,22 +20,11 @@ from proxytune.comparison.judgement import Judgement
 from proxytune.comparison.ranking import METRICS, Ranking
 from proxytune.comparison.runs import Run, RunKey
 from proxytune.comparison.summary import summarise
-from proxytune.search.design import design_point, from_unit, unit_points
-from proxytune.search.engines.gaussian_process import GaussianProcess, highest
-from proxytune.search.proposer import Trial
-from proxytune.search.surrogate import (
-    AMPLITUDE,
-    LENGTH_SCALE,
-    NOISE,
-    Surrogate,
-    fit_surrogate,
-    most_probable,
-    unit_array,
-)
+from proxytune.search import Surrogate, Trial, fit_surrogate, from_unit, unit_array, unit_points
+from proxytune.search.engine import design_point
+from proxytune.search.surrogate import AMPLITUDE, LENGTH_SCALE, NOISE, GaussianProcess, highest, most_probable
 from proxytune.seeds import proposal_seed
-from proxytune.usefulness import compare
-from proxytune.usefulness.prpv import prpv_of_means
-from proxytune.usefulness.resampling import bootstrap_means
+from proxytune.usefulness import bootstrap_means, compare, prpv_of_means
 
 BUDGET, INITIAL = 40, 10
 QUANTILES = norm.ppf((np.arange(32) + 0.5) / 32)

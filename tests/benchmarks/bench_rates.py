@@ -9,12 +9,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from joblib import Parallel, delayed
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "diagnosis"))
-
 import rate_rows
 import rates
+from joblib import Parallel, delayed
 from rate_jobs import GENERATORS, Job, all_jobs
 
 

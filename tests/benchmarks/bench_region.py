@@ -12,18 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.comparison.of_truths import MIDDLE, lacking_families
-from proxytune.running.progress import Bars
-from proxytune.search.design import from_unit, unit_points
-from proxytune.search.knowledge.knowledge import learn
-from proxytune.search.proposer import Trial
+from proxytune.running import Bars
+from proxytune.search import Trial, from_unit, learn, unit_points
 from proxytune.seeds import TARGET_OFFSET
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import plan, table
-from proxytune.study.knowledge import goal_of
-from proxytune.study.outputs import outputs_of
-from proxytune.study.stages.preflight import run_preflight
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store
+from proxytune.study import StudyRun, goal_of, open_study, outputs_of, plan, run_preflight, table
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "truths"
 DESIGN_SEED, TRUTH_SEED = 5, 77

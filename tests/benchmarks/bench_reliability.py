@@ -15,7 +15,6 @@ import random
 import re
 import signal
 import sqlite3
-import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable
@@ -23,22 +22,15 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-sys.path.append(str(Path(__file__).resolve().parents[1]))
-sys.path.append(str(Path(__file__).resolve().parents[1] / "fakes"))
-
 import conftest
 import launched
+import numpy as np
 import processes
 
 from proxytune.errors import ProxytuneError
-from proxytune.search.engines.registry import STUDY_ENGINES
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.run import as_stored
-from proxytune.study.study import Study, open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.search import STUDY_ENGINES
+from proxytune.storage import Store
+from proxytune.study import Study, StudyRun, as_stored, open_study, result_of
 
 KILLS = 4
 TABLES = ("facts", "trials", "episodes", "instances")

@@ -8,24 +8,19 @@ Without `--names` the search for named effects is left out: the remainder is lea
 """
 
 import argparse
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "diagnosis"))
-
 import rates
 from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, make_log
 
-from proxytune.diagnosis.diagnose import declared_effects, declared_parameters
-from proxytune.diagnosis.horizon.windows import cut, pose_errors
-from proxytune.diagnosis.measured.split import split
-from proxytune.diagnosis.measured.vehicle import robot_of
-from proxytune.diagnosis.model.fitting import fit
-from proxytune.diagnosis.naming.search import fit_declared, search
-from proxytune.diagnosis.remainder.remainder import HORIZONS_S, remainder
+from proxytune.diagnosis import cut, pose_errors, robot_of
+from proxytune.diagnosis.motion.clocks import split
+from proxytune.diagnosis.motion.diagnose import declared_effects, declared_parameters
+from proxytune.diagnosis.motion.discrepancy import HORIZONS_S, remainder
+from proxytune.diagnosis.motion.fitting import fit
+from proxytune.diagnosis.motion.selection import fit_declared, search
 from proxytune.effects import PARAMETERS
 from proxytune.logs import read_log
 

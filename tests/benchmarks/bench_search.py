@@ -11,15 +11,11 @@ import pytest
 from proxytune.comparison.analytic import BOX, Analytic
 from proxytune.domain import Outcome, make_episode
 from proxytune.scores import Metric
-from proxytune.search.design import design_point, to_unit
-from proxytune.search.engines.registry import make_proposer
-from proxytune.search.goal import Goal
-from proxytune.search.knowledge.knowledge import learn
-from proxytune.search.proposer import Trial
+from proxytune.search import Goal, Trial, learn, make_proposer, to_unit
+from proxytune.search.engine import design_point
 from proxytune.seeds import episode_seed
-from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
-from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.storage import Store, TrialRecord
+from proxytune.usefulness import prpv_of_means
 
 COUNTS = (25, 100, 400)
 REPEATS = 4

@@ -16,23 +16,15 @@ from typing import Any
 import pytest
 
 from proxytune.domain import Demonstration, make_episode
-from proxytune.driving.agents.pupil import Pupil
-from proxytune.driving.bullet.plant import BulletPlant
-from proxytune.driving.drivetrain import Drivetrain
-from proxytune.driving.episode import drive
-from proxytune.driving.expert import Expert
-from proxytune.driving.family import lane_following
-from proxytune.driving.ground_plane import GroundPlaneCamera
-from proxytune.driving.lane_following import LaneFollowing
-from proxytune.driving.planar import PlanarFleet, PlanarPlant
-from proxytune.driving.view import View
-from proxytune.learning.cache import Cache
+from proxytune.driving import BulletPlant, Drivetrain, Expert, GroundPlaneCamera, LaneFollowing, drive, lane_following
+from proxytune.driving.cameras import View
+from proxytune.driving.expert import Pupil
+from proxytune.driving.plants import PlanarFleet, PlanarPlant
+from proxytune.learning import Cache, Distribution, collect_samples, policy_of
 from proxytune.learning.cloning import BehaviourCloning
-from proxytune.learning.learner import policy_of
-from proxytune.learning.lessons import Distribution, collect_samples
 from proxytune.settings import Section
-from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import load_setup
+from proxytune.study import read_study_settings
+from proxytune.teaching import load_setup
 from proxytune.teaching.points import Point, TeachingSetup
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "teacher"

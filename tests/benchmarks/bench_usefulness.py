@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import assess, bootstrap_prpv, noise_floor, prpv
+from proxytune.usefulness import assess
+from proxytune.usefulness.noise import noise_floor
+from proxytune.usefulness.pairs import prpv
+from proxytune.usefulness.resampling import bootstrap_prpv
 
 METRICS = tuple(Metric(name) for name in "abc")
 

@@ -13,14 +13,12 @@ import numpy as np
 from scipy.stats import qmc
 
 from proxytune.comparison.calibrated import METRICS
-from proxytune.running.episodes import running
+from proxytune.running import running
 from proxytune.scores import ScoreTable
-from proxytune.search.design import from_unit
-from proxytune.search.knowledge.output_model import fit_outputs
-from proxytune.search.proposer import Trial
+from proxytune.search import Trial, from_unit
+from proxytune.search.likelihood import fit_outputs
 from proxytune.seeds import TARGET_OFFSET
-from proxytune.study.evaluation import plan
-from proxytune.study.study import open_study
+from proxytune.study import open_study, plan
 
 POINTS, PAIRS = 48, 24
 

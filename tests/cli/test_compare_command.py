@@ -8,8 +8,8 @@ from proxytune.cli.compare import _engines, read_runs
 from proxytune.cli.compare_objective import WithinRun
 from proxytune.cli.main import main, parser
 from proxytune.comparison.judgement import judging_code
-from proxytune.search.engines import registry as engines
-from proxytune.storage.store import Store
+from proxytune.search import registry as engines
+from proxytune.storage import Store
 
 FEW = ("--engines", "random,sobol", "--seeds", "2", "--budget", "7", "--initial", "5")
 

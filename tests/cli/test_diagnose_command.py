@@ -2,22 +2,18 @@
 
 import json
 import shutil
-import sys
 from dataclasses import replace
 from pathlib import Path
 
+import hidden
 import numpy as np
 import pandas as pd
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
-import hidden
 from planted import CALM, TRUTH, planted_log, with_poses, write_log
 
 from proxytune.cli.main import main
 from proxytune.effects import CATALOGUE, read_model
-from proxytune.study.study import open_study
+from proxytune.study import open_study
 
 KEYS = {
     "verdict",

@@ -2,15 +2,11 @@
 
 import io
 import json
-import sys
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
 from circling import circling_log
 from pictured import add_frames, lane_poses, write_still_frames
 from planted import CALM, TRUTH, write_log

@@ -12,9 +12,9 @@ from failing_disk import HOOKED, forking
 from processes import besides_progress, episodes, trials
 
 from proxytune.errors import StoreError
+from proxytune.storage import Store, salvage
 from proxytune.storage.formats import FORMAT
-from proxytune.storage.repair import salvage
-from proxytune.storage.store import Store, theta_json
+from proxytune.storage.store import theta_json
 
 pytestmark = [
     pytest.mark.slow,

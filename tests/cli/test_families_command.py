@@ -11,7 +11,7 @@ from taught import TEACHING
 from proxytune.api.families import Quiet, Spending, read_families, run_families, run_opened_families
 from proxytune.cli.main import main
 from proxytune.errors import InputError
-from proxytune.study.settings import read_study_settings
+from proxytune.study import read_study_settings
 
 FAST = "[families.fast]\n[families.slow.domain]\nsleep = 0.02\n"
 THIS_RUN = ("episodes", "seconds")

@@ -1,19 +1,15 @@
 """Ctrl-C in the middle of what a command writes: what its line says of files is true, and no draft is left."""
 
 import signal
-import sys
 from pathlib import Path
 
 import foreign_robot
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
 from pictured import lane_poses, write_still_frames
 
 from proxytune.cli.main import COMMANDS, main
+from proxytune.files import shipped
 from proxytune.report import writing
-from proxytune.shipped import shipped
 
 TABLE = "agent,episode,distance\n" + "".join(f"{agent},{k},{k + i}\n" for i, agent in enumerate("ABC") for k in (1, 2))
 MODEL = 'format = 1\nrobot = "duckiebot"\nplant = "planar"\n[effects.trim]\ntrim = 0.05\n'
@@ -111,14 +107,14 @@ def test_import_leaves_nothing(tmp_path, interrupted, monkeypatch):
     drives = [foreign_robot.drive(0, seconds=20.0)]
     source = foreign_robot.write_form(tmp_path, "csv", drives)
     before = {path.name for path in tmp_path.iterdir()}
-    monkeypatch.setattr("proxytune.importing.writing.read_log", lambda draft: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr("proxytune.importing.reading.read_log", lambda draft: signal.raise_signal(signal.SIGINT))
     figures = [word for key, value in foreign_robot.FIGURES.items() for word in ("--figure", f"{key}={value}")]
     interrupted(tmp_path, "import", source, tmp_path / "log", *figures)
     assert {path.name for path in tmp_path.iterdir()} == before
 
 
 def test_record_leaves_no_log_but_pictures(tmp_path, interrupted, ctrl_c, monkeypatch):
-    monkeypatch.setattr("proxytune.diagnosis.filming.SHORTEST_S", 0.5)
+    monkeypatch.setattr("proxytune.diagnosis.recording.SHORTEST_S", 0.5)
     study = (shipped("studies") / "quickstart" / "study.toml").read_text(encoding="utf-8")
     (tmp_path / "study.toml").write_text(study)
     (tmp_path / "model.toml").write_text(MODEL)

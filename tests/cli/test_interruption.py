@@ -3,22 +3,18 @@
 import json
 import os
 import signal
-import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from planted import planted_log, write_log
 from processes import besides_progress, finished_episodes, start, wait_for
 
 from proxytune.cli.compare import read_runs
 from proxytune.cli.main import COMMANDS, main
 from proxytune.cli.terminal.interruption import Terminated, signals_as_interruptions
-from proxytune.extensions.interrupting import Interrupted
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
-from planted import planted_log, write_log
+from proxytune.extensions import Interrupted
 
 SLOWLY = {"sleep": "0.03"}
 

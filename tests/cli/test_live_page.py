@@ -9,8 +9,8 @@ from proxytune.cli.main import main
 from proxytune.cli.terminal import live_page
 from proxytune.cli.terminal.live_page import LivePage, renewed_page
 from proxytune.errors import RunError
-from proxytune.running.progress import Silent
-from proxytune.study.study import open_study
+from proxytune.running import Silent
+from proxytune.study import open_study
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
-from proxytune.extensions.interrupting import Interrupted
+from proxytune.extensions import Interrupted
 
 
 def proxytune(*words, cwd):

@@ -1,16 +1,11 @@
 """`predict` replays any log with a model file and says how far it strays."""
 
 import json
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
 from planted import TRUTH, planted_log, with_poses, write_log
 
 from proxytune.cli.main import main

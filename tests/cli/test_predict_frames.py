@@ -2,17 +2,12 @@
 
 import json
 import shutil
-import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from PIL import Image
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
 from pictured import lane_poses, pictures, write_still_frames
+from PIL import Image
 from planted import TRUTH, planted_log, write_log
 
 from proxytune.cli.main import main

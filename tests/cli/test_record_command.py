@@ -5,12 +5,10 @@ import pytest
 from PIL import Image
 
 from proxytune.cli.main import main
-from proxytune.diagnosis import filming
-from proxytune.logs import read_log
-from proxytune.logs.pictures import read_pictures
-from proxytune.shipped import shipped
-from proxytune.study.family import load_family
-from proxytune.study.settings import read_study_settings
+from proxytune.diagnosis import recording as filming
+from proxytune.files import shipped
+from proxytune.logs import read_log, read_pictures
+from proxytune.study import load_family, read_study_settings
 
 MODEL = 'format = 1\nrobot = "duckiebot"\nplant = "planar"\n[effects.camera_roll]\ncamera_roll = 4.0\n'
 

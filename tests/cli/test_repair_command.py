@@ -9,7 +9,7 @@ from edited import edited
 from processes import episodes, trials
 
 from proxytune.cli.main import main
-from proxytune.storage.store import Store
+from proxytune.storage import Store
 
 DAMAGES = {
     "a score": ("UPDATE trials SET score = score + 7 WHERE number = 3", 2, 0),

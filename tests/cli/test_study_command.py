@@ -71,7 +71,7 @@ def test_bad_input_is_one_line_and_exit_2(make_study, capsys):
 def test_an_engine_that_is_not_installed_is_refused_by_file_and_key_and_nothing_is_simulated(
     make_study, capsys, monkeypatch
 ):
-    monkeypatch.setattr("proxytune.search.engines.registry.find_spec", lambda name: None)
+    monkeypatch.setattr("proxytune.search.registry.find_spec", lambda name: None)
     folder = make_study(engine='"tpe"')
     told = refused(capsys, 2, "study", folder)
     assert f"{folder / 'study.toml'}: engine: 'tpe' needs Optuna, which is not installed" in told

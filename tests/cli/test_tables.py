@@ -1,15 +1,10 @@
 """Tables are readable at 80 columns and at 44: names and figures may be broken, but never cut."""
 
 import io
-import sys
-from pathlib import Path
 
 import foreign_robot
 import pytest
 from rich.console import Console
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
 from taught import make_taught
 
 from proxytune.cli.main import COMMANDS, parser

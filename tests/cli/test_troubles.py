@@ -12,12 +12,10 @@ from processes import besides_progress, episodes, start, trials
 from stopping import Stopping
 
 from proxytune.cli.main import main
-from proxytune.search.engines.registry import make_proposer
+from proxytune.search import make_proposer
+from proxytune.storage import Store
 from proxytune.storage.formats import FORMAT
-from proxytune.storage.store import Store
-from proxytune.study.run import run_study
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.study import StudyRun, open_study, run_study
 
 slow = pytest.mark.slow
 DAMAGED = r"is damaged \([^)]+\); restore a copy, or keep what is whole: python -m proxytune repair \S+"

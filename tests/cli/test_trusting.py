@@ -13,9 +13,8 @@ import pytest
 from proxytune.cli.main import main
 from proxytune.cli.terminal.trusting import is_trusted, memory, only_trusted_code, remember
 from proxytune.errors import ExtensionError
-from proxytune.extensions import load
-from proxytune.extensions.beside import import_beside
-from proxytune.shipped import shipped
+from proxytune.extensions import import_beside, load
+from proxytune.files import shipped
 
 FAMILY = """
 from pathlib import Path

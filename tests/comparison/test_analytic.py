@@ -3,7 +3,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxytune.comparison.analytic import CEILING, NOISE, STEP, Analytic
-from proxytune.search.design import design_point, from_unit, to_unit
+from proxytune.search import from_unit, to_unit
+from proxytune.search.engine import design_point
 
 OBJECTIVE = Analytic()
 SEEDS = st.integers(0, 1000)

@@ -4,8 +4,9 @@ from hypothesis import strategies as st
 
 from proxytune.comparison.calibrated import COMPARED, LONGEST, METRICS, Calibrated, replaced
 from proxytune.comparison.courses import course, simulated
-from proxytune.search.design import design_point, from_unit, to_unit
-from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.search import from_unit, to_unit
+from proxytune.search.engine import design_point
+from proxytune.usefulness import prpv_of_means
 
 OBJECTIVE = Calibrated()
 BOX_POINTS = [design_point(OBJECTIVE.space, index, 7) for index in range(64)]

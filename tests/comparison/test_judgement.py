@@ -7,10 +7,8 @@ import pytest
 from proxytune.comparison.analytic import Analytic
 from proxytune.comparison.calibrated import Calibrated
 from proxytune.comparison.judgement import Judgement, judge, judgement_from, judging_code
-from proxytune.search.design import design_point, from_unit, unit_points
-from proxytune.search.knowledge.knowledge import learn
-from proxytune.search.proposer import Trial
-from proxytune.search.surrogate import fit_surrogate
+from proxytune.search import Trial, fit_surrogate, from_unit, learn, unit_points
+from proxytune.search.engine import design_point
 
 OBJECTIVE = Calibrated()
 SEED = 3

@@ -5,14 +5,12 @@ import pytest
 
 from proxytune.comparison.of_truths import TruthObjective, lacking_families
 from proxytune.errors import EpisodeError, InputError
-from proxytune.running.progress import Silent
-from proxytune.search.design import design_point, to_unit
+from proxytune.running import Silent
+from proxytune.search import to_unit
+from proxytune.search.engine import design_point
 from proxytune.seeds import fresh_seed, target_seed
-from proxytune.storage.store import Store
-from proxytune.study.evaluation import plan
-from proxytune.study.measure import measure
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store
+from proxytune.study import StudyRun, measure, open_study, plan
 
 
 @pytest.fixture

@@ -4,8 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from proxytune.comparison.ranking import AGENTS, METRICS, Ranking
-from proxytune.search.design import design_point, from_unit, to_unit
-from proxytune.usefulness import prpv
+from proxytune.search import from_unit, to_unit
+from proxytune.search.engine import design_point
+from proxytune.usefulness.pairs import prpv
 
 OBJECTIVE = Ranking()
 

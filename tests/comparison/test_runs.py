@@ -8,7 +8,7 @@ from proxytune.comparison.analytic import Analytic
 from proxytune.comparison.judgement import Judgement, Reading
 from proxytune.comparison.runs import Run, RunKey, judged_again, run_document, run_engine, run_from
 from proxytune.comparison.summary import estimate, median_curve, summarise
-from proxytune.search.engines.registry import engine_of
+from proxytune.search import engine_of
 
 SOBOL = engine_of("sobol")
 KEY = RunKey("analytic 1", "sobol", 1, 12, 4, "")

@@ -1,17 +1,13 @@
 """The robots with hidden effects move as worked out by hand."""
 
 import ast
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 
+import hidden
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parent))
-
-import hidden
 from bullet_truth import BULLET, make_bullet_log
 from hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, Case, make_log
 from manoeuvres import MANOEUVRES, Drives, make_drives

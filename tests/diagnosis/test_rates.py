@@ -1,17 +1,11 @@
 """How often the diagnosis is right, over hidden effects of every kind at full size."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-from joblib import Parallel, delayed
-
-sys.path.append(str(Path(__file__).parent))
-
 import rate_rows
 import rates
 from hidden import Case
+from joblib import Parallel, delayed
 from rate_jobs import Job, all_jobs
 
 EVERY = 30

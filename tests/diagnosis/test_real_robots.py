@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from proxytune.diagnosis.diagnose import declared_effects, diagnose
-from proxytune.diagnosis.measured.vehicle import robot_of
+from proxytune.diagnosis import robot_of
+from proxytune.diagnosis.motion.diagnose import declared_effects, diagnose
 from proxytune.logs import read_log
 
 LOGS = Path(__file__).resolve().parents[2] / "../shared/data/logs"

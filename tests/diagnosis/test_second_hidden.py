@@ -1,21 +1,17 @@
 """The robots of the second generator move as worked out by hand, and by more than its noise."""
 
 import ast
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import hidden
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-
-sys.path.append(str(Path(__file__).parent))
-
-import hidden
 import second_drives as drives
 import second_hidden as second
+from numpy.typing import NDArray
 from second_cases import LEVELS, NOISES
 from second_hidden import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, Case, make_log
 

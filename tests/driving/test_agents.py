@@ -3,16 +3,22 @@
 import numpy as np
 import pytest
 
-from proxytune.driving.agents import AGENTS, Agent, Laggy, LanePilot, Leaning, Smoothed, Wary
-from proxytune.driving.agents.loading import load_agent
-from proxytune.driving.agents.perception import fit_lane, open_eye, white_pixels, yellow_pixels
-from proxytune.driving.agents.pilots import HALF_LANE_M, duties
-from proxytune.driving.ground_plane import GroundPlaneCamera
-from proxytune.driving.road.reading import shipped_map
-from proxytune.driving.road.texture import draw_floor
-from proxytune.driving.robot import read_robot
+from proxytune.driving import AGENTS, Agent, GroundPlaneCamera, draw_floor, load_agent, read_robot, shipped_map
+from proxytune.driving.agents import (
+    HALF_LANE_M,
+    Laggy,
+    LanePilot,
+    Leaning,
+    Smoothed,
+    Wary,
+    duties,
+    fit_lane,
+    open_eye,
+    white_pixels,
+    yellow_pixels,
+)
 from proxytune.errors import ExtensionError
-from proxytune.testing import check_agent
+from proxytune.testing.extension import check_agent
 
 SMALL_LOOP = shipped_map("small_loop")
 ROBOT = read_robot("duckiebot")

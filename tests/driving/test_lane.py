@@ -8,8 +8,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from proxytune.driving.road.lane import lane_length, lane_point, lane_pose, off_map
-from proxytune.driving.road.reading import shipped_map
+from proxytune.driving import lane_length, lane_point, lane_pose, off_map, shipped_map
 
 ROAD = shipped_map("small_loop")
 SIDE, TILE = ROAD.size[0], ROAD.width

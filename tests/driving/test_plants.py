@@ -1,188 +1,111 @@
-"""Both plants drive as the reference model says, and like each other."""
+"""What a URDF says of its wheels, and that the bullet plant does not drive one that says otherwise than robot.toml."""
 
-import numpy as np
+import math
+import shutil
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
-from proxytune.driving.bullet import worlds
-from proxytune.driving.bullet.plant import BulletPlant
-from proxytune.driving.drivetrain import drivetrain
-from proxytune.driving.planar import PlanarPlant, integrate
-from proxytune.driving.robot import read_robot
-from proxytune.effects import CATALOGUE, Setting, Stage, effects_from, theta_names
+from proxytune.driving import lane_following, parse_urdf, read_body, read_robot, robot_names
+from proxytune.driving.plants import check_body
+from proxytune.errors import SettingsError
+from proxytune.files import shipped
+from proxytune.settings import Section
 
 ROBOT = read_robot("duckiebot")
-TICK_S = 1 / 60
-START = np.array([0.3, -0.2, 0.7])
-PLANTS = {
-    "bullet": lambda: BulletPlant(ROBOT, START, TICK_S),
-    "planar": lambda: PlanarPlant(START, TICK_S),
-}
-ON_THE_MOVE = {
-    name: effect for name, effect in CATALOGUE.items() if effect.stage in (Stage.COMMAND, Stage.ACTUATION, Stage.MOTION)
-}
+TEXT = ROBOT.urdf.read_text(encoding="utf-8")
 
 
-def values_to_agree_on():
-    """Each parameter by itself at its last probe but one, and each wheel effect with either wheel the worse."""
-    for name, effect in ON_THE_MOVE.items():
-        main = effect.parameters[0]
-        there = {} if isinstance(main.neutral, str) else {theta_names(effect)[0]: main.probes[len(main.probes) // 2]}
-        for theta_name, parameter in zip(theta_names(effect), effect.parameters, strict=True):
-            shape = parameter.shape
-            for probe in parameter.probes[1:3] if shape else parameter.probes[-2:-1]:
-                yield pytest.param(name, {**(there if shape else {}), theta_name: probe}, id=f"{theta_name}={probe}")
+def body_of(text):
+    return read_body(ET.fromstring(text), Path("robot.urdf"))
 
 
-def twists_for(duties, **theta):
-    train = drivetrain(ROBOT, effects_from({**ROBOT.theta, "delay": 0.0, **theta}, ROBOT.figures))
-    return train.apply(duties, train.begin(Setting(60.0, np.zeros(2), ROBOT.figures, 3, START[2:], START[None, :2])))[0]
+def test_the_duckiebots_wheels_mass_and_camera_are_read():
+    body = body_of(TEXT)
+    assert (body.left.joint, body.right.joint) == ("axle_left", "axle_right")
+    assert (body.left.radius_m, body.wheel_distance) == pytest.approx((0.0318, 0.1))
+    assert body.left.effort == 0.08
+    assert body.mass_kg == pytest.approx(ROBOT.figures["mass"])
+    assert body.camera[:3, 3] == pytest.approx((0.066, 0.0, 0.108))
+    assert math.degrees(math.asin(-body.camera[2, 0])) == pytest.approx(ROBOT.figures["camera_pitch"], abs=1e-4)
 
 
-def poses_for(plant, duties, **theta):
-    with PLANTS[plant]() as robot:
-        poses, crashed = robot.move(twists_for(duties, **theta))
-    assert not crashed
-    return np.vstack((START, poses))
+def test_turned_wheel_joints_and_fixed_joints_between_are_followed():
+    turned = TEXT.replace('xyz="0 0.05 0.0318"', 'xyz="0 0.05 0.0318" rpy="-1.5707963 0 0"')
+    turned = turned.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>', 1)
+    assert body_of(turned).left.axis == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
 
 
-def held(left, right, seconds=5.0):
-    return np.tile((left, right), (round(seconds * 60), 1))
+def test_of_more_wheels_those_called_axles_are_driven():
+    third = '<link name="w"/><joint name="rear" type="continuous"><parent link="chassis"/><child link="w"/>'
+    third += '<axis xyz="0 1 0"/></joint></robot>'
+    assert body_of(TEXT.replace("</robot>", third)).left.joint == "axle_left"
+    unnamed = TEXT.replace("axle_", "wheel_joint_").replace("</robot>", third)
+    with pytest.raises(
+        SettingsError, match="found wheel_joint_left, wheel_joint_right, rear; call the two driven joints"
+    ):
+        body_of(unnamed)
 
 
-def speeds(poses):
-    return np.hypot(*np.diff(poses[:, :2], axis=0).T) * 60
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_full_duty_drives_at_0_6_metres_per_second_within_3_percent(plant):
-    assert speeds(poses_for(plant, held(1, 1)))[-1] == pytest.approx(0.6, rel=0.03)
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_speed_follows_a_step_with_a_time_constant_of_0_2_seconds_within_3_percent(plant):
-    speed = speeds(poses_for(plant, held(1, 1)))
-    gap = np.log(1 - speed[5:40] / speed[-1])
-    assert -1 / np.polyfit(np.arange(5, 40) / 60, gap, 1)[0] == pytest.approx(0.2, rel=0.03)
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize(("left", "right", "yaw"), [(0, 1, 3.75), (1, 0, -3.75)])
-def test_one_wheel_at_full_duty_turns_at_3_75_radians_per_second_within_3_percent(plant, left, right, yaw):
-    poses = poses_for(plant, held(left, right))
-    assert (poses[-1, 2] - poses[-121, 2]) / 2.0 == pytest.approx(yaw, rel=0.03)
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize(("duty", "trim"), [(0.5, 0.1), (1.0, 0.1), (0.5, 0.3), (0.3, -0.2), (0.6, -0.05)])
-def test_trim_curves_the_path_by_12_5_per_metre_within_3_percent(plant, duty, trim):
-    last = poses_for(plant, held(duty, duty), trim=trim)[-121:]
-    curvature = (last[-1, 2] - last[0, 2]) / (speeds(last).sum() * TICK_S)
-    assert curvature == pytest.approx(12.5 * trim, rel=0.03)
-
-
-def mixed_driving(seed):
-    random = np.random.default_rng(seed)
-    steps = random.uniform(-0.2, 1.0, (10, 1)) + random.normal(0.0, 0.3, (10, 2))
-    return np.repeat(np.clip(steps, -1.0, 1.0), 30, axis=0)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_bullet_and_planar_agree_within_2_cm_and_3_degrees_after_5_seconds_of_mixed_driving(seed):
-    apart = poses_for("bullet", mixed_driving(seed))[-1] - poses_for("planar", mixed_driving(seed))[-1]
-    assert np.hypot(*apart[:2]) < 0.02
-    assert abs(np.degrees(apart[2])) < 3.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "theta"), list(values_to_agree_on()))
-def test_bullet_and_planar_agree_with_every_effect_on_how_the_robot_moves(name, theta):
-    """Within 2 cm and 3°; with backlash within 7 cm and 4°.
-
-    A gear that has crossed its gap takes the wheel along at once; a tyre slips until it has caught up.
-    """
-    metres, degrees = (0.07, 4.0) if name == "backlash" else (0.02, 3.0)
-    moved = []
-    for duties in (mixed_driving(0), mixed_driving(1)):
-        planar = poses_for("planar", duties, **theta)
-        apart = poses_for("bullet", duties, **theta)[-1] - planar[-1]
-        assert np.hypot(*apart[:2]) < metres
-        assert abs(np.degrees(apart[2])) < degrees
-        moved.append(np.abs(planar - poses_for("planar", duties)).max())
-    assert max(moved) > 0.005
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_the_same_twists_give_the_same_poses_to_the_last_bit(plant):
-    np.testing.assert_array_equal(poses_for(plant, held(0.6, 0.4, 1)), poses_for(plant, held(0.6, 0.4, 1)))
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_moving_in_chunks_changes_nothing(plant):
-    twists = twists_for(held(0.7, 0.5, 1.0))
-    with PLANTS[plant]() as whole, PLANTS[plant]() as cut:
-        together, _ = whole.move(twists)
-        pieces = np.concatenate([cut.move(twists[i : i + 3])[0] for i in range(0, len(twists), 3)])
-    np.testing.assert_allclose(pieces, together, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_sideways_motion_slides_the_body_to_its_left(plant):
-    twists = np.tile((0.2, 0.05, 0.0), (120, 1))
-    with PLANTS[plant]() as robot:
-        end = robot.move(twists)[0][-1]
-    across = np.array((-np.sin(START[2]), np.cos(START[2]))) @ (end[:2] - START[:2])
-    assert across == pytest.approx(0.1, abs=0.005)
-
-
-def test_a_robot_on_its_back_has_crashed():
-    robot = BulletPlant(ROBOT, START, TICK_S)
-    import pybullet
-
-    with robot:
-        upside_down = pybullet.getQuaternionFromEuler((np.pi, 0.0, 0.0))
-        pybullet.resetBasePositionAndOrientation(robot._body, (0, 0, 0.12), upside_down, physicsClientId=robot._world)
-        _, crashed = robot.move(np.zeros((60, 3)))
-    assert crashed
-
-
-def test_planar_integration_is_exact_on_a_circle():
-    twists = np.tile((0.5, 0.0, 1.25), (2, 240, 1))
-    poses = integrate(np.zeros((2, 3)), twists, TICK_S)
-    angle = 1.25 * np.arange(1, 241) * TICK_S
-    np.testing.assert_allclose(poses[0, :, 0], 0.4 * np.sin(angle), atol=1e-12)
-    np.testing.assert_allclose(poses[1, :, 1], 0.4 * (1 - np.cos(angle)), atol=1e-12)
-
-
-def test_in_a_world_that_others_have_left_a_robot_drives_to_the_bit_as_in_a_new_one(monkeypatch):
-    duties = held(0.6, 0.5, 2.0)
-    for twist in ((0.3, 0.2, 2.0), (-0.5, 0.0, -9.0)):  # one slides sideways, one spins
-        with BulletPlant(ROBOT, START, TICK_S) as robot:
-            robot.move(np.tile(twist, (40, 1)))
-    before = len(worlds._empty)
-    used = poses_for("bullet", duties)
-    assert len(worlds._empty) == before > 0
-    monkeypatch.setattr(worlds, "_empty", [])
-    np.testing.assert_array_equal(poses_for("bullet", duties), used)
-
-
-def test_two_robots_at_once_do_not_disturb_each_other():
-    alone = poses_for("bullet", held(0.5, 0.6, 1.0))[1:]
-    with PLANTS["bullet"]() as one, PLANTS["bullet"]() as two:
-        twists = twists_for(held(0.5, 0.6, 1.0))
-        both = [(one.move(twists[i : i + 3])[0], two.move(-twists[i : i + 3])[0]) for i in range(0, len(twists), 3)]
-    np.testing.assert_array_equal(np.concatenate([first for first, _ in both]), alone)
-
-
-LEARNT = {
-    **{"learnt.range.forward@low": -0.6, "learnt.range.forward@high": 0.6},
-    **{"learnt.range.yaw@low": -4.0, "learnt.range.yaw@high": 4.0},
-    **{"learnt.turn_rate.yaw@-2.0": 0.4, "learnt.turn_rate.yaw@2.0": -0.4, "learnt.time.left@3.0": -0.2},
+BAD = {
+    "no file": (None, "cannot be read"),
+    "no XML": ("robot", "is not XML"),
+    "no URDF": ("<sdf/>", "is no URDF: it needs <robot> with links; got <sdf>"),
 }
 
 
-def test_both_plants_drive_what_was_learnt():
-    duties = held(0.3, 0.5, seconds=4.0)
-    moved = [np.hypot(*(poses_for(plant, duties, **LEARNT) - poses_for(plant, duties))[-1, :2]) for plant in PLANTS]
-    assert min(moved) > 0.05
-    bullet, planar = (poses_for(plant, duties, **LEARNT)[-1] for plant in PLANTS)
-    np.testing.assert_allclose(bullet, planar, atol=0.04)
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_no_urdf_is_refused_in_a_line(tmp_path, case):
+    text, expected = BAD[case]
+    path = tmp_path / "robot.urdf"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(SettingsError, match=expected) as caught:
+        parse_urdf(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_words_for_numbers_are_refused_in_a_line():
+    with pytest.raises(SettingsError, match="is no sound URDF .*'wide'"):
+        body_of(TEXT.replace("0 0.05 0.0318", "0 wide 0.0318"))
+
+
+CHANGES = {
+    "another radius": ("0.0318", "0.04", r"has the wheel_radius 0.04 m, robot.toml says 0.0318 m; correct the one"),
+    "another distance": ("0 0.05 0.0318", "0 0.06 0.0318", "has the wheel_distance 0.11 m, robot.toml says 0.1 m"),
+    "another name": ("axle_left", "left_wheel_joint", "found left_wheel_joint, axle_right|must be called axle_left"),
+    "an axle to the right": ('<axis xyz="0 1 0"/>', '<axis xyz="0 -1 0"/>', "its axis must point to the left"),
+}
+
+
+@pytest.mark.parametrize("case", CHANGES)
+def test_a_urdf_that_disagrees_with_robot_toml_is_refused(tmp_path, case):
+    before, after, expected = CHANGES[case]
+    path = tmp_path / "robot.urdf"
+    path.write_text(TEXT.replace(before, after))
+    with pytest.raises(SettingsError, match=expected):
+        check_body(replace(ROBOT, urdf=path))
+
+
+def test_a_study_of_such_a_robot_is_refused_before_the_first_episode(tmp_path):
+    shutil.copytree(shipped("robots") / "duckiebot", tmp_path / "mine")
+    described = tmp_path / "mine" / "robot.toml"
+    described.write_text(
+        described.read_text().replace('"duckiebot"', '"mine"').replace("value = 0.0318", "value = 0.05")
+    )
+    section = Section(tmp_path / "study.toml", "domain.", {"robot": "mine"})
+    with pytest.raises(SettingsError, match=r"domain.robot: duckiebot.urdf: has the wheel_radius"):
+        lane_following(section, model=None)
+    planar = Section(tmp_path / "study.toml", "domain.", {"robot": "mine", "plant": "planar"})
+    assert lane_following(planar, model=None).plant == "planar"
+
+
+def test_a_robot_beside_the_studys_folder_is_its_robot_too(tmp_path):
+    shutil.copytree(shipped("robots") / "husky", tmp_path / "mine")
+    described = tmp_path / "mine" / "robot.toml"
+    described.write_text(described.read_text().replace('"husky"', '"mine"'))
+    (tmp_path / "study").mkdir()
+    assert "mine" in robot_names(tmp_path / "study")
+    assert read_robot("mine", tmp_path / "study").figures["wheel_radius"] == 0.165

@@ -8,16 +8,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from proxytune.driving import (
+    CAMERA,
+    UNITS,
+    BulletPlant,
+    drivetrain,
+    lane_following,
+    read_robot,
+    robot_from_geometry,
+    robot_names,
+)
 from proxytune.driving import robot as module
-from proxytune.driving.bullet.plant import BulletPlant
-from proxytune.driving.drivetrain import drivetrain
-from proxytune.driving.family import lane_following
-from proxytune.driving.planar import PlanarPlant
-from proxytune.driving.robot import CAMERA, REQUIRED, UNITS, read_robot, robot_from_geometry, robot_names
+from proxytune.driving.plants import PlanarPlant
+from proxytune.driving.robot import REQUIRED
 from proxytune.effects import CATALOGUE, Setting, Stage, effects_from, theta_names
 from proxytune.errors import ExtensionError, SettingsError
+from proxytune.files import shipped
 from proxytune.settings import Section, read_settings
-from proxytune.shipped import shipped
 
 ROBOT = read_robot("duckiebot")
 BODY = ET.parse(ROBOT.urdf).getroot()

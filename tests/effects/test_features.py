@@ -1,11 +1,15 @@
-"""Hats are curves that vanish at 0 and stay level beyond their last knot."""
+"""Hats are curves that vanish at 0 and stay level beyond their last knot.
+
+What was before is remembered the same, however a signal is cut.
+"""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proxytune.effects.learnt.bases import hats
-from proxytune.effects.learnt.features import GROUPS
+from proxytune.effects import GROUPS
+from proxytune.effects.features import hats, low_passes, moved_since, play, rings, rolled_since
 
 
 def test_a_hat_is_one_at_its_own_knot_and_nothing_at_the_others_and_at_rest():
@@ -28,3 +32,52 @@ def test_beyond_the_last_knot_a_hat_is_level():
 def test_every_group_and_channel_has_a_unit():
     assert all(group.unit and group.title for group in GROUPS.values())
     assert all(channel.unit for group in GROUPS.values() for channel in group.channels.values())
+
+
+RATE_HZ = 10.0
+
+
+def test_a_low_pass_goes_most_of_the_way_in_its_time_constant():
+    slow = low_passes(np.ones(10), np.zeros(1), (1.0,), RATE_HZ)
+    assert slow[-1, 0] == pytest.approx(1.0 - np.exp(-1.0))
+
+
+def test_the_way_is_counted_from_where_a_wheel_turns_the_other_way():
+    speed = np.array([1.0, 1.0, 0.0, 1.0, -2.0, -2.0, 0.0, -2.0, 1.0])
+    way = rolled_since(speed, np.zeros(()), RATE_HZ)
+    np.testing.assert_allclose(way, [0.1, 0.2, 0.2, 0.3, -0.2, -0.4, -0.4, -0.6, 0.1])
+
+
+def test_a_wheel_that_has_not_moved_has_no_way_behind_it():
+    np.testing.assert_array_equal(rolled_since(np.zeros(3), np.zeros(()), RATE_HZ), np.zeros(3))
+
+
+def test_the_time_is_counted_from_where_a_wheel_stood():
+    speed = np.array([0.0, 1.0, 1.0, 0.01, -1.0, 1.0])
+    np.testing.assert_allclose(moved_since(speed, np.zeros(()), 0.02, RATE_HZ), [0.0, 0.1, 0.2, 0.0, 0.1, 0.2])
+    np.testing.assert_allclose(moved_since(np.ones(2), np.array(0.5), 0.02, RATE_HZ), [0.6, 0.7])
+
+
+@settings(max_examples=50, derandomize=True, deadline=None)
+@given(speed=st.lists(st.sampled_from((-0.5, 0.0, 0.2, 1.0)), min_size=2, max_size=20), cut=st.integers(1, 19))
+def test_cutting_a_signal_changes_nothing(speed, cut):
+    whole = rolled_since(np.array(speed), np.zeros(()), RATE_HZ)
+    first = rolled_since(np.array(speed[:cut]), np.zeros(()), RATE_HZ)
+    rest = rolled_since(np.array(speed[cut:]), first[-1], RATE_HZ) if speed[cut:] else np.empty(0)
+    np.testing.assert_allclose(np.concatenate((first, rest)), whole, atol=1e-12)
+
+
+def test_a_change_sets_off_a_swing_of_its_frequency_that_dies_away():
+    change = np.zeros(400)
+    change[10] = 0.3
+    swing = rings(change, np.zeros(1, dtype=complex), (0.5,), RATE_HZ)[:, 0]
+    np.testing.assert_array_equal(swing[:10], 0.0)
+    assert swing[10] == 0.3
+    period = np.flatnonzero(np.diff(np.sign(swing.imag[10:200])) > 0.0)
+    assert np.diff(period[1:3])[0] == pytest.approx(RATE_HZ / 0.5, rel=0.1)
+    assert abs(swing[-1]) < 1e-3
+
+
+def test_a_play_drags_along_what_has_crossed_it():
+    dragged = play(np.array([0.0, 0.3, 0.5, 0.45, 0.2, -0.1]), np.zeros(1), (0.1,))[:, 0]
+    np.testing.assert_allclose(dragged, [0.0, 0.2, 0.4, 0.4, 0.3, 0.0], atol=1e-12)

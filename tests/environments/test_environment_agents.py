@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-
-pytest.importorskip("gymnasium")
-
 from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
 from toy_families import CART, SCREEN, family
 
 from proxytune.domain import make_episode
-from proxytune.environments.agents import ask_agent, load_agent
+from proxytune.environments.family import ask_agent, load_agent
 from proxytune.errors import EpisodeError, InputError
+
+pytest.importorskip("gymnasium")
 
 
 def run(kin, agent, seed=1):

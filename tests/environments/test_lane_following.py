@@ -1,25 +1,28 @@
-"""Lane following as a Gymnasium environment: the episodes that a study scores, step by step."""
+"""Lane following as a Gymnasium environment: the episodes that a study scores, step by step.
+
+How gymnasium comes to know of lane following, and what a user without gymnasium is told.
+"""
 
 import functools
+import subprocess
+import sys
 import warnings
 
-import numpy as np
-import pytest
-
-pytest.importorskip("gymnasium")
-
 import gymnasium
+import numpy as np
 import pybullet
+import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from proxytune.domain import make_episode
-from proxytune.driving.agents import AGENTS
-from proxytune.driving.robot import read_robot
-from proxytune.driving.task import METRICS
+from proxytune.driving import AGENTS, METRICS, read_robot
 from proxytune.environments import LANE_FOLLOWING
 from proxytune.environments.lane_following import LaneFollowingEnv
 from proxytune.errors import EpisodeError, InputError, SettingsError
+
+pytest.importorskip("gymnasium")
+
 
 STRAIGHT = np.array((1.0, 0.95))
 THETA = {"trim": 0.1, "delay": 0.06, "image_noise": 8.0, "delay_jitter": 0.05}
@@ -343,3 +346,32 @@ def test_two_steps_never_share_a_picture():
     for number, (picture, *_) in enumerate(steps):
         picture[:] = number
     assert [int(picture[0, 0, 0]) for picture, *_ in steps] == list(range(9))
+
+
+pytest.importorskip("gymnasium")
+
+
+def printed(code):
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    return done.stdout.strip(), done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import gymnasium; print(gymnasium.make('proxytune.environments:proxytune/LaneFollowing-v0').spec.id)",
+        "import gymnasium, proxytune.environments; print(gymnasium.make('proxytune/LaneFollowing-v0').spec.id)",
+    ],
+)
+def test_gymnasium_makes_it(code):
+    assert printed(code)[0] == "proxytune/LaneFollowing-v0"
+
+
+def test_without_gymnasium_it_says_what_to_install():
+    _, errors = printed("import sys; sys.modules['gymnasium'] = None; import proxytune.environments")
+    assert errors.splitlines()[-1].endswith('gymnasium is not installed; pip install "proxytune[gym]"')
+
+
+def test_importing_proxytune_does_not_import_gymnasium():
+    assert printed("import sys, proxytune; print('gymnasium' in sys.modules)")[0] == "False"

@@ -9,16 +9,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-pytest.importorskip("mujoco")
-
 from proxytune.cli.main import main
 from proxytune.domain import make_episode
-from proxytune.driving.robot import read_robot
+from proxytune.driving import read_robot
 from proxytune.errors import InputError
 from proxytune.extensions import load
 from proxytune.logs import read_log
-from proxytune.study.family import bare_family, load_family
-from proxytune.study.settings import read_study_settings
+from proxytune.study import bare_family, load_family, read_study_settings
+
+pytest.importorskip("mujoco")
+
 
 STUDY = Path(__file__).resolve().parent.parent.parent / "studies" / "mujoco_target"
 ROBOT = STUDY / "robot"

@@ -1,18 +1,17 @@
 """A trained policy is an agent of a study like any other."""
 
+import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
 
-pytest.importorskip("gymnasium")
-
-import gymnasium
-
 import proxytune
-from proxytune.driving.agents.loading import load_agent
-from proxytune.environments.policies import agent_of
+from proxytune.driving import load_agent
+from proxytune.environments.family import agent_of
 from proxytune.errors import ExtensionError
-from proxytune.testing import check_agent
+from proxytune.testing.extension import check_agent
+
+pytest.importorskip("gymnasium")
 
 
 class Brightness:

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from proxytune.search.knowledge.information import Information
-from proxytune.search.knowledge.misfit import Misfit
-from proxytune.search.knowledge.region import posterior_of
-from proxytune.study.stages.confirmation import Candidate, Confirmation
+from proxytune.search import Information
+from proxytune.search.posterior import Misfit, posterior_of
+from proxytune.study import Confirmation
+from proxytune.study.result import Candidate
 
 FITS, LACKS, UNTOLD = Misfit(1.0, 1.1, 0.4), Misfit(9.0, 1.1, 0.002), Misfit(1.0, None, None)
 AGENTS = (("agent4", 0.46), ("agent0", 0.3), ("agent1", 0.2), ("agent2", 0.04))

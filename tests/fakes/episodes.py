@@ -3,8 +3,7 @@
 import numpy as np
 
 from proxytune.domain import make_episode
-from proxytune.study.side_by_side import SideBySide
-from proxytune.study.single_episode import RecordedEpisode
+from proxytune.study import RecordedEpisode, SideBySide
 
 EPISODE = make_episode({}, agent="steady", start=0, seed=1)
 

@@ -1,6 +1,6 @@
 """Instances to export."""
 
-from proxytune.driving.robot import read_robot
+from proxytune.driving import read_robot
 from proxytune.report.export.instance import Instance
 
 ROBOT = read_robot("duckiebot")

@@ -212,7 +212,7 @@ if __name__ == "__main__":
     from proxytune.cli.main import main
     from proxytune.cli.terminal.answer import Answer
     from proxytune.running import workers
-    from proxytune.study.study import open_study
+    from proxytune.study import open_study
 
     workers.Apart, command.run = Here, only_search
     with redirect_stdout(io.StringIO()):

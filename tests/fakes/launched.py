@@ -9,12 +9,9 @@ from contextlib import contextmanager
 
 from processes import ENVIRONMENT, FAKES, episodes, trials
 
-from proxytune.search.engines.registry import make_proposer
-from proxytune.storage.store import Store
-from proxytune.study.knowledge import goal_of
-from proxytune.study.run import run_study
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.search import make_proposer
+from proxytune.storage import Store
+from proxytune.study import StudyRun, goal_of, open_study, run_study
 
 
 class Launched:

@@ -6,7 +6,7 @@ that rise, for all learners and for each of its own, so scores are neither Gauss
 
 import numpy as np
 
-from proxytune.learning.curves import Curve
+from proxytune.learning import Curve
 
 GRID = (0, 50, 100, 200, 400, 800, 1600, 3200)
 STARTS, BEST, NONE, TOLERANCE = 10, 60.0, "none", 5.0

@@ -18,7 +18,7 @@ from schoolroom import Matrix, schoolroom
 from tightrope import Cells, tightrope
 
 from proxytune.domain import Demonstration
-from proxytune.learning.learner import Weights
+from proxytune.learning import Weights
 from proxytune.settings import Section
 
 MOMENTS = {"demonstrate": "lesson", "guide": "guided", "examine": "exam", "run": "episode"}

@@ -3,8 +3,8 @@
 import bags
 import numpy as np
 
-from proxytune.importing.ros.reading import read_bag
-from proxytune.importing.wanted import Wanted
+from proxytune.importing import Wanted
+from proxytune.importing.topics import read_bag
 
 TIMES = 1.7e9 + np.arange(50) * 0.1
 PLAIN = Wanted(commands="none")

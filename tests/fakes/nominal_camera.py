@@ -1,6 +1,6 @@
 """The Duckiebot's camera as its makers state it."""
 
-from proxytune.driving.cameras import CameraFigures
+from proxytune.driving import CameraFigures
 
 CAMERA = CameraFigures(
     columns=160,

@@ -9,12 +9,15 @@ import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image
 
-from proxytune.driving.ground_plane import GroundPlaneCamera
-from proxytune.driving.mounting import mounted_camera
-from proxytune.driving.road.lane import lane_point, lane_pose
-from proxytune.driving.road.reading import shipped_map
-from proxytune.driving.road.texture import draw_floor
-from proxytune.driving.robot import read_robot
+from proxytune.driving import (
+    GroundPlaneCamera,
+    draw_floor,
+    lane_point,
+    lane_pose,
+    mounted_camera,
+    read_robot,
+    shipped_map,
+)
 from proxytune.effects import effects_from
 from proxytune.logs import Log
 

@@ -10,7 +10,7 @@ from wobbly import Wobbly
 
 from proxytune.domain import Demonstration, Episode, Policy
 from proxytune.errors import EpisodeError
-from proxytune.learning.learner import Weights
+from proxytune.learning import Weights
 from proxytune.settings import Section
 
 SAMPLES_PER_S = 10

@@ -3,9 +3,9 @@
 from pathlib import Path
 from types import SimpleNamespace
 
-from proxytune.learning.plv import Estimate
+from proxytune.learning import Estimate
 from proxytune.scores import Metric, ScoreTable
-from proxytune.study.families.compared import ComparedFamilies, Lesson
+from proxytune.study import ComparedFamilies, Lesson
 from proxytune.usefulness import assess
 
 METRICS = (Metric("distance"),)

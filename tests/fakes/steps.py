@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from proxytune.search.engines.registry import why_not
-from proxytune.search.goal import Goal
-from proxytune.search.proposer import Trial
+from proxytune.search import Goal, Trial, why_not
 from proxytune.space import Interval, Space
 
 SPACE = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))

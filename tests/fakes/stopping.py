@@ -1,6 +1,6 @@
 """A watcher that interrupts."""
 
-from proxytune.running.progress import Silent
+from proxytune.running import Silent
 
 
 class Stopping(Silent):

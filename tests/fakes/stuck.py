@@ -11,7 +11,7 @@ from schoolroom import Matrix, Schoolroom
 from walled import inside
 
 from proxytune.domain import Demonstration, Episode, Policy
-from proxytune.learning.learner import Weights
+from proxytune.learning import Weights
 from proxytune.settings import Section
 
 

@@ -5,9 +5,7 @@ from dataclasses import replace
 from schoolroom import Matrix, Schoolroom
 from wobbly import Wobbly
 
-from proxytune.learning.cache import Cache
-from proxytune.learning.lessons import Distribution
-from proxytune.learning.settings import TeachingSettings
+from proxytune.learning import Cache, Distribution, TeachingSettings
 from proxytune.teaching.points import TeachingSetup
 
 TEACHING = """

@@ -1,6 +1,6 @@
 """A watcher that keeps every line it is told."""
 
-from proxytune.running.progress import Silent
+from proxytune.running import Silent
 
 
 class Telling(Silent):

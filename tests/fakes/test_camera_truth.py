@@ -20,11 +20,8 @@ from camera_truth.tape import lay_tape, line_distances, straight_tape
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxytune.driving.cameras import CameraFigures, lens_rays
-from proxytune.driving.ground_plane import GroundPlaneCamera
-from proxytune.driving.road.lane import lane_pose
-from proxytune.driving.road.reading import shipped_map
-from proxytune.driving.road.texture import COLOURS, draw_floor
+from proxytune.driving import COLOURS, CameraFigures, GroundPlaneCamera, draw_floor, lane_pose, shipped_map
+from proxytune.driving.optics import lens_rays
 
 SMALL_LOOP = shipped_map("small_loop")
 STARTS = np.array(SMALL_LOOP.starts[:2]) * (1.0, 1.0, np.pi / 180.0)
@@ -294,7 +291,7 @@ def test_the_same_seed_writes_the_same_set_and_its_truth(few_frames, tmp_path):
 
 
 def test_worse_tape_comes_with_a_map_that_says_so(few_frames, tmp_path):
-    from proxytune.driving.road.reading import read_map
+    from proxytune.driving import read_map
 
     write_set(tmp_path, "none still small_loop 20mm_tape", 1)
     assert tomllib.loads((tmp_path / "log.toml").read_text())["map"] == "laid.toml"

@@ -7,7 +7,7 @@ import json
 import sys
 
 from proxytune.api.recording import Wanted
-from proxytune.closing import diagnosing
+from proxytune.loop import diagnosing
 
 STUDY = """\
 format = 1

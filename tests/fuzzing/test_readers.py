@@ -20,36 +20,28 @@ from typing import Any, NamedTuple
 import foreign_robot
 import numpy as np
 import pytest
+from mutation import mutated
 from tiny_loop import write_diagnosis
+
+from proxytune.cli.compare import read_runs
+from proxytune.domain import make_episode
+from proxytune.driving import read_map, read_robot
+from proxytune.effects import read_model
+from proxytune.errors import ProxytuneError
+from proxytune.files import shipped
+from proxytune.importing import Wanted, read_source
+from proxytune.learning import Cache
+from proxytune.logs import read_log
+from proxytune.loop.comparison import compare_errors, following, lacking, level_text
+from proxytune.loop.diagnosing import read_diagnosis
+from proxytune.loop.episodes import pictures_file, read_pictures
+from proxytune.loop.opening import Kept
+from proxytune.scores import read_scores
+from proxytune.storage import Store
+from proxytune.study import StudyRun, as_stored, open_study, read_lessons, read_study_settings, result_of
 
 sys.path.append(str(Path(__file__).parent))
 
-from mutation import mutated
-
-from proxytune.cli.compare import read_runs
-from proxytune.closing.comparison import compare_errors
-from proxytune.closing.diagnosing import read_diagnosis
-from proxytune.closing.episodes import pictures_file, read_pictures
-from proxytune.closing.steps import Kept
-from proxytune.closing.wording import following, lacking, level_text
-from proxytune.domain import make_episode
-from proxytune.driving.road.reading import read_map
-from proxytune.driving.robot import read_robot
-from proxytune.effects.model import read_model
-from proxytune.errors import ProxytuneError
-from proxytune.importing.reading import read_source
-from proxytune.importing.wanted import Wanted
-from proxytune.learning.cache import Cache
-from proxytune.logs import read_log
-from proxytune.scores import read_scores
-from proxytune.shipped import shipped
-from proxytune.storage.store import Store
-from proxytune.study.families.lessons import read_lessons
-from proxytune.study.result import result_of
-from proxytune.study.run import as_stored
-from proxytune.study.settings import read_study_settings
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
 
 MODEL = """\
 format = 1

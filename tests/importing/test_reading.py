@@ -1,4 +1,9 @@
-"""The form of a source is told by what is in it, and a log has one kind of commands."""
+"""A log is opened whatever form it comes in, and every form of one recording is the same log.
+
+The form of a source is told by what is in it, and a log has one kind of commands.
+A drive is told in numbers that are counted, and two clocks show in them.
+A log is written whole or not at all, and reads back as what was imported.
+"""
 
 import os
 from dataclasses import replace
@@ -7,14 +12,100 @@ from pathlib import Path
 import foreign_robot
 import numpy as np
 import pytest
-from imported_drives import drive
+from imported_drives import commands, drive, poses, turning
 from one_line import complaint_of
 
-from proxytune.errors import LogError
-from proxytune.importing import reading
-from proxytune.importing.reading import FORMS, Form, read_source
-from proxytune.importing.source import Source
-from proxytune.importing.wanted import Wanted
+from proxytune.errors import InputError, LogError
+from proxytune.importing import Facts, Source, Wanted, open_log, read_geometry, read_source, reading, write_log
+from proxytune.importing.reading import FORMS, Form, clock_notes, survey
+from proxytune.importing.source import Drive, Pictures
+from proxytune.logs import read_log
+
+FACTS = Facts(robot="nobodys", figures=foreign_robot.FIGURES)
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return [foreign_robot.drive(number, seconds=12.0, offset_s=0.1) for number in range(2)]
+
+
+@pytest.fixture(scope="module")
+def forms(tmp_path_factory, recordings):
+    """The same two drives in every form that there is."""
+    home = tmp_path_factory.mktemp("forms")
+    return {form: foreign_robot.write_form(home, form, recordings) for form in foreign_robot.FORMS}
+
+
+def opened(path):
+    with open_log(path, facts=FACTS) as (log, notes):
+        return log, notes
+
+
+@pytest.mark.parametrize("form", foreign_robot.FORMS)
+def test_every_form_gives_the_same_drives(forms, recordings, form):
+    if form in foreign_robot.BAGS:
+        pytest.importorskip("rosbags")
+    log, notes = opened(forms[form])
+    assert len(log.episodes) == len(recordings)
+    for episode, recording in zip(log.episodes, recordings, strict=True):
+        np.testing.assert_allclose(episode.measured.times, recording.measured, rtol=0, atol=1.1e-6)
+        np.testing.assert_allclose(episode.issued, recording.issued, rtol=0, atol=1.1e-6)
+        np.testing.assert_allclose(episode.commands, recording.twists, atol=1e-9)
+        np.testing.assert_allclose(episode.measured.poses[:, :2], recording.poses[:, :2], atol=1e-6)
+        turns = (episode.measured.poses[:, 2] - recording.poses[:, 2]) / (2.0 * np.pi)
+        np.testing.assert_allclose(turns, np.round(turns[0]), atol=1e-6)
+    assert any("after its commands" in note for note in notes)
+
+
+def test_a_logs_own_folder_is_opened_as_it_is(tmp_path, recordings):
+    log, notes = opened(foreign_robot.write_own_times(tmp_path, recordings))
+    assert (len(log.episodes), notes) == (2, ())
+
+
+def test_what_is_imported_is_there_only_while_the_log_is_open(forms):
+    with open_log(forms["csv"], facts=FACTS):
+        assert list(forms["csv"].parent.glob("**/log.toml")) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("empty.bag", b"", "cannot be read"),
+        ("noise.bin", bytes(range(256)), "is no recording that is known; give a ROS bag"),
+        ("missing", None, "no such folder"),
+    ],
+)
+def test_what_is_no_recording_is_refused_in_one_line(tmp_path, name, content, says):
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(LogError) as caught:
+        opened(path)
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_clock_offset_given_with_it_is_declared(forms):
+    facts = Facts(robot="nobodys", figures=foreign_robot.FIGURES, clock_offset="0.1")
+    with open_log(forms["csv"], Wanted(), facts) as (log, _):
+        assert log.clock_offset_s == 0.1
+
+
+def test_clocks_an_hour_apart_are_opened_with_the_offset_that_the_complaint_asks_for(tmp_path):
+    one = foreign_robot.drive(1, seconds=12.0, offset_s=3000.0)
+    table = foreign_robot.write_form(tmp_path, "csv", [one]) / "run0.csv"
+    with pytest.raises(LogError, match="two clocks; .*--clock-offset"):
+        opened(table)
+    with open_log(table, facts=Facts("nobodys", foreign_robot.FIGURES, clock_offset="3000")) as (log, _):
+        np.testing.assert_allclose(log.episodes[0].issued, one.issued + 3000.0, rtol=0, atol=1e-5)
+
+
+def test_a_source_may_be_where_one_is(forms, monkeypatch):
+    (forms["csv"] / "inside").mkdir(exist_ok=True)
+    monkeypatch.chdir(forms["csv"] / "inside")
+    log, _ = opened(Path(".."))
+    assert (len(log.episodes), log.name) == (2, "csv")
+
 
 TIMES = np.arange(0.0, 20.0, 0.05)
 
@@ -67,3 +158,121 @@ def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "run.csv")
     for path in (tmp_path / "run.csv", Path("/dev/zero")):
         assert "is a device or a pipe; copy" in complaint_of(read_source, path, Wanted())
+
+
+def test_a_regular_drive_loses_nothing():
+    one = survey(drive(np.arange(200) * 0.05, np.arange(100) * 0.1))
+    assert (one.poses, one.commands, one.frames, one.gaps) == (200, 100, 0, 0)
+    assert (one.seconds, one.poses_hz) == pytest.approx((9.95, 20.0))
+    assert (one.lost, one.jitter_s) == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+def test_drop_outs_are_counted_apart_from_gaps():
+    times = np.delete(np.arange(400) * 0.05, [*range(50, 60), *range(200, 300)])
+    one = survey(drive(times, np.arange(200) * 0.1))
+    assert (one.gaps, one.longest_gap_s) == (2, pytest.approx(5.05))
+    times = np.delete(np.arange(400) * 0.05, [50, 51, 90, 200])
+    one = survey(drive(times, np.arange(200) * 0.1))
+    assert one.gaps == 0
+    assert one.lost == pytest.approx(4 / 400, abs=1e-4)
+
+
+def test_jitter_is_the_scatter_of_intervals():
+    random = np.random.default_rng(1)
+    times = np.arange(2000) * 0.05 + random.normal(0.0, 0.002, 2000)
+    one = survey(drive(times, np.arange(200) * 0.1))
+    assert one.jitter_s == pytest.approx(0.002 * np.sqrt(2.0), rel=0.1)
+
+
+def test_turning_before_the_command_is_told_as_two_clocks():
+    (note,) = clock_notes([survey(turning(-0.25)), survey(turning(0.1))])
+    assert note.startswith("1 of 2 drives turn before they are told to (up to 0.25 s, run): two clocks")
+
+
+def test_turning_after_the_command_is_told_as_a_sum_that_cannot_be_split():
+    (note,) = clock_notes([survey(turning(0.1))])
+    assert note.startswith("it turns 0.10 s after its commands: delay, lag and an offset")
+
+
+def test_a_drive_that_does_not_turn_says_nothing_of_clocks():
+    straight = replace(turning(0.1), poses=poses(np.arange(0.0, 40.0, 0.02)))
+    assert survey(straight).lag_s is None
+    assert clock_notes([survey(straight)]) == ["no drive turns enough to tell whether commands and poses share a clock"]
+
+
+WRITING_TIMES = 1.7e9 + np.arange(0.0, 5.0, 0.05) + 1e-4 * np.sin(np.arange(100.0))
+FIGURES = Facts(robot="nobodys", figures={"wheel_radius_m": 0.03, "baseline_m": 0.16}, clock_offset="-0.25")
+
+
+def source(*drives):
+    return Source("CSV file", drives, (), ())
+
+
+def test_what_is_written_reads_back_to_the_last_bit(tmp_path):
+    write_log(source(drive(WRITING_TIMES, WRITING_TIMES[::7])), tmp_path / "log", FIGURES, "run.csv")
+    log = read_log(tmp_path / "log")
+    (episode,) = log.episodes
+    np.testing.assert_array_equal(episode.measured.times, WRITING_TIMES)
+    np.testing.assert_array_equal(episode.issued, WRITING_TIMES[::7] - 0.25)
+    assert (log.robot, log.command, log.clock_offset_s) == ("nobodys", "twist", -0.25)
+    assert log.geometry == {"wheel_radius": 0.03, "effective_baseline": 0.16}
+
+
+def test_pictures_are_written_with_their_times(tmp_path):
+    shown = np.random.default_rng(1).integers(0, 255, (3, 12, 16, 3), dtype=np.uint8)
+    pictures = Pictures(WRITING_TIMES[[10, 20, 30]], lambda: iter(shown))
+    facts = replace(FIGURES, road="small_loop", clock_offset="")
+    write_log(source(replace(drive(WRITING_TIMES, WRITING_TIMES), pictures=pictures)), tmp_path / "log", facts, "bag")
+    frames = read_log(tmp_path / "log").frames
+    np.testing.assert_array_equal(frames.times, WRITING_TIMES[[10, 20, 30]])
+    assert frames.road == "small_loop"
+    assert all(path.is_file() for path in frames.paths)
+
+
+def test_an_offset_may_be_asked_to_be_fitted(tmp_path):
+    write_log(
+        source(drive(WRITING_TIMES, WRITING_TIMES)), tmp_path / "log", replace(FIGURES, clock_offset="fit"), "bag"
+    )
+    assert read_log(tmp_path / "log").fit_clock_offset
+
+
+def test_a_log_that_is_there_is_not_written_over(tmp_path):
+    write_log(source(drive(WRITING_TIMES, WRITING_TIMES)), tmp_path / "log", FIGURES, "bag")
+    before = (tmp_path / "log" / "samples.csv").read_bytes()
+    with pytest.raises(InputError, match="log: is there already"):
+        write_log(source(drive(WRITING_TIMES + 1, WRITING_TIMES + 1)), tmp_path / "log", FIGURES, "bag")
+    assert (tmp_path / "log" / "samples.csv").read_bytes() == before
+
+
+def test_what_makes_no_log_leaves_nothing_behind(tmp_path):
+    wild = Drive(
+        "run",
+        replace(commands(WRITING_TIMES), kind="duty", values=np.full((len(WRITING_TIMES), 2), 7.0)),
+        poses(WRITING_TIMES),
+    )
+    with pytest.raises(LogError, match="log/commands.csv: line 2, column 'left': a duty must be between -1 and 1"):
+        write_log(source(wild), tmp_path / "log", FIGURES, "bag")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures_that_break_off_leave_nothing_behind(tmp_path):
+    def broken():
+        yield np.zeros((4, 4, 3), dtype=np.uint8)
+        raise LogError("bag: message 2 of /camera cannot be decoded")
+
+    pictures = Pictures(WRITING_TIMES[[10, 20]], broken)
+    with pytest.raises(LogError, match="message 2"):
+        write_log(
+            source(replace(drive(WRITING_TIMES, WRITING_TIMES), pictures=pictures)), tmp_path / "log", FIGURES, "bag"
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_figures_are_read_by_the_names_of_log_toml():
+    assert read_geometry(["baseline_m=0.16", "wheel_radius_m = 0.03"]) == {"baseline_m": 0.16, "wheel_radius_m": 0.03}
+
+
+@pytest.mark.parametrize("text", ["baseline=0.16", "baseline_m", "baseline_m=wide"])
+def test_a_figure_that_is_none_is_refused(text):
+    with pytest.raises(InputError, match="--figure"):
+        read_geometry([text])

@@ -1,13 +1,272 @@
-"""Lessons give as many samples as asked for, from θ drawn as p(θ) says."""
+"""What is in the cache is whole, is made once, and is told apart by all that determines it.
+
+Target samples cost what the expert's driving, the learner's and labels cost; PLV in cost is equation 6.
+Several episodes are examined at once where the classroom offers it, else one by one.
+What a learner has learnt is found again only by the same settings and the same code.
+Lessons give as many samples as asked for, from θ drawn as p(θ) says.
+Rehearsal adds so many of the proxy's samples as its share says, from all over its lessons.
+"""
+
+import contextlib
+import importlib
+import sys
+import zipfile
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from schoolroom import SAMPLES_PER_S, Schoolroom
+from hypothesis import given
+from hypothesis import strategies as st
+from schoolroom import SAMPLES_PER_S, Matrix, Schoolroom
 from tightrope import Tightrope
 from wobbly import Wobbly
 
-from proxytune.errors import LearnerError
-from proxytune.learning.lessons import Distribution, collect_samples
+from proxytune.domain import Demonstration, make_episode
+from proxytune.errors import EpisodeError, LearnerError, StoreError
+from proxytune.learning import (
+    Cache,
+    Costs,
+    Distribution,
+    collect_samples,
+    digest,
+    examine,
+    learner_identity,
+    mix_samples,
+    policy_of,
+)
+from proxytune.learning.cloning import BehaviourCloning
+from proxytune.learning.lessons import cost_saved, split_samples
+from proxytune.learning.plv import plv
+
+
+def test_arrays_are_made_once_and_read_back_to_the_last_bit(tmp_path):
+    cache, made = Cache(tmp_path / "kept"), []
+
+    def make():
+        made.append(1)
+        return {"values": np.random.default_rng(3).normal(size=(4, 2)), "small": np.arange(3, dtype=np.uint8)}
+
+    first, again = (cache.get("samples", {"seed": 1}, make) for _ in range(2))
+    assert len(made) == 1
+    assert set(first) == {"values", "small"}
+    assert all(np.array_equal(first[name], again[name]) and first[name].dtype == again[name].dtype for name in first)
+    assert np.array_equal(first["values"], np.random.default_rng(3).normal(size=(4, 2)))
+
+
+def test_other_facts_are_other_arrays_and_the_order_of_facts_is_none():
+    assert digest({"a": 1, "b": 2.0}) == digest({"b": 2.0, "a": 1})
+    assert len({digest({"a": value}) for value in (1, 2, 1.5, "1", None)}) == 5
+
+
+def test_the_file_says_what_determines_it(tmp_path):
+    cache = Cache(tmp_path)
+    cache.get("exam", {"seed": 7, "theta": {"trim": 0.1}}, lambda: {"scores": np.zeros(2)})
+    with np.load(cache.path("exam", {"theta": {"trim": 0.1}, "seed": 7})) as file:
+        assert str(file["facts"]) == '{"seed": 7, "theta": {"trim": 0.1}}'
+
+
+def test_what_failed_while_being_made_is_not_there(tmp_path):
+    cache = Cache(tmp_path)
+    with pytest.raises(ZeroDivisionError):
+        cache.get("exam", {"seed": 1}, lambda: 1 / 0)
+    assert not cache.has("exam", {"seed": 1})
+
+
+@pytest.mark.parametrize("keep", [0, 10, 200])
+def test_a_damaged_file_is_one_line_with_a_remedy(tmp_path, keep):
+    cache, facts = Cache(tmp_path), {"seed": 1}
+    cache.get("exam", facts, lambda: {"scores": np.zeros(200)})
+    path = cache.path("exam", facts)
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(StoreError, match="is damaged .*delete it, and run again"):
+        cache.get("exam", facts, dict)
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
+    (tmp_path / "kept").write_text("a file, where the folder should be")
+    with pytest.raises(StoreError, match="cannot be written"):
+        Cache(tmp_path / "kept").get("exam", {}, lambda: {"scores": np.zeros(1)})
+
+
+@pytest.mark.parametrize("place", [0.3, 0.5, 0.7, 0.9])
+def test_a_flipped_byte_is_one_line_or_in_no_array(tmp_path, place):
+    cache, facts = Cache(tmp_path), {"seed": 1}
+    noise = {"scores": np.random.default_rng(1).normal(size=500)}
+    cache.get("exam", facts, lambda: noise)
+    path = cache.path("exam", facts)
+    content = bytearray(path.read_bytes())
+    content[int(place * len(content))] ^= 0xFF
+    path.write_bytes(content)
+    with contextlib.suppress(StoreError):
+        assert (cache.get("exam", facts, dict)["scores"] == noise["scores"]).all()
+
+
+def test_an_array_of_impossible_size_is_damage(tmp_path):
+    cache, facts = Cache(tmp_path), {"seed": 1}
+    path = cache.path("exam", facts)
+    header = repr({"descr": "<f8", "fortran_order": False, "shape": (10**12,)}).encode().ljust(117) + b"\n"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("scores.npy", b"\x93NUMPY\x01\x00v\x00" + header)
+    with pytest.raises(StoreError, match="is damaged .*delete it"):
+        cache.get("exam", facts, dict)
+
+
+COSTS = Costs(off_policy=3.0, on_policy=0.5, label=0.25)
+counts = st.floats(0.0, 1e6)
+
+
+@given(counts, counts)
+def test_on_policy_and_off_policy_samples_are_all_there_are(count, expert_drives):
+    on, off = split_samples(count, expert_drives)
+    assert on >= 0.0
+    assert 0.0 <= off <= expert_drives
+    assert on + off == count or abs(on + off - count) < 1e-9 * count
+
+
+def test_the_expert_drives_for_the_first_samples():
+    on, off = split_samples(np.array([0.0, 10.0, 25.0]), 10.0)
+    assert (on.tolist(), off.tolist()) == ([0.0, 0.0, 15.0], [0.0, 10.0, 10.0])
+
+
+def test_what_is_never_reached_costs_without_end():
+    assert split_samples(np.inf, np.inf) == (0.0, np.inf)
+    nothing = (0.0, 0.0)
+    assert cost_saved(COSTS, without=split_samples(np.array([np.inf, 4.0]), np.inf), with_proxy=nothing).tolist() == [
+        np.inf,
+        13.0,
+    ]
+    assert cost_saved(COSTS, without=split_samples(np.inf, 10.0), with_proxy=nothing) == np.inf
+
+
+def test_what_costs_nothing_adds_nothing_however_many_samples_it_takes():
+    free = Costs(off_policy=2.0, on_policy=0.0)
+    assert cost_saved(free, without=split_samples(np.inf, 10.0), with_proxy=split_samples(5.0, 0.0)) == 20.0
+
+
+@given(counts, counts, st.floats(0.0, 1e3))
+def test_more_samples_never_cost_less(count, more, expert_drives):
+    splits = (split_samples(count + more, expert_drives), split_samples(count, expert_drives))
+    assert cost_saved(COSTS, without=splits[0], with_proxy=splits[1]) >= 0.0
+
+
+def test_a_sample_costs_its_driving_and_its_label():
+    assert cost_saved(COSTS, without=split_samples(25.0, 10.0), with_proxy=(0.0, 0.0)) == 10 * 3.25 + 15 * 0.75
+
+
+@given(counts, counts)
+def test_at_equal_costs_without_labels_the_saving_is_plv_itself(without, needed):
+    splits = {"without": split_samples(without, 50.0), "with_proxy": split_samples(needed, 0.0)}
+    assert abs(cost_saved(Costs(), **splits) - plv(without=without, with_proxy=needed)) < 1e-6
+
+
+def test_the_saving_is_told_apart_by_who_drove():
+    saved = cost_saved(COSTS, without=(np.array(50.0), np.array(400.0)), with_proxy=(np.array(10.0), np.array(100.0)))
+    assert saved == 40 * 0.75 + 300 * 3.25
+
+
+EPISODES = [make_episode({}, agent="pupil", start=start, seed=7) for start in range(4)]
+WEIGHTS = {"matrix": np.ones((3, 2))}
+
+
+@dataclass(frozen=True)
+class Together(Schoolroom):
+    """Adds a point, so that it is seen who has been asked; loses some scores."""
+
+    lost: int = 0
+
+    def examine_together(self, episodes, policy):
+        return tuple(self.examine(episode, policy) + 1.0 for episode in episodes[self.lost :])
+
+
+@dataclass(frozen=True)
+class Unfinished:
+    """Has no finite score from one of its starts."""
+
+    inner: Wobbly
+    score: float
+
+    def examine(self, episode, policy):
+        return self.score if episode.start == 2 else 1.0
+
+
+@dataclass(frozen=True)
+class Manifold(Matrix):
+    def act_many(self, weights, observations):
+        return observations @ weights["matrix"]
+
+
+def test_a_classroom_is_asked_for_all_episodes_at_once_if_it_can_and_else_for_each():
+    policy = policy_of(Matrix(), WEIGHTS)
+    alone = [Schoolroom(Wobbly()).examine(episode, policy) for episode in EPISODES]
+    assert examine(Schoolroom(Wobbly()), EPISODES, policy) == alone
+    assert examine(Together(Wobbly()), EPISODES, policy) == [score + 1.0 for score in alone]
+
+
+def test_missing_scores_are_told_in_one_line():
+    with pytest.raises(EpisodeError, match="examine_together gave 3 scores for 4 episodes; give each its own"):
+        examine(Together(Wobbly(), lost=1), EPISODES, policy_of(Matrix(), WEIGHTS))
+
+
+@pytest.mark.parametrize("score", [np.nan, np.inf, -np.inf])
+def test_a_score_that_is_no_finite_number_is_told_with_its_start(score):
+    with pytest.raises(EpisodeError, match=r"the examination from start 2 gave -?(nan|inf); give a finite score"):
+        examine(Unfinished(Wobbly(), score), EPISODES, policy_of(Matrix(), WEIGHTS))
+
+
+def test_a_policy_answers_many_observations_at_once_only_if_its_learner_does():
+    seen = np.arange(12.0).reshape(4, 3)
+    one, many = policy_of(Matrix(), WEIGHTS), policy_of(Manifold(), WEIGHTS)
+    assert not hasattr(one, "act_many")
+    np.testing.assert_array_equal(many.act_many(seen), [one(row) for row in seen])
+    np.testing.assert_array_equal(many(seen[0]), one(seen[0]))
+
+
+MINE = """
+from dataclasses import dataclass
+from my_cells import cells
+import my_unused
+
+@dataclass(frozen=True)
+class Mine:
+    size: int = 3
+"""
+
+
+@pytest.fixture
+def identity(tmp_path, monkeypatch):
+    """The identity of a learner whose module and the one beside it are as written."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    names = ("my_learner", "my_cells", "my_unused")
+
+    def identity_of(mine=MINE, cells="def cells(): return 1", size=3):
+        for name, text in zip(names, (mine, cells, "VALUE = 1"), strict=True):
+            (tmp_path / f"{name}.py").write_text(text)
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)
+        return learner_identity(importlib.import_module("my_learner").Mine(size))
+
+    yield identity_of
+    for name in names:
+        sys.modules.pop(name, None)
+
+
+def test_it_is_another_by_other_settings_other_code_or_other_code_beside_it(identity):
+    others = [identity(size=4), identity(mine=MINE + "    more: int = 1\n"), identity(cells="def cells(): return 2")]
+    assert len({identity(), *others}) == 4
+
+
+def test_comments_and_time_do_not_change_it(identity):
+    assert identity() == identity(mine=MINE + "\n# a remark\n") == identity(cells="def cells(): return 1  # one")
+
+
+def test_a_shipped_learner_is_known_by_what_it_sees_of_pictures_too(monkeypatch):
+    files = []
+    monkeypatch.setattr("proxytune.learning.lessons.meaning_of", lambda paths, root: files.extend(paths) or "")
+    learner_identity(BehaviourCloning())
+    assert {"cloning.py", "pictures.py"} <= {path.name for path in files}
+    assert "settings.py" not in {path.name for path in files}
+
 
 ROOM = Schoolroom(Wobbly())
 WIDE = Distribution({"delay": (0.0, 0.3), "trim": (0.1, 0.1)})
@@ -89,3 +348,25 @@ def test_an_expert_without_labels_on_the_learners_states_is_one_line():
 def test_steps_off_the_road_are_made_up_for_by_further_lessons():
     samples = collect_samples(Schoolroom(Wobbly(), blocked=0.4), WIDE, count=50, seed=1, lesson_s=1.0)
     assert len(samples.commands) == 50
+
+
+def numbered(first, count):
+    """Samples that are told apart by their number."""
+    numbers = np.arange(first, first + count)
+    return Demonstration(numbers[:, None].astype(np.uint8), np.stack((numbers, -numbers), axis=1).astype(float))
+
+
+@pytest.mark.parametrize(("share", "earlier"), [(0.0, 0), (0.2, 5), (0.5, 20), (0.8, 80), (0.9, 100)])
+def test_the_share_is_that_of_the_earlier_samples_as_long_as_there_are_enough(share, earlier):
+    mixed = mix_samples(numbered(0, 20), numbered(100, 100), share)
+    assert len(mixed.commands) == len(mixed.observations) == 20 + earlier
+    assert mixed.commands[:20, 0].tolist() == list(range(20))
+    assert (mixed.commands[20:, 0] >= 100).all()
+    np.testing.assert_array_equal(mixed.observations[:, 0], mixed.commands[:, 0].astype(np.uint8))
+
+
+def test_the_earlier_samples_taken_are_all_different_and_lie_over_all_lessons():
+    taken = mix_samples(numbered(0, 20), numbered(100, 100), 0.5).commands[20:, 0]
+    assert len(set(taken)) == 20
+    assert (taken[0], taken[-1]) == (100.0, 199.0)
+    assert np.diff(taken).max() <= 6.0

@@ -6,7 +6,7 @@ from leaning import error, pictures
 
 from proxytune.domain import Demonstration
 from proxytune.errors import LearnerError
-from proxytune.learning.pictures import grey_cells
+from proxytune.learning.cloning import grey_cells
 from proxytune.learning.ridge import RandomFeatures
 
 SMALL = RandomFeatures(rows=3, columns=4, features=200)

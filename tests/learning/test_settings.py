@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from proxytune.errors import SettingsError
-from proxytune.learning.costs import Costs
-from proxytune.learning.settings import read_teaching
+from proxytune.learning import Costs, read_teaching
 from proxytune.settings import Section
 
 GOOD = {"target": "twin.toml", "target_samples": [0, 10, 20]}

@@ -1,4 +1,8 @@
-"""Logs are read strictly, laid on their grid of times, and every complaint says where and what to do."""
+"""Commands at times of their own are read as they were issued, and every complaint says where and what to do.
+
+Everything that is wrong with a log.toml is said at once, in one line.
+Logs are read strictly, laid on their grid of times, and every complaint says where and what to do.
+"""
 
 import io
 import time
@@ -11,17 +15,187 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from log_folders import complaint, write_files
 
+from proxytune.errors import LogError
 from proxytune.logs import COMMANDS, read_log
+from proxytune.logs.reading import read_description
+from proxytune.settings import read_settings
 
-DATA = Path(__file__).resolve().parents[2] / "../shared/data/logs"
-TWIST = 'format = 1\nname = "yard"\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
-HEADER = "episode,time,v,omega,x,y,heading\n"
-GOOD = HEADER + "a,0.0,0.5,0.1,1,2,0.5\na,0.1,0.6,0.2,1.05,2,0.51\nb,3.0,0,0,0,0,0\nb,3.1,0.1,0,0,0,0\n"
+TOML = 'format = 1\nname = "yard"\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
+SAMPLES = "episode,time,x,y,heading\na,5.0,1,2,0\na,5.1,1,2,0\na,5.3,1,2,0\nb,0,0,0,0\nb,0.1,0,0,0\n"
+HEADER = "episode,time,v,omega\n"
+GOOD = HEADER + "b,0,0.1,0.2\na,5.013,0.5,0.1\na,5.127,0.6,0.2\na,9.5,0.7,0.3\n"
 
 
 @pytest.fixture
 def folder(tmp_path):
-    def write(samples=GOOD, description=TWIST):
+    def write(commands=GOOD, samples=SAMPLES, description=TOML):
+        files = {"log.toml": description, "samples.csv": samples, "commands.csv": commands}
+        return write_files(tmp_path / "log", files)
+
+    return write
+
+
+def test_commands_keep_their_own_times_and_poses_their_grid(folder):
+    first, second = read_log(folder()).episodes
+    np.testing.assert_array_equal(first.issued, [5.013, 5.127, 9.5])
+    np.testing.assert_array_equal(first.commands, [[0.5, 0.1], [0.6, 0.2], [0.7, 0.3]])
+    np.testing.assert_allclose(first.times, [5.0, 5.1, 5.2, 5.3])
+    assert np.isnan(first.poses[:, 0]).tolist() == [False, False, True, False]
+    np.testing.assert_array_equal(second.issued, [0.0])
+
+
+def test_the_command_in_force_at_a_sample_is_the_newest_and_none_is_zero(folder):
+    first, second = read_log(folder()).episodes
+    np.testing.assert_array_equal(first.held, [[0, 0], [0.5, 0.1], [0.6, 0.2], [0.6, 0.2]])
+    np.testing.assert_array_equal(second.held, [[0.1, 0.2]] * 2)
+
+
+def test_a_log_without_such_a_file_has_its_commands_with_its_samples(folder):
+    samples = "episode,time,v,omega,x,y,heading\na,0,1,2,0,0,0\na,0.1,3,4,0,0,0\n"
+    home = folder(samples=samples)
+    (home / "commands.csv").unlink()
+    (episode,) = read_log(home).episodes
+    assert episode.issued is None
+    np.testing.assert_array_equal(episode.held, [[1, 2], [3, 4]])
+
+
+@pytest.mark.parametrize("command", [kind for kind in COMMANDS if kind != "none"])
+def test_each_kind_of_command_has_columns_of_its_own(folder, command):
+    home = folder(GOOD.replace("v,omega", ",".join(COMMANDS[command])), description=TOML.replace("twist", command))
+    np.testing.assert_array_equal(read_log(home).episodes[0].commands[0], [0.5, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("commands", "says"),
+    [
+        ("", "/commands.csv: is empty"),
+        (HEADER, "/commands.csv: has no rows"),
+        (b"\xff\xfe\x00", "/commands.csv: is not a CSV file"),
+        (GOOD.replace("omega", "yaw"), "/commands.csv: line 1: unknown column 'yaw'"),
+        (GOOD.replace(",omega", ""), "/commands.csv: line 1: no column 'omega'; commands of kind 'twist' need "),
+        (GOOD.replace("0.6,0.2", "0.6"), "/commands.csv: line 4: has 3 cells"),
+        (GOOD.replace("0.6,0.2", "0.6,"), "/commands.csv: line 4, column 'omega': must be a finite number, got ''"),
+        (GOOD.replace("5.127", "inf"), "/commands.csv: line 4, column 'time': must be a finite number"),
+        (GOOD.replace("5.127", "5.013"), "/commands.csv: line 4, column 'time': 5.013 s does not come after"),
+        (GOOD.replace("a,", "c,"), "/commands.csv: line 3, column 'episode': 'c' is not in samples.csv"),
+        (GOOD.replace("b,0,0.1,0.2\n", ""), "/samples.csv: line 5, column 'episode': 'b' is not in commands.csv"),
+        (
+            GOOD.replace("b,0,", "b,17,"),
+            "/commands.csv: line 2, column 'time': the commands of 'b' lie between 17 and 17",
+        ),
+        (GOOD + "b,0,0,0\n", "/commands.csv: line 6, column 'episode': 'b' comes back after another episode"),
+    ],
+)
+def test_a_mistake_in_commands_is_one_line_with_file_line_and_column(folder, commands, says):
+    assert complaint(folder(commands)).startswith(says)
+
+
+def test_commands_of_another_clock_are_refused_with_both_times(folder):
+    says = complaint(folder(GOOD.replace("a,5.013", "a,1.013").replace("a,5.127", "a,1.2").replace("a,9.5", "a,1.3")))
+    assert "lie between 1.013 and 1.3 s, its poses between 5 and 5.3 s; write both in seconds of one clock" in says
+
+
+def test_commands_in_both_files_are_refused(folder):
+    samples = "episode,time,v,omega,x,y,heading\na,5.0,0,0,1,2,0\na,5.1,0,0,1,2,0\n"
+    assert complaint(folder(samples=samples)).startswith("/samples.csv: line 1: unknown column 'v'")
+
+
+def test_duties_beyond_full_are_refused_and_so_are_commands_of_still_frames(folder):
+    duty = TOML.replace("twist", "duty")
+    says = complaint(folder(GOOD.replace("v,omega", "left,right").replace("0.7,0.3", "0.7,1.3"), description=duty))
+    assert says.startswith("/commands.csv: line 5, column 'right': a duty must be between -1 and 1, got 1.3")
+    assert "there are no commands" in complaint(folder(description=TOML.replace("twist", "none")))
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(
+    text=st.one_of(
+        st.text(max_size=80),
+        st.lists(st.text("ab,-0.159einf \n\"'\t", max_size=20), max_size=6).map(lambda rows: HEADER + "\n".join(rows)),
+    )
+)
+def test_no_text_leads_to_anything_but_a_log_or_one_line(tmp_path_factory, text):
+    home = tmp_path_factory.getbasetemp() / "fuzz"
+    home.mkdir(exist_ok=True)
+    for name, content in (("log.toml", TOML), ("samples.csv", SAMPLES), ("commands.csv", text)):
+        (home / name).write_text(content, encoding="utf-8", newline="")
+    log, problem = read(home)
+    assert "\n" not in problem
+    assert log is None or all(np.isfinite(episode.commands).all() for episode in log.episodes)
+
+
+def read(home):
+    """The log, or None and what is wrong with it."""
+    try:
+        return read_log(home), ""
+    except LogError as problem:
+        return None, str(problem)
+
+
+WRONG = """
+command = "cmd_vel"
+rate_hz = "fast"
+baseline_m = -1
+speed = 3
+
+[camera]
+frames = "no number.png"
+"""
+
+
+@pytest.fixture
+def described(tmp_path):
+    def read(text):
+        path = tmp_path / "log.toml"
+        path.write_text(text, encoding="utf-8")
+        return read_description(read_settings(path))
+
+    return read
+
+
+def test_every_complaint_comes_at_once(described, tmp_path):
+    with pytest.raises(LogError) as caught:
+        described(WRONG)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert text.startswith(f"{tmp_path / 'log.toml'}: (1) ")
+    wanted = ("command: unknown", "rate_hz: must be", "baseline_m: must be", "speed: unknown key", "robot: is missing")
+    assert all(part in text for part in wanted), text
+    assert "(6) camera.frames: must have the picture's number" in text
+
+
+def test_a_single_complaint_has_no_number(described):
+    with pytest.raises(LogError, match=r"log.toml: robot: is missing; add it$"):
+        described('command = "twist"\nrate_hz = 10\n')
+
+
+def test_without_a_rate_poses_have_times_of_their_own(described):
+    assert described('robot = "r"\ncommand = "twist"\n').rate_hz == 0.0
+
+
+def test_a_clock_offset_is_declared_or_fitted(described):
+    text = 'robot = "r"\ncommand = "twist"\n'
+    assert described(text).clock_offset_s is None
+    assert described(text + "clock_offset_s = -0.25\n").clock_offset_s == -0.25
+    fitted = described(text + 'clock_offset_s = "fit"\n')
+    assert (fitted.clock_offset_s, fitted.fit_clock_offset) == (None, True)
+
+
+@pytest.mark.parametrize("value", ['"later"', "true", "1e9", "[1]"])
+def test_a_clock_offset_that_is_none_is_refused(described, value):
+    with pytest.raises(LogError, match="clock_offset_s: must be"):
+        described(f'robot = "r"\ncommand = "twist"\nclock_offset_s = {value}\n')
+
+
+DATA = Path(__file__).resolve().parents[2] / "../shared/data/logs"
+TWIST = 'format = 1\nname = "yard"\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
+READING_HEADER = "episode,time,v,omega,x,y,heading\n"
+READING_GOOD = READING_HEADER + "a,0.0,0.5,0.1,1,2,0.5\na,0.1,0.6,0.2,1.05,2,0.51\nb,3.0,0,0,0,0,0\nb,3.1,0.1,0,0,0,0\n"
+
+
+@pytest.fixture
+def folder_of_reading(tmp_path):
+    def write(samples=READING_GOOD, description=TWIST):
         return write_files(tmp_path / "log", {"log.toml": description, "samples.csv": samples})
 
     return write
@@ -40,8 +214,8 @@ def driven(*, degrees=False, wrapped=False, seconds=60.0, turn=0.5, backwards=Fa
     return pd.DataFrame(rows).to_csv(index=False)
 
 
-def test_commands_poses_and_times_are_read_as_written(folder):
-    log = read_log(folder())
+def test_commands_poses_and_times_are_read_as_written(folder_of_reading):
+    log = read_log(folder_of_reading())
     assert (log.name, log.robot, log.command, log.rate_hz, log.geometry) == ("yard", "tractor", "twist", 10.0, {})
     first, second = log.episodes
     assert (first.name, second.name) == ("a", "b")
@@ -51,30 +225,30 @@ def test_commands_poses_and_times_are_read_as_written(folder):
     assert first.wheels is None
 
 
-def test_geometry_of_the_log_is_in_the_figures_of_a_robot(folder):
+def test_geometry_of_the_log_is_in_the_figures_of_a_robot(folder_of_reading):
     text = TWIST + "wheel_radius_m = 0.05\nbaseline_m = 0.3\nfull_speed_m_s = 1.5\n"
     figures = {"wheel_radius": 0.05, "effective_baseline": 0.3, "full_speed": 1.5}
-    assert read_log(folder(description=text)).geometry == figures
+    assert read_log(folder_of_reading(description=text)).geometry == figures
 
 
 @pytest.mark.parametrize("command", [kind for kind in COMMANDS if kind != "none"])
-def test_each_kind_of_command_has_columns_of_its_own(folder, command):
-    samples = GOOD.replace("v,omega", ",".join(COMMANDS[command]))
-    log = read_log(folder(samples, TWIST.replace("twist", command)))
+def test_reading_each_kind_of_command_has_columns_of_its_own(folder_of_reading, command):
+    samples = READING_GOOD.replace("v,omega", ",".join(COMMANDS[command]))
+    log = read_log(folder_of_reading(samples, TWIST.replace("twist", command)))
     assert log.command == command
     np.testing.assert_array_equal(log.episodes[0].commands, [[0.5, 0.1], [0.6, 0.2]])
 
 
-def test_measured_wheel_speeds_are_read_and_may_be_empty(folder):
-    samples = HEADER.strip() + ",wheel_left,wheel_right\na,0,0,0,0,0,0,3,4\na,0.1,0,0,0,0,0,,\n"
-    (episode,) = read_log(folder(samples)).episodes
+def test_measured_wheel_speeds_are_read_and_may_be_empty(folder_of_reading):
+    samples = READING_HEADER.strip() + ",wheel_left,wheel_right\na,0,0,0,0,0,0,3,4\na,0.1,0,0,0,0,0,,\n"
+    (episode,) = read_log(folder_of_reading(samples)).episodes
     np.testing.assert_array_equal(episode.wheels, [[3, 4], [np.nan, np.nan]])
 
 
-def test_still_frames_need_no_rate_and_no_commands(folder):
+def test_still_frames_need_no_rate_and_no_commands(folder_of_reading):
     description = 'format = 1\nrobot = "duckiebot"\ncommand = "none"\nframes = "frames/%04d.png"\nmap = "small_loop"\n'
     samples = "episode,time,x,y,heading\n0,0,0.8,1.5,3.2\n0,1.7,1.5,0.5,-1.3\n"
-    log = read_log(folder(samples, description))
+    log = read_log(folder_of_reading(samples, description))
     assert (log.name, log.command, log.rate_hz) == ("log", "none", 0.0)
     (episode,) = log.episodes
     assert episode.commands.shape == (2, 0)
@@ -82,15 +256,18 @@ def test_still_frames_need_no_rate_and_no_commands(folder):
     np.testing.assert_allclose(np.cos(episode.poses[:, 2]), np.cos([3.2, -1.3]))
 
 
-def test_headings_of_still_frames_are_not_compared_with_a_course(folder):
+def test_headings_of_still_frames_are_not_compared_with_a_course(folder_of_reading):
     rows = pd.read_csv(io.StringIO(driven(degrees=True))).drop(columns=["v", "omega"])
-    log = read_log(folder(rows.to_csv(index=False), TWIST.replace("twist", "none")))
+    log = read_log(folder_of_reading(rows.to_csv(index=False), TWIST.replace("twist", "none")))
     assert len(log.episodes[0].poses) == len(rows)
 
 
-def test_missing_rows_hold_the_last_command_and_have_no_pose(folder):
-    samples = HEADER + "a,5.0,0.5,0.1,1,2,0\na,5.3,0.6,0.2,1,2,0\na,5.4,0.7,0.3,1,2,0\nb,0,1,1,9,9,0\nb,0.2,2,2,9,9,0\n"
-    first, second = read_log(folder(samples)).episodes
+def test_missing_rows_hold_the_last_command_and_have_no_pose(folder_of_reading):
+    samples = (
+        READING_HEADER
+        + "a,5.0,0.5,0.1,1,2,0\na,5.3,0.6,0.2,1,2,0\na,5.4,0.7,0.3,1,2,0\nb,0,1,1,9,9,0\nb,0.2,2,2,9,9,0\n"
+    )
+    first, second = read_log(folder_of_reading(samples)).episodes
     np.testing.assert_allclose(first.times, [5.0, 5.1, 5.2, 5.3, 5.4])
     np.testing.assert_array_equal(first.commands[:, 0], [0.5, 0.5, 0.5, 0.6, 0.7])
     assert np.isnan(first.poses[:, 0]).tolist() == [False, True, True, False, False]
@@ -105,36 +282,40 @@ def test_rows_left_out_change_nothing_of_the_others(tmp_path_factory, kept, jitt
     rows = [f"a,{7 + k / 10 + (jitter if k else 0)},{k},{-k},{k / 50},0,0" for k in steps]
     home = tmp_path_factory.mktemp("log")
     (home / "log.toml").write_text(TWIST, encoding="utf-8")
-    (home / "samples.csv").write_text(HEADER + "\n".join(rows) + "\n", encoding="utf-8")
+    (home / "samples.csv").write_text(READING_HEADER + "\n".join(rows) + "\n", encoding="utf-8")
     (episode,) = read_log(home).episodes
     np.testing.assert_allclose(episode.times, 7 + np.arange(steps[-1] + 1) / 10)
     np.testing.assert_array_equal(episode.commands[steps, 0], steps)
     assert np.flatnonzero(np.isfinite(episode.poses[:, 0])).tolist() == steps
 
 
-def test_wrapped_headings_are_unwrapped_across_gaps_and_episodes_stay_apart(folder):
+def test_wrapped_headings_are_unwrapped_across_gaps_and_episodes_stay_apart(folder_of_reading):
     pieces = ["a,0,0,0,0,0,3.0", "a,0.1,0,0,,,", "a,0.2,0,0,0,0,-3.0", "a,0.5,0,0,0,0,-2.5", "a,0.6,0,0,0,0,2.5"]
-    first, second = read_log(folder(HEADER + "\n".join([*pieces, "b,0,0,0,0,0,-3", "b,0.1,0,0,0,0,3"]) + "\n")).episodes
+    first, second = read_log(
+        folder_of_reading(READING_HEADER + "\n".join([*pieces, "b,0,0,0,0,0,-3", "b,0.1,0,0,0,0,3"]) + "\n")
+    ).episodes
     nan, turn = np.nan, 2 * np.pi
     np.testing.assert_allclose(first.poses[:, 2], [3.0, nan, turn - 3.0, nan, nan, turn - 2.5, 2.5])
     np.testing.assert_allclose(second.poses[:, 2], [-3.0, 3.0 - turn])
 
 
-def test_a_wrapped_heading_reads_as_the_unwrapped_one(folder):
-    smooth = read_log(folder(driven(turn=1.5))).episodes[0].poses
+def test_a_wrapped_heading_reads_as_the_unwrapped_one(folder_of_reading):
+    smooth = read_log(folder_of_reading(driven(turn=1.5))).episodes[0].poses
     assert np.ptp(smooth[:, 2]) > 10
-    np.testing.assert_allclose(read_log(folder(driven(turn=1.5, wrapped=True))).episodes[0].poses, smooth, atol=1e-9)
+    np.testing.assert_allclose(
+        read_log(folder_of_reading(driven(turn=1.5, wrapped=True))).episodes[0].poses, smooth, atol=1e-9
+    )
 
 
-def test_spreadsheets_marks_are_understood(folder):
+def test_spreadsheets_marks_are_understood(folder_of_reading):
     spaced = (
-        GOOD.replace("a,0.1,0.6", "a , 0.1, 0.6 ")
+        READING_GOOD.replace("a,0.1,0.6", "a , 0.1, 0.6 ")
         .replace("a,0.0,0.5,0.1,1,2,0.5", "a,0.0,0.5,0.1, , , ")
         .replace("\n", "\r\n")
         .replace("\r\nb,3.0", "\r\n\r\nb,3.0")
     )
-    plain = read_log(folder(GOOD.replace("a,0.0,0.5,0.1,1,2,0.5", "a,0.0,0.5,0.1,,,")))
-    marked = read_log(folder(b"\xef\xbb\xbf" + spaced.encode()))
+    plain = read_log(folder_of_reading(READING_GOOD.replace("a,0.0,0.5,0.1,1,2,0.5", "a,0.0,0.5,0.1,,,")))
+    marked = read_log(folder_of_reading(b"\xef\xbb\xbf" + spaced.encode()))
     assert np.isnan(plain.episodes[0].poses[0]).all()
     for one, other in zip(plain.episodes, marked.episodes, strict=True):
         assert one.name == other.name
@@ -159,14 +340,14 @@ def test_spreadsheets_marks_are_understood(folder):
         (("rate_hz = 10", "rate_hz = "), "is not valid TOML"),
     ],
 )
-def test_a_mistake_in_log_toml_is_one_line_with_file_and_key(folder, change, says):
-    assert complaint(folder(description=TWIST.replace(*change))).startswith(f"/log.toml: {says}")
+def test_a_mistake_in_log_toml_is_one_line_with_file_and_key(folder_of_reading, change, says):
+    assert complaint(folder_of_reading(description=TWIST.replace(*change))).startswith(f"/log.toml: {says}")
 
 
-def test_a_folder_that_is_no_log_is_told_what_is_missing(folder, tmp_path):
-    home = folder()
-    assert complaint(tmp_path / "none") == ": no such folder; check the path"
-    assert complaint(home / "samples.csv") == ": is a file; give the folder that it lies in"
+def test_a_folder_that_is_no_log_is_told_what_is_missing(folder_of_reading, tmp_path):
+    home = folder_of_reading()
+    assert complaint(tmp_path / "none") == ": no such folder_of_reading; check the path"
+    assert complaint(home / "samples.csv") == ": is a file; give the folder_of_reading that it lies in"
     (home / "samples.csv").unlink()
     assert complaint(home).startswith("/samples.csv: no such file")
     (home / "samples.csv").mkdir()
@@ -179,102 +360,135 @@ def test_a_folder_that_is_no_log_is_told_what_is_missing(folder, tmp_path):
     ("samples", "says"),
     [
         ("", ": is empty"),
-        (HEADER, ": has no rows"),
-        (HEADER + "\n\n", ": has no rows"),
+        (READING_HEADER, ": has no rows"),
+        (READING_HEADER + "\n\n", ": has no rows"),
         (b"\x89PNG\r\n\x1a\n\xff", ": is not a CSV file"),
-        (GOOD.replace("a,0.1,", "a,0.1,7,"), ": line 3: has 8 cells, but the first line names 7"),
-        (GOOD.replace("a,0.1,0.6,0.2,1.05,2,0.51", "a,0.1,0.6"), ": line 3: has 3 cells, but the first line names 7"),
-        (GOOD.replace(",1.05,2,0.51", ""), ": line 3: has 4 cells, but the first line names 7"),
-        (GOOD.replace("a,0.1", '"a,0.1'), ": is not a CSV file"),
-        (GOOD.replace(",", ";"), ": line 1: unknown column 'episode;time;v;omega;x;y;heading'"),
-        (GOOD.replace("omega", "omeg"), ": line 1: unknown column 'omeg'; did you mean 'omega'?"),
-        (GOOD.replace("omega", "v"), ": line 1: names the column 'v' twice"),
-        (GOOD.replace("heading", "wheel_left"), ": line 1: no column 'heading'"),
-        (GOOD.replace("v,omega", "wheel_left,wheel_right"), ": line 1: no column 'v'; commands of kind 'twist' need "),
-        (HEADER.replace("\n", ",wheel_left\n") + "a,0,0,0,0,0,0,1\n", ": line 1: no column 'wheel_right'"),
-        (GOOD.replace("0.51", "north"), ": line 3, column 'heading': must be a finite number, or empty where nothing"),
-        (GOOD.replace("0.51", "nan"), ": line 3, column 'heading': must be a finite number, or empty where nothing"),
-        (GOOD.replace("0.51", "inf"), ": line 3, column 'heading': must be a finite number, or empty where nothing"),
-        (GOOD.replace("0.2,1.05", ",1.05"), ": line 3, column 'omega': must be a finite number, got ''"),
-        (GOOD.replace("0.2,1.05", "nan,1.05"), ": line 3, column 'omega': must be a finite number, got 'nan'"),
-        (GOOD.replace("0.2,1.05", "-inf,1.05"), ": line 3, column 'omega': must be a finite number, got '-inf'"),
-        (GOOD.replace("0.2,1.05", "fast,1.05"), ": line 3, column 'omega': must be a finite number, got 'fast'"),
-        (GOOD.replace("a,0.1", "a,"), ": line 3, column 'time': must be a finite number, got ''"),
-        (GOOD.replace("\na,0.1", "\n\n\na,noon"), ": line 5, column 'time': must be a finite number, got 'noon'"),
-        (GOOD.replace("a,0.1", ",0.1"), ": line 3, column 'episode': is empty"),
-        (GOOD.replace("a,0.1", "a,0.0"), ": line 3, column 'time': 0 s does not come after 0 s of the row before"),
-        (GOOD.replace("a,0.1", "a,-0.1"), ": line 3, column 'time': -0.1 s does not come after 0 s"),
-        (GOOD.replace("a,0.1", "a,0.13"), ": line 3, column 'time': 0.13 s lies off the grid of 10 Hz"),
-        (GOOD + "b,3.11,0,0,,,\n", ": line 6, column 'time': 3.11 s lies off the grid of 10 Hz"),
-        (GOOD.replace("b,3.1", "b,3100"), ": line 5, column 'time': the rows cover 30971 samples of 10 Hz with 4 rows"),
-        (GOOD + "a,9.0,0,0,0,0,0\n", ": line 6, column 'episode': 'a' comes back after another episode"),
-        (GOOD + "c,9.0,0,0,0,0,0\n", ": line 6, column 'episode': 'c' has a single row"),
-        (GOOD.replace("1.05,2,0.51", "1.05,,0.51"), ": line 3, column 'y': is empty, but not all of x, y, heading"),
-        (GOOD.replace("1.05,2,0.51", ",,0.51"), ": line 3, column 'x': is empty, but not all of x, y, heading"),
+        (READING_GOOD.replace("a,0.1,", "a,0.1,7,"), ": line 3: has 8 cells, but the first line names 7"),
+        (
+            READING_GOOD.replace("a,0.1,0.6,0.2,1.05,2,0.51", "a,0.1,0.6"),
+            ": line 3: has 3 cells, but the first line names 7",
+        ),
+        (READING_GOOD.replace(",1.05,2,0.51", ""), ": line 3: has 4 cells, but the first line names 7"),
+        (READING_GOOD.replace("a,0.1", '"a,0.1'), ": is not a CSV file"),
+        (READING_GOOD.replace(",", ";"), ": line 1: unknown column 'episode;time;v;omega;x;y;heading'"),
+        (READING_GOOD.replace("omega", "omeg"), ": line 1: unknown column 'omeg'; did you mean 'omega'?"),
+        (READING_GOOD.replace("omega", "v"), ": line 1: names the column 'v' twice"),
+        (READING_GOOD.replace("heading", "wheel_left"), ": line 1: no column 'heading'"),
+        (
+            READING_GOOD.replace("v,omega", "wheel_left,wheel_right"),
+            ": line 1: no column 'v'; commands of kind 'twist' need ",
+        ),
+        (READING_HEADER.replace("\n", ",wheel_left\n") + "a,0,0,0,0,0,0,1\n", ": line 1: no column 'wheel_right'"),
+        (
+            READING_GOOD.replace("0.51", "north"),
+            ": line 3, column 'heading': must be a finite number, or empty where nothing",
+        ),
+        (
+            READING_GOOD.replace("0.51", "nan"),
+            ": line 3, column 'heading': must be a finite number, or empty where nothing",
+        ),
+        (
+            READING_GOOD.replace("0.51", "inf"),
+            ": line 3, column 'heading': must be a finite number, or empty where nothing",
+        ),
+        (READING_GOOD.replace("0.2,1.05", ",1.05"), ": line 3, column 'omega': must be a finite number, got ''"),
+        (READING_GOOD.replace("0.2,1.05", "nan,1.05"), ": line 3, column 'omega': must be a finite number, got 'nan'"),
+        (
+            READING_GOOD.replace("0.2,1.05", "-inf,1.05"),
+            ": line 3, column 'omega': must be a finite number, got '-inf'",
+        ),
+        (
+            READING_GOOD.replace("0.2,1.05", "fast,1.05"),
+            ": line 3, column 'omega': must be a finite number, got 'fast'",
+        ),
+        (READING_GOOD.replace("a,0.1", "a,"), ": line 3, column 'time': must be a finite number, got ''"),
+        (
+            READING_GOOD.replace("\na,0.1", "\n\n\na,noon"),
+            ": line 5, column 'time': must be a finite number, got 'noon'",
+        ),
+        (READING_GOOD.replace("a,0.1", ",0.1"), ": line 3, column 'episode': is empty"),
+        (
+            READING_GOOD.replace("a,0.1", "a,0.0"),
+            ": line 3, column 'time': 0 s does not come after 0 s of the row before",
+        ),
+        (READING_GOOD.replace("a,0.1", "a,-0.1"), ": line 3, column 'time': -0.1 s does not come after 0 s"),
+        (READING_GOOD.replace("a,0.1", "a,0.13"), ": line 3, column 'time': 0.13 s lies off the grid of 10 Hz"),
+        (READING_GOOD + "b,3.11,0,0,,,\n", ": line 6, column 'time': 3.11 s lies off the grid of 10 Hz"),
+        (
+            READING_GOOD.replace("b,3.1", "b,3100"),
+            ": line 5, column 'time': the rows cover 30971 samples of 10 Hz with 4 rows",
+        ),
+        (READING_GOOD + "a,9.0,0,0,0,0,0\n", ": line 6, column 'episode': 'a' comes back after another episode"),
+        (READING_GOOD + "c,9.0,0,0,0,0,0\n", ": line 6, column 'episode': 'c' has a single row"),
+        (
+            READING_GOOD.replace("1.05,2,0.51", "1.05,,0.51"),
+            ": line 3, column 'y': is empty, but not all of x, y, heading",
+        ),
+        (READING_GOOD.replace("1.05,2,0.51", ",,0.51"), ": line 3, column 'x': is empty, but not all of x, y, heading"),
     ],
 )
-def test_a_mistake_in_samples_is_one_line_with_file_line_and_column(folder, samples, says):
-    assert complaint(folder(samples)).startswith(f"/samples.csv{says}")
+def test_a_mistake_in_samples_is_one_line_with_file_line_and_column(folder_of_reading, samples, says):
+    assert complaint(folder_of_reading(samples)).startswith(f"/samples.csv{says}")
 
 
-def test_a_half_measured_pair_of_wheels_is_refused(folder):
-    samples = HEADER.strip() + ",wheel_left,wheel_right\na,0,0,0,0,0,0,3,4\na,0.1,0,0,0,0,0,3,\n"
-    assert complaint(folder(samples)).startswith("/samples.csv: line 3, column 'wheel_right': is empty")
+def test_a_half_measured_pair_of_wheels_is_refused(folder_of_reading):
+    samples = READING_HEADER.strip() + ",wheel_left,wheel_right\na,0,0,0,0,0,0,3,4\na,0.1,0,0,0,0,0,3,\n"
+    assert complaint(folder_of_reading(samples)).startswith("/samples.csv: line 3, column 'wheel_right': is empty")
 
 
-def test_duties_lie_between_full_backwards_and_full_ahead(folder):
+def test_duties_lie_between_full_backwards_and_full_ahead(folder_of_reading):
     duty = TWIST.replace("twist", "duty")
-    samples = GOOD.replace("v,omega", "left,right")
-    read_log(folder(samples.replace("0.6,0.2", "-1,1.0000001"), duty))
-    says = complaint(folder(samples.replace("0.6,0.2", "0.6,-1.01"), duty))
+    samples = READING_GOOD.replace("v,omega", "left,right")
+    read_log(folder_of_reading(samples.replace("0.6,0.2", "-1,1.0000001"), duty))
+    says = complaint(folder_of_reading(samples.replace("0.6,0.2", "0.6,-1.01"), duty))
     assert says.startswith("/samples.csv: line 3, column 'right': a duty must be between -1 and 1, got -1.01")
 
 
-def test_rows_within_a_quarter_of_a_sample_are_on_the_grid(folder):
-    (first, _) = read_log(folder(GOOD.replace("a,0.1", "a,0.125"))).episodes
+def test_rows_within_a_quarter_of_a_sample_are_on_the_grid(folder_of_reading):
+    (first, _) = read_log(folder_of_reading(READING_GOOD.replace("a,0.1", "a,0.125"))).episodes
     np.testing.assert_allclose(first.times, [0.0, 0.1])
-    assert "off the grid" in complaint(folder(GOOD.replace("a,0.1", "a,0.126")))
+    assert "off the grid" in complaint(folder_of_reading(READING_GOOD.replace("a,0.1", "a,0.126")))
 
 
 @pytest.mark.parametrize("wrapped", [False, True])
 @pytest.mark.parametrize("backwards", [False, True])
 @pytest.mark.parametrize("turn", [0.02, 0.1, 0.5])
-def test_headings_in_degrees_are_found_out_and_radians_are_not(folder, turn, backwards, wrapped):
+def test_headings_in_degrees_are_found_out_and_radians_are_not(folder_of_reading, turn, backwards, wrapped):
     drive = {"turn": turn, "backwards": backwards, "wrapped": wrapped, "seconds": 120.0}
-    read_log(folder(driven(**drive)))
-    says = complaint(folder(driven(**drive, degrees=True)))
+    read_log(folder_of_reading(driven(**drive)))
+    says = complaint(folder_of_reading(driven(**drive, degrees=True)))
     assert "column 'heading'" in says
     assert "look like degrees; write headings in radians" in says
 
 
 @pytest.mark.parametrize("start", [0.3, 1.5708, 3.0])
-def test_degrees_of_a_straight_drive_are_found_out(folder, start):
-    read_log(folder(driven(turn=0.0, start=start)))
-    assert "look like degrees" in complaint(folder(driven(turn=0.0, start=start, degrees=True)))
+def test_degrees_of_a_straight_drive_are_found_out(folder_of_reading, start):
+    read_log(folder_of_reading(driven(turn=0.0, start=start)))
+    assert "look like degrees" in complaint(folder_of_reading(driven(turn=0.0, start=start, degrees=True)))
 
 
-def test_degrees_of_a_drive_that_hardly_turns_are_found_out(folder):
+def test_degrees_of_a_drive_that_hardly_turns_are_found_out(folder_of_reading):
     table = pd.read_csv(io.StringIO(driven(turn=0.0015)))
     assert table["heading"].abs().max() < np.radians(7)
-    read_log(folder(table.to_csv(index=False)))
+    read_log(folder_of_reading(table.to_csv(index=False)))
     table["heading"] = np.degrees(table["heading"])
-    assert "look like degrees" in complaint(folder(table.to_csv(index=False)))
+    assert "look like degrees" in complaint(folder_of_reading(table.to_csv(index=False)))
 
 
-def test_turns_counted_through_one_episode_but_not_the_next_are_no_degrees(folder):
-    samples = HEADER + "a,0,0,1,1,1,365\na,0.1,0,1,1,1,365.1\nb,0,0,1,1,1,5\nb,0.1,0,1,1,1,5.1\n"
-    np.testing.assert_allclose(read_log(folder(samples)).episodes[1].poses[:, 2], [5, 5.1])
+def test_turns_counted_through_one_episode_but_not_the_next_are_no_degrees(folder_of_reading):
+    samples = READING_HEADER + "a,0,0,1,1,1,365\na,0.1,0,1,1,1,365.1\nb,0,0,1,1,1,5\nb,0.1,0,1,1,1,5.1\n"
+    np.testing.assert_allclose(read_log(folder_of_reading(samples)).episodes[1].poses[:, 2], [5, 5.1])
 
 
-def test_degrees_of_a_robot_that_turns_on_the_spot_are_found_out_where_they_wrap(folder):
+def test_degrees_of_a_robot_that_turns_on_the_spot_are_found_out_where_they_wrap(folder_of_reading):
     rows = [f"a,{k / 10},0,1,1,1,{(k * 15 + 180) % 360 - 180}" for k in range(60)]
-    assert "look like degrees" in complaint(folder(HEADER + "\n".join(rows) + "\n"))
+    assert "look like degrees" in complaint(folder_of_reading(READING_HEADER + "\n".join(rows) + "\n"))
 
 
-def test_a_heading_that_is_measured_askew_is_not_taken_for_degrees(folder):
+def test_a_heading_that_is_measured_askew_is_not_taken_for_degrees(folder_of_reading):
     table = pd.read_csv(io.StringIO(driven(turn=1.0)))
     for askew in (0.5, np.pi / 2, -2.0):
-        read_log(folder(table.assign(heading=table["heading"] + askew).to_csv(index=False)))
+        read_log(folder_of_reading(table.assign(heading=table["heading"] + askew).to_csv(index=False)))
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs measured data in shared/data/logs")
@@ -309,7 +523,9 @@ def test_measured_logs_are_read_whole_and_quickly(name, command, episodes, rows,
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs measured data in shared/data/logs")
 @pytest.mark.parametrize("name", ["drive_husky", "gym_duckietown", "mrclam6_robot1", "mrclam6_robot4"])
-def test_measured_logs_in_degrees_are_found_out(folder, name):
+def test_measured_logs_in_degrees_are_found_out(folder_of_reading, name):
     table = pd.read_csv(DATA / name / "samples.csv")
     turned = table.assign(heading=np.degrees(table["heading"])).to_csv(index=False)
-    assert "look like degrees" in complaint(folder(turned, (DATA / name / "log.toml").read_text(encoding="utf-8")))
+    assert "look like degrees" in complaint(
+        folder_of_reading(turned, (DATA / name / "log.toml").read_text(encoding="utf-8"))
+    )

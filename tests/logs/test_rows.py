@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from log_folders import complaint, write_files
 
-from proxytune.logs import cells, read_log
+from proxytune.logs import read_log
+from proxytune.logs import rows as cells
 
 TWIST = 'format = 1\nname = "yard"\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
 HEADER = "episode,time,v,omega,x,y,heading"

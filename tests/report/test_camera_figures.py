@@ -1,26 +1,18 @@
 """The document, figures and sentences of a camera's diagnosis, on frames whose camera is known."""
 
 import math
-import sys
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.text import Text
-
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
 from pictured import ROBOT, lane_poses, write_still_frames
 
-from proxytune.diagnosis.camera.conclusion import Evidence, conclude
-from proxytune.diagnosis.camera.diagnose import diagnose_camera
-from proxytune.diagnosis.camera.error import weighing
-from proxytune.diagnosis.camera.look.appearance import look_at
-from proxytune.diagnosis.camera.look.blemishes import Blemish
-from proxytune.diagnosis.camera.result import CameraEffect, LaidLine, LaidMap
-from proxytune.diagnosis.result import Estimate
+from proxytune.diagnosis import Blemish, CameraEffect, Estimate, LaidLine, LaidMap
+from proxytune.diagnosis.camera import error as weighing
+from proxytune.diagnosis.camera.appearance import look_at
+from proxytune.diagnosis.camera.diagnose import Evidence, conclude, diagnose_camera
 from proxytune.logs import read_log
 from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure, measured_displacements
 from proxytune.report.diagnosis.camera.document import camera_document

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.measured.clocks import Clocks, Jump, Offset
+from proxytune.diagnosis import Clocks, Offset
+from proxytune.diagnosis.motion.clocks import Jump
 from proxytune.report.diagnosis.clocks import clocks_document, clocks_notes
 
 NONE = Offset(0.0, (0.0, 0.0))

@@ -8,10 +8,8 @@ from proxytune.comparison.runs import Run, RunKey
 from proxytune.comparison.summary import Estimate, summarise
 from proxytune.report.compare.document import compare_document, compare_lines, compare_tables, verdict
 from proxytune.report.compare.figure import PALETTE, SHARED, compare_figure, looks_of
-from proxytune.search.engines import registry
-from proxytune.search.engines.engine import Engine, Look
-from proxytune.search.engines.registry import ENGINES, NAMES
-from proxytune.search.engines.sobol import Sobol
+from proxytune.search import ENGINES, NAMES, Engine, Look, registry
+from proxytune.search.engine import Sobol
 
 
 def runs(engine, *curves, reading=None):

@@ -9,7 +9,8 @@ from proxytune.comparison.judgement import Judgement
 from proxytune.comparison.runs import Run, RunKey
 from proxytune.comparison.summary import summarise
 from proxytune.report.compare.page import compare_page
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 
 
 def runs(engine, *curves):

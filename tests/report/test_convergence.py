@@ -5,11 +5,8 @@ import pytest
 from confirmations import confirmed
 
 from proxytune.report.study.convergence import convergence
-from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store, TrialRecord
+from proxytune.study import StudyRun, open_study, result_of
 
 
 @pytest.fixture

@@ -1,28 +1,28 @@
-import sys
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
+import hidden
 import numpy as np
 import pytest
 from matplotlib.container import ErrorbarContainer
 from matplotlib.text import Text
 
-sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
-
-import hidden
-
-from proxytune.diagnosis.diagnose import diagnose
-from proxytune.diagnosis.horizon.windows import cut, pose_errors
-from proxytune.diagnosis.model.innovations import huber
-from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, disturbed_increments, increments
-from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS, candidates
-from proxytune.diagnosis.naming.findings import AdoptedEffect
-from proxytune.diagnosis.naming.signals import signal_groups
-from proxytune.diagnosis.rules import RULES
-from proxytune.driving.robot import read_robot
-from proxytune.effects import Means, theta_names
-from proxytune.effects.catalogue import CATALOGUE
+from proxytune.diagnosis import (
+    MOTION_EFFECTS,
+    RANDOM_EFFECTS,
+    RULES,
+    AdoptedEffect,
+    cut,
+    disturbed_increments,
+    increments,
+    pose_errors,
+)
+from proxytune.diagnosis.motion.diagnose import diagnose
+from proxytune.diagnosis.motion.innovations import huber
+from proxytune.diagnosis.motion.screening import candidates
+from proxytune.diagnosis.motion.signals import signal_groups
+from proxytune.driving import read_robot
+from proxytune.effects import CATALOGUE, Means, theta_names
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.figures import diagnosis_figures
 from proxytune.report.diagnosis.means import ANY, GROUPS, MEASURED, retuned

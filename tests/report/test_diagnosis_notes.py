@@ -5,13 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from proxytune.diagnosis.horizon.polish import Polish
-from proxytune.diagnosis.horizon.windows import Ratio
-from proxytune.diagnosis.manoeuvres import LIBRARY, Manoeuvre
-from proxytune.diagnosis.naming.findings import AdoptedEffect
-from proxytune.diagnosis.remainder.learning import Learning
-from proxytune.diagnosis.remainder.remainder import Remainder
-from proxytune.diagnosis.result import Estimate
+from proxytune.diagnosis import AdoptedEffect, Estimate, Learning, Ratio
+from proxytune.diagnosis.motion.discrepancy import Remainder
+from proxytune.diagnosis.motion.manoeuvres import LIBRARY, Manoeuvre
+from proxytune.diagnosis.motion.multistep_fit import Polish
 from proxytune.report.diagnosis.notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
 
 SLIP = AdoptedEffect("lateral_slip", "", ("lateral_slip",), (("lateral_slip",),), 75.2, 0.002, ())

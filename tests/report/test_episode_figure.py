@@ -8,7 +8,7 @@ from episodes import paired, recorded
 from hypothesis import given
 from hypothesis import strategies as st
 
-from proxytune.driving.road.reading import shipped_map
+from proxytune.driving import shipped_map
 from proxytune.report.drive.document import parting
 from proxytune.report.drive.figure import episode_figure
 from proxytune.report.drive.path import ARROWS, LEAST_M, arrow_rows

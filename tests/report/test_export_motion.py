@@ -9,10 +9,8 @@ import pybullet
 import pytest
 from export_truth import ROBOT, instance
 
-from proxytune.driving.body import AXLES, read_body
-from proxytune.driving.cameras import orientation
-from proxytune.driving.drivetrain import drivetrain
-from proxytune.driving.planar import PlanarPlant
+from proxytune.driving import AXLES, drivetrain, orientation, read_body
+from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import Setting, effects_from
 from proxytune.errors import InputError, SettingsError
 from proxytune.report.export.mjcf import mjcf_text

@@ -71,7 +71,7 @@ def test_every_effect_is_in_the_table_of_the_page(name):
 
 
 def test_the_duckiebot_as_it_is_keeps_its_wheels_and_camera():
-    from proxytune.driving.body import parse_urdf, read_body
+    from proxytune.driving import parse_urdf, read_body
 
     before = read_body(parse_urdf(ROBOT.urdf), ROBOT.urdf)
     assert WRITERS["urdf"](instance()).count(f'radius="{before.left.radius_m:g}"') == 4

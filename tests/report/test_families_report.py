@@ -6,11 +6,11 @@ import pytest
 from matplotlib.text import Text
 from several_tuned import compared, family, lesson
 
-from proxytune.learning.plv import Estimate
+from proxytune.learning import Estimate
 from proxytune.report.families.figure import families_figure
 from proxytune.report.families.words import families_answer, families_next_step
 from proxytune.report.style import COLUMN
-from proxytune.study.families.compared import Lesson
+from proxytune.study import Lesson
 
 DEAR, CHEAP = (2.0, 2.2, 1.8, 2.0), (1.0, 1.1, 0.9, 1.0)
 BOTH = (family("bullet", 0, DEAR, noise=8.0), family("planar", 0, CHEAP, noise=8.0))

@@ -3,16 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proxytune.report.page import html_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.study.document import study_document
 from proxytune.report.study.importance_figure import importance_figure
 from proxytune.report.study.page import study_page
 from proxytune.report.study.search_rows import importance_row
-from proxytune.search.knowledge.importance import Importance
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.search import Importance
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, result_of
 
 
 @pytest.fixture

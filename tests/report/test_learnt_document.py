@@ -2,10 +2,9 @@
 
 import json
 
-from proxytune.diagnosis.horizon.windows import Ratio, Rmse
-from proxytune.diagnosis.remainder.learning import Learning, LearntError
-from proxytune.diagnosis.remainder.lookalike import Lookalike
-from proxytune.diagnosis.remainder.remainder import Remainder
+from proxytune.diagnosis import Learning, Lookalike, Ratio, Rmse
+from proxytune.diagnosis.motion.discrepancy import Remainder
+from proxytune.diagnosis.motion.discrepancy_match import LearntError
 from proxytune.report.diagnosis.learnt import learnt_document, learnt_notes
 
 RATIO = Ratio(0.5, (0.4, 0.6))

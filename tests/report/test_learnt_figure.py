@@ -4,11 +4,9 @@ import warnings
 
 import numpy as np
 
-from proxytune.diagnosis.remainder.learning import Learning
-from proxytune.diagnosis.remainder.remainder import Remainder
-from proxytune.effects.learnt.effect import Curve, Learnt, Seen
-from proxytune.effects.learnt.features import GROUPS
-from proxytune.effects.learnt.table import learnt_theta
+from proxytune.diagnosis import Learning
+from proxytune.diagnosis.motion.discrepancy import Remainder
+from proxytune.effects import GROUPS, Curve, Learnt, Seen, learnt_theta
 from proxytune.report.diagnosis.learnt_figure import learnt_figure
 
 KNOTS = {"speed_and_turn": ((-0.2, -1.0), (0.2, 1.0)), "direction": (-1.0,), "heading": (1.0, 2.0)}

@@ -2,7 +2,7 @@
 
 import json
 
-from proxytune.diagnosis.naming.likeness import Unlike
+from proxytune.diagnosis import Unlike
 from proxytune.report.diagnosis.likeness import unlike_document, unlike_notes
 
 FOUND = Unlike("left", (0.88, 1.02), ((0, 2), (1, 3)))

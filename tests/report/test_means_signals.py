@@ -1,16 +1,11 @@
 """Whatever an effect may have along the axis of a figure can be drawn."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parent.parent / "diagnosis"))
-
 from planted import TRUTH, planted_drives
 
-from proxytune.effects.trace import MOTIONS, SIGNALS, Panel
+from proxytune.effects import Panel
+from proxytune.effects.effect import MOTIONS, SIGNALS
 from proxytune.report.diagnosis.means import NAMES, Rates, _signal
 
 DRIVES = planted_drives(TRUTH, episodes=1, seconds=10.0)

@@ -6,10 +6,8 @@ from confirmations import planted
 
 from proxytune.report.numbers import span
 from proxytune.report.study.profiles_figure import density_of, profiles_figure
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, result_of
 
 
 @pytest.fixture

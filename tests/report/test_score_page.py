@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.scores.figures import flipped_pairs
 from proxytune.report.scores.page import Drawn, score_page
 from proxytune.report.scores.words import score_answer, score_next_step

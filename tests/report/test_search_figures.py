@@ -6,13 +6,9 @@ from confirmations import planted
 
 from proxytune.report.study.profiles_figure import profiles_figure
 from proxytune.report.study.search_figures import evaluations_figure
-from proxytune.search.knowledge.knowledge import learn
-from proxytune.search.proposer import Trial
-from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.search import Trial, learn
+from proxytune.storage import Store, TrialRecord
+from proxytune.study import StudyRun, open_study, result_of
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import pytest
 from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
 
-from proxytune.report.page import html_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.study.document import study_document
 from proxytune.report.study.finding import finding_of
 from proxytune.report.study.page import study_page
@@ -15,15 +15,11 @@ from proxytune.report.study.search_rows import cut_rows, failure_rows, search_ro
 from proxytune.report.study.table import INFORMATION, SEARCH, THETA, USEFULNESS, study_table
 from proxytune.report.study.usefulness_table import floor_rows, misfit_row, usefulness_notes, usefulness_rows
 from proxytune.report.study.verdict import sentence
-from proxytune.search.engines.registry import make_proposer
+from proxytune.search import make_proposer
 from proxytune.space import Interval
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.run import run_study
-from proxytune.study.stages.movement import Movement
-from proxytune.study.stages.preflight import Preflight
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store
+from proxytune.study import Preflight, StudyRun, open_study, result_of, run_study
+from proxytune.study.preflight import Movement
 
 
 @pytest.fixture

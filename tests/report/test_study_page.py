@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from confirmations import TOLD, planted
 
-from proxytune.report.page import html_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.study.captions import TITLES
 from proxytune.report.study.convergence import convergence
 from proxytune.report.study.finding import finding_of
@@ -15,10 +15,8 @@ from proxytune.report.study.live_page import live_page
 from proxytune.report.study.page import study_page
 from proxytune.report.study.verdict import answer, next_step, sentence
 from proxytune.report.writing import save
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, result_of
 
 EVIL = "<script>alert(1)</script>"
 

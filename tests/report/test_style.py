@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis.result")
+HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis.answer")
 
 
 @pytest.mark.slow

@@ -19,11 +19,9 @@ from proxytune.report.sweep.document import (
     held_mark,
 )
 from proxytune.report.sweep.figures import panels_figure, sweep_figure
-from proxytune.storage.store import Store
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
-from proxytune.sweep.discrepancy import discrepancy_study
-from proxytune.sweep.sweep import curve_of, plan_sweep, run_sweep, sweep_interval, with_target
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study
+from proxytune.sweep import curve_of, discrepancy_study, plan_sweep, run_sweep, sweep_interval, with_target
 
 TRUTH = {"trim": 0.1, "delay": 0.12}
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.sweep.document import curve_name
 from proxytune.report.sweep.page import sweep_page
-from proxytune.storage.store import Store
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
-from proxytune.sweep.sweep import curve_of, plan_sweep, run_sweep, sweep_interval
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study
+from proxytune.sweep import curve_of, plan_sweep, run_sweep, sweep_interval
 
 EVIL = "<script>alert(1)</script>"
 

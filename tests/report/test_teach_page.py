@@ -6,18 +6,16 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 import pytest
 
-from proxytune.learning.costs import Costs
-from proxytune.learning.curves import Curve
-from proxytune.learning.lessons import Distribution
-from proxytune.learning.plv import Estimate as Worth
-from proxytune.learning.plv import Teaching, sample_needs
-from proxytune.learning.published import Published
-from proxytune.report.page import foot_of, html_of
+from proxytune.learning import Costs, Curve, Distribution, Teaching, sample_needs
+from proxytune.learning import Estimate as Worth
+from proxytune.learning.plv import Published
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.teaching.figure import teach_figure
 from proxytune.report.teaching.page import teach_page
 from proxytune.report.teaching.words import plv_answer, plv_next_step, sorted_by_worth, teach_answer, teach_next_step
 from proxytune.report.writing import save
-from proxytune.teaching.experiment import Experiment, TeacherResult
+from proxytune.teaching import Experiment, TeacherResult
 
 NOTHING = Worth(None, None, None)
 COUNTS = (0, 50, 100, 200, 400)

@@ -5,10 +5,8 @@ from confirmations import TOLD, planted
 
 from proxytune.report.study.information_table import information_rows
 from proxytune.report.study.theta_table import theta_columns, theta_notes, theta_rows
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, result_of
 
 
 @pytest.fixture

@@ -7,13 +7,10 @@ from confirmations import LACKS, TOLD, planted
 from proxytune.report.study.finding import Finding, KnownParameter, declared_of, finding_of
 from proxytune.report.study.verdict import sentence
 from proxytune.scores import Metric, ScoreTable
-from proxytune.search.knowledge.information import Information
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
-from proxytune.usefulness import NoiseFloor
-from proxytune.usefulness.chance import Chance
+from proxytune.search import Information
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, result_of
+from proxytune.usefulness import Chance, NoiseFloor
 
 TRIM = KnownParameter("trim", "", 0.1213, (0.108, 0.146), 0.06, True)
 PITCH = KnownParameter("camera_pitch", "deg", 13.04, (11.1, 14.4), 0.1, True)

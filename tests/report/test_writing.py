@@ -5,8 +5,8 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from proxytune.drafts import draft_path
 from proxytune.errors import RunError
+from proxytune.files import draft_path
 from proxytune.report.writing import figures_also_as, save, write_picture, write_text
 
 

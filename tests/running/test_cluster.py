@@ -8,9 +8,8 @@ import pytest
 
 from proxytune.cli.main import main
 from proxytune.errors import InputError
-from proxytune.running.cluster import on_cluster
+from proxytune.running import on_cluster, working
 from proxytune.running.same_code import check_code, made_by
-from proxytune.running.workers import working
 
 distributed = pytest.importorskip("distributed")
 

@@ -15,7 +15,7 @@ from processes import ENVIRONMENT
 from proxytune.cli.terminal.interruption import signals_as_interruptions
 from proxytune.domain import make_episode
 from proxytune.errors import RunError
-from proxytune.running.episodes import Watch, run_episode, running
+from proxytune.running import Watch, run_episode, running
 
 EPISODES = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for a in range(3) for s in range(3)]
 LAST = EPISODES[-1]

@@ -6,7 +6,7 @@ from wobbly import Wobbly
 
 from proxytune.domain import make_episode
 from proxytune.errors import EpisodeError, RunError
-from proxytune.running.episodes import run_episode, running
+from proxytune.running import run_episode, running
 
 EPISODES = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for a in range(3) for s in range(3)]
 

@@ -8,9 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from deadly import ENDINGS
 
-from proxytune.running.apart import Apart, Lost
-from proxytune.running.limits import OVERRUN, Noted, limited, was_ended_in
-from proxytune.running.workers import Rescue, working
+from proxytune.running import OVERRUN, Apart, Lost, Noted, Rescue, limited, was_ended_in, working
 
 
 def meet(ending, piece):

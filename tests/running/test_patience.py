@@ -6,8 +6,7 @@ import pytest
 from deadly import Deadly
 
 from proxytune.domain import make_episode
-from proxytune.running import patience
-from proxytune.running.episodes import Watch, running
+from proxytune.running import Watch, patience, running
 
 EPISODES = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for a in range(2) for s in range(2)]
 LONG_S = 0.1

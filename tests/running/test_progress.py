@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from proxytune.running.progress import Bars
+from proxytune.running import Bars
 
 STUDY = ("fresh episodes 2 of 3", "episodes", 3.25)
 TEACHING = ("demonstrations", "points of learning curves", None)

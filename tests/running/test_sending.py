@@ -4,7 +4,7 @@ import importlib
 import sys
 from pathlib import Path
 
-from proxytune.running.workers import working
+from proxytune.running import working
 
 
 def folder_of(module):

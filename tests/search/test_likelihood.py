@@ -1,4 +1,9 @@
-"""The likelihood is highest where the target was made, and outputs that say the same count as one."""
+"""The likelihood is highest where the target was made, and outputs that say the same count as one.
+
+Outputs are modelled each on its own, where they are known, and their errors are told as large as they are.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from steps import SPACE, goal, whole
 
-from proxytune.search.design import design_point, to_unit
-from proxytune.search.knowledge.likelihood import Likelihood, deviance, temper
-from proxytune.search.knowledge.output_model import fit_outputs
-from proxytune.search.proposer import Trial
+from proxytune.errors import RunError
+from proxytune.search import Trial, to_unit, unit_array
+from proxytune.search.engine import design_point
+from proxytune.search.likelihood import Likelihood, deviance, fit_outputs, temper
 
 TRUTH = (0.12, 0.06)
 
@@ -67,3 +72,73 @@ def test_an_output_that_is_far_off_counts_for_less_than_a_normal_s_would():
     assert deviance(np.array([0.0]))[0] == 0.0
     assert deviance(np.array([1.0]))[0] == pytest.approx(0.5, abs=0.1)
     assert deviance(np.array([10.0]))[0] < 10.0
+
+
+def outputs_of_output_model(values):
+    """Two smooth outputs, a rough one, one that never changes, one that comes to its bound."""
+    first, second = to_unit(SPACE, values)
+    rough = np.random.default_rng([int(1e6 * first), int(1e6 * second)]).normal()
+    return (first + second, np.sin(3.0 * second), first + 0.3 * rough, 60.0, min(20.0, 15.0 + 10.0 * first))
+
+
+def trials(count, seed=1):
+    points = [design_point(SPACE, index, seed) for index in range(count)]
+    return [Trial(values, 1.0, outputs_of_output_model(values)) for values in points]
+
+
+HELD_OUT = [design_point(SPACE, index, 9) for index in range(64)]
+
+
+def test_smooth_outputs_are_predicted_where_no_trial_was_and_others_are_not_trusted():
+    model = fit_outputs(SPACE, trials(32))
+    mean, _ = model.predict(unit_array(SPACE, HELD_OUT))
+    truth = np.array([outputs_of_output_model(values) for values in HELD_OUT])
+    errors = np.sqrt(np.mean((mean - truth) ** 2, axis=0))
+    assert errors[0] < 0.05
+    assert errors[1] < 0.05
+    assert model.rough[2] > 10.0 * model.rough[0]
+    assert np.isnan(mean[:, 3]).all()
+    assert model.constant[3] == 60.0
+
+
+def test_each_output_s_errors_are_as_large_as_its_variance_says():
+    model = fit_outputs(SPACE, trials(32))
+    mean, variance = model.predict(unit_array(SPACE, HELD_OUT))
+    truth = np.array([outputs_of_output_model(values) for values in HELD_OUT])
+    squares = np.mean((truth - mean)[:, :3] ** 2 / (variance + model.rough)[:, :3], axis=0)
+    assert (squares > 0.05).all()
+    assert (squares < 5.0).all()
+
+
+def test_an_output_that_the_kernel_does_not_suit_gets_more_variance_than_one_that_it_does():
+    model = fit_outputs(SPACE, trials(32))
+    share = model.rough / np.nanvar([trial.outcome for trial in trials(32)], axis=0)
+    assert share[2] > 3.0 * share[0]
+
+
+def test_trials_that_know_some_outputs_alone_tell_of_these():
+    whole = trials(24)
+    part = [replace(t, outcome=(t.outcome[0], *[np.nan] * 4)) if row % 2 else t for row, t in enumerate(whole)]
+    model, half = fit_outputs(SPACE, part), fit_outputs(SPACE, whole[::2])
+    points = unit_array(SPACE, HELD_OUT)
+    assert np.median(model.predict(points)[1][:, 0]) < np.median(half.predict(points)[1][:, 0])
+    assert np.allclose(model.predict(points)[0][:, 1], half.predict(points)[0][:, 1])
+    assert np.isnan(model.left_out).sum(axis=0)[:2].tolist() == [0, 12]
+
+
+def test_the_order_of_trials_changes_no_bit():
+    forwards, backwards = fit_outputs(SPACE, trials(12)), fit_outputs(SPACE, trials(12)[::-1])
+    points = unit_array(SPACE, HELD_OUT)
+    for one, other in zip(forwards.predict(points), backwards.predict(points), strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_without_an_outcome_it_says_so():
+    with pytest.raises(RunError, match="no trial has an outcome"):
+        fit_outputs(SPACE, [Trial((0.1, 0.1), 3.0)])
+
+
+def test_outputs_that_never_change_are_not_modelled_and_stop_nothing():
+    model = fit_outputs(SPACE, [Trial(design_point(SPACE, index, 1), 1.0, (7.0,)) for index in range(6)])
+    assert model.modelled.size == 0
+    assert np.isnan(model.predict(np.array([[0.5, 0.5]]))[0]).all()

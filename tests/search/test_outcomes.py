@@ -1,4 +1,7 @@
-"""The engine that learns from every output finds the θ that made the target, and looks nowhere twice."""
+"""The engine that learns from every output finds the θ that made the target, and looks nowhere twice.
+
+The engine that learns from every output finds the θ that made the target, and looks nowhere twice.
+"""
 
 import os
 import subprocess
@@ -7,15 +10,108 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from steps import SPACE, WHOLE, goal, search
+from steps import SPACE, WHOLE, goal, search, steps, whole
 
-from proxytune.errors import InputError
-from proxytune.search.design import design_point, from_unit, to_unit
-from proxytune.search.engines.outcomes import Outcomes
-from proxytune.search.engines.registry import make_proposer
-from proxytune.search.proposer import Trial, propose_batch
+from proxytune.errors import InputError, RunError
+from proxytune.search import Trial, from_unit, make_proposer, propose_batch, to_unit, with_failures_as_worst
+from proxytune.search.engine import design_point
+from proxytune.search.likelihood import fit_outputs
+from proxytune.search.outcomes import Composite, Outcomes, composed_scores
+from proxytune.space import Interval, Space
 
 FAKES = Path(__file__).parent.parent / "fakes"
+
+
+def needle(outcomes):
+    """0 within a small box around (0.1, 0.1), 10 everywhere else: a score alone does not tell where to look."""
+    return np.where(np.abs(outcomes - 0.1).max(axis=-1) < 0.01, 0.0, 10.0)
+
+
+def told(values):
+    """A trial whose outcome is smooth: the parameters themselves."""
+    return Trial(values, float(needle(np.array(values))), values)
+
+
+def test_it_finds_at_once_what_the_score_alone_does_not_show():
+    for seed in range(3):
+        trials = [told(design_point(SPACE, index, seed)) for index in range(10)]
+        assert {trial.score for trial in trials} == {10.0}
+        for _ in range(3):
+            trials.append(told(Composite(goal(needle, (0.1, 0.1))).propose(SPACE, trials, seed)))
+        assert min(trial.score for trial in trials) == 0.0
+
+
+def test_a_proposal_does_not_depend_on_the_order_in_which_trials_are_told():
+    trials = search(make_proposer("composite", 5, WHOLE), 8, seed=2)
+    assert Composite(WHOLE).propose(SPACE, trials[::-1], 2) == Composite(WHOLE).propose(SPACE, trials, 2)
+
+
+@pytest.mark.slow
+def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
+    trials = search(make_proposer("composite", 5, WHOLE), 8, seed=4)
+    code = (
+        f"import sys; sys.path.append({str(FAKES)!r})\n"
+        "from steps import WHOLE\n"
+        "from proxytune.search.engines.composite import Composite\n"
+        "from proxytune.search.proposer import Trial\n"
+        "from proxytune.space import Interval, Space\n"
+        f"print(repr(Composite(WHOLE).propose({SPACE!r}, {trials!r}, 4)))"
+    )
+    environment = {**os.environ, "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2", "PYTHONHASHSEED": "7"}
+    found = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == repr(Composite(WHOLE).propose(SPACE, trials, 4))
+
+
+def test_a_failed_trial_keeps_the_search_away():
+    """Everything beyond 0.15 s fails; the search goes there less than the design would."""
+    trials = search(make_proposer("composite", 6, WHOLE), 20, seed=1, score=lambda v: None if v[0] > 0.15 else steps(v))
+    assert sum(trial.values[0] > 0.15 for trial in trials[6:]) < 14 / 3
+
+
+def test_a_failed_trial_counts_as_the_outcome_of_the_worst_score():
+    trials = [Trial((0.1, 0.0), 3.0, (1.0,)), Trial((0.2, 0.0), None), Trial((0.3, 0.0), 8.0, (2.0,))]
+    assert [(trial.score, trial.outcome) for trial in with_failures_as_worst(trials)] == [
+        (3.0, (1.0,)),
+        (8.0, (2.0,)),
+        (8.0, (2.0,)),
+    ]
+
+
+def test_draws_agree_with_the_outcomes_at_visited_points_and_spread_elsewhere():
+    visited = np.random.default_rng(1).uniform(0.0, 0.4, (30, 2))
+    box = Space((Interval("delay", 0.0, 1.0), Interval("trim", 0.0, 1.0)))
+    known = [Trial((a, b), 0.0, (100.0 + a, b)) for a, b in visited.tolist()]
+    scores = composed_scores(fit_outputs(box, known), goal(whole, (100.0, 0.0)), 1)
+    assert np.allclose(scores(visited).mean(axis=0), 100.0 + visited[:, 0], atol=0.02)
+    near, far = scores(np.array([[0.2, 0.2], [1.0, 1.0]])).std(axis=0)
+    assert 5 * near < far
+
+
+def test_an_output_that_never_changes_does_no_harm():
+    trials = search(Composed(), 6, 1)
+    more = [Trial(trial.values, trial.score, (*trial.outcome, 60.0)) for trial in trials]
+    assert Composite(goal(whole, (0.0, 60.0))).propose(SPACE, more, 1) == pytest.approx(
+        Composite(WHOLE).propose(SPACE, trials, 1), abs=0.1
+    )
+
+
+class Composed:
+    """The design alone."""
+
+    def propose(self, space, trials, seed):
+        return design_point(space, len(trials), seed)
+
+
+def test_without_an_outcome_it_says_so():
+    with pytest.raises(RunError, match="no trial has an outcome"):
+        Composite(WHOLE).propose(SPACE, [Trial((0.1, 0.1), 3.0)], 1)
+
+
+def test_where_a_score_has_no_parts_the_engine_is_refused():
+    with pytest.raises(InputError, match="'composite' models what a score is computed from"):
+        make_proposer("composite", 3)
+
+
 AGENTS = np.random.default_rng(3).uniform(1.0, 5.0, (10, 2))
 
 
@@ -52,7 +148,7 @@ def test_it_comes_nearer_to_the_truth_than_the_engine_of_the_score_alone():
 
 
 @pytest.mark.slow
-def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
+def test_outcomes_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
     for count in (8, 9):  # a draw, and an expected improvement
         trials = search(make_proposer("outcomes", 5, WHOLE), count, seed=4)
         code = (
@@ -93,6 +189,6 @@ def test_a_trial_that_was_cut_off_tells_what_it_has(count):
     assert found[0] != found[1]
 
 
-def test_where_a_score_has_no_parts_the_engine_is_refused():
+def test_outcomes_where_a_score_has_no_parts_the_engine_is_refused():
     with pytest.raises(InputError, match="'outcomes' models what a score is computed from"):
         make_proposer("outcomes", 3)

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from proxytune.driving.body import check_body, parse_urdf, read_body
-from proxytune.driving.bullet.plant import BulletPlant
-from proxytune.driving.robot import read_robot
+from proxytune.driving import BulletPlant, parse_urdf, read_body, read_robot
+from proxytune.driving.plants import check_body
 from proxytune.errors import InputError
-from proxytune.skeletons.given_urdf import robot_from_urdf
+from proxytune.skeletons import robot_from_urdf
 
 OTHERS = """<robot name="turtle">
   <link name="base_footprint"/>

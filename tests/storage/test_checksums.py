@@ -11,9 +11,8 @@ from hypothesis import strategies as some
 
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import StoreError
+from proxytune.storage import Store, SweepRecord, TrialRecord
 from proxytune.storage.checksums import checksum
-from proxytune.storage.records import SweepRecord, TrialRecord
-from proxytune.storage.store import Store
 
 THETAS = [{"trim": 0.1 * number, "delay": 1 / 3} for number in range(4)]
 

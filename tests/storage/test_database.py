@@ -5,16 +5,10 @@ import sqlite3
 import pytest
 
 from proxytune.errors import StoreError
+from proxytune.storage import salvage
 from proxytune.storage.checksums import COLUMNS
-from proxytune.storage.database import (
-    OF_SEVERAL_FILES,
-    connect,
-    disconnect,
-    open_file,
-    sqlite_errors_as_store_errors,
-)
+from proxytune.storage.database import OF_SEVERAL_FILES, connect, disconnect, open_file, sqlite_errors_as_store_errors
 from proxytune.storage.formats import FORMAT, TRIALS_3
-from proxytune.storage.repair import salvage
 
 
 def made(path):

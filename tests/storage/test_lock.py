@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from proxytune.errors import BusyError, StoreError
-from proxytune.storage.lock import locked
+from proxytune.storage import locked
 
 HOLD = "import sys, time\nfrom pathlib import Path\nfrom proxytune.storage.lock import locked\n" + (
     "with locked(Path(sys.argv[1])):\n    print('held', flush=True)\n    time.sleep(60)\n"

@@ -5,9 +5,8 @@ import os
 import pytest
 
 from proxytune.errors import StoreError
-from proxytune.storage.lock import locked
+from proxytune.storage import Store, locked
 from proxytune.storage.own_files import NAMES
-from proxytune.storage.store import Store
 
 
 @pytest.fixture

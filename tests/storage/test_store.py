@@ -5,8 +5,8 @@ import pytest
 
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import InputError, StoreError
-from proxytune.storage.records import SweepRecord, TrialRecord
-from proxytune.storage.store import RENAMING, Store, theta_json
+from proxytune.storage import Store, SweepRecord, TrialRecord
+from proxytune.storage.store import RENAMING, theta_json
 
 THETA = {"trim": 0.1, "delay": 1 / 3}
 EPISODE = make_episode(THETA, agent="agent1", start=2, seed=11)

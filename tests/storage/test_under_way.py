@@ -4,7 +4,7 @@ import pytest
 
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import StoreError
-from proxytune.storage.store import Store
+from proxytune.storage import Store
 
 EPISODES = [make_episode({"trim": 0.1 / 3.0, "delay": 0.2}, agent="a", start=start, seed=7) for start in (0, 1)]
 

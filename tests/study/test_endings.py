@@ -9,7 +9,7 @@ from processes import besides_progress, start, trials
 from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.running import patience
-from proxytune.storage.store import Store
+from proxytune.storage import Store
 
 FAMILY = {"family": '"deadly:deadly"', "budget": "2", "initial": "2"}
 

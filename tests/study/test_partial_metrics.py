@@ -6,8 +6,8 @@ import pytest
 
 from proxytune.api.studies import read_study, run_study
 from proxytune.cli.main import main
-from proxytune.storage.store import Store
-from proxytune.study.study import open_study
+from proxytune.storage import Store
+from proxytune.study import open_study
 
 FAMILY = """
 from wobbly import Wobbly, wobbly

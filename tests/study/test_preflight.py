@@ -1,20 +1,153 @@
-"""A family with one dead parameter, one that moves no more than noise does, and one that matters."""
+"""Noise is that of placement where both sides share their starts, and what is lost without is told.
 
+Noise is that of placement where both sides share their starts, and what is lost without is told.
+A family with one dead parameter, one that moves no more than noise does, and one that matters.
+An agent that comes to other scores in the same episode is named before the first trial.
+"""
+
+import json
+import random
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from moody import Moody
 from stopping import Stopping
 
+from proxytune.cli.main import main
+from proxytune.domain import Outcome, make_episode
 from proxytune.errors import EpisodeError, RunError
-from proxytune.search.engines.registry import make_proposer
+from proxytune.running import run_episode
+from proxytune.search import make_proposer
 from proxytune.space import Interval
-from proxytune.storage.store import Store
-from proxytune.study.run import run_study
-from proxytune.study.stages.movement import LEVEL, LOOKS, judge
-from proxytune.study.stages.preflight import PAIRS, most_episodes, preflight_of, run_preflight
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store
+from proxytune.study import StudyRun, goal_of, most_preflight_episodes, open_study, result_of, run_preflight, run_study
+from proxytune.study.preflight import (
+    LEVEL,
+    LOOKS,
+    PAIRS,
+    REMEDY,
+    check_some_work,
+    judge,
+    noise_of,
+    placement_pairs,
+    preflight_of,
+    shares_starts,
+)
+
+
+def outcome(agent, failure=""):
+    return Outcome(make_episode({}, agent=agent, start=0, seed=0), None if failure else {"distance": 1.0}, failure, 0.1)
+
+
+ALIKE = [outcome(f"agent{n}", f"agent 'agent{n}' raised KeyError at 1.{n} s: 'mass' (sim.py, line 7)") for n in (0, 1)]
+
+
+def test_where_all_fail_alike_the_line_begins_with_the_failure_and_its_place():
+    expected = r"^agent 'agent0' raised KeyError at 1.0 s: 'mass' \(sim.py, line 7\); every agent fails so, in all 2"
+    with pytest.raises(RunError, match=expected) as told:
+        check_some_work(ALIKE, "trial 1 of 20")
+    assert str(told.value).endswith("of trial 1 of 20: correct it and run the same command again")
+
+
+@pytest.mark.parametrize(
+    "outcomes",
+    [[], [*ALIKE, outcome("agent2")], [ALIKE[0], outcome("agent1", "agent 'agent1' raised ValueError: no mass")]],
+    ids=["none was driven", "one worked", "they fail of different things"],
+)
+def test_anything_else_goes_on(outcomes):
+    check_some_work(outcomes, "the pre-flight")
+
+
+def opened(folder, store):
+    study = open_study(folder)
+    study_run = StudyRun(study, store)
+    run_preflight(study_run)
+    return study
+
+
+def edited(folder, edit):
+    target = folder / "target.csv"
+    head, *rows = target.read_text().splitlines()
+    target.write_text("\n".join([head, *edit(rows)]) + "\n")
+    return folder
+
+
+def means_only(rows):
+    """One row an agent, as papers print them."""
+    kept = {row.split(",")[0]: row for row in rows}
+    return list(kept.values())
+
+
+def other_starts(rows):
+    return [row.replace(",", ",other", 1) for row in rows]
+
+
+def with_holes(rows):
+    return [row for row in rows if not row.startswith("agent2,1,")]
+
+
+def test_with_shared_starts_noise_is_what_another_placement_changes(make_study):
+    folder = make_study(preflight="true")
+    with Store.open(folder) as store:
+        study = opened(folder, store)
+        found, pairs = noise_of(StudyRun(study, store)), placement_pairs(StudyRun(study, store))
+    assert found.caution == ""
+    assert pairs.shape[1:] == (2, 6, 2)
+    # Wobbly's scores wobble by 0.15, so a difference of two means over three starts has a variance of 2 · 0.15² / 3.
+    assert np.median(found.variance) == pytest.approx(2 * 0.15**2 / 3, rel=0.8)
+    assert (found.variance > 0.0).all()
+
+
+def test_repeats_of_a_start_on_the_target_make_its_noise_less(make_study):
+    folder = make_study(preflight="true")
+    with Store.open(folder) as store:
+        once = noise_of(StudyRun(opened(folder, store), store))
+        edited(folder, twice)
+        study = open_study(folder)
+        assert shares_starts(study)
+        again = noise_of(StudyRun(study, store))
+    assert again.variance == pytest.approx(0.75 * once.variance)
+
+
+def twice(rows):
+    """Every start driven twice, labelled START/REPEAT."""
+    split = [row.split(",", 2) for row in rows]
+    return [f"{agent},{start}/{repeat},{rest}" for agent, start, rest in split for repeat in (0, 1)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edit", [means_only, other_starts, with_holes])
+def test_any_other_table_works_and_says_what_it_loses(finished, edit):
+    with Store.read(finished) as store:
+        before = result_of(StudyRun(open_study(finished), store))
+        assert len(before.cautions) == 1  # this study has no pre-flight
+        found = result_of(StudyRun(open_study(edited(finished, edit)), store))
+    assert not shares_starts(found.study)
+    (caution,) = found.cautions
+    assert caution.startswith("noise is ")
+    assert "; to know θ better, measure the target" in caution
+    assert found.best.trial in found.trials
+    for low, high in found.knowledge.intervals.values():
+        assert low < high
+
+
+def test_the_spread_between_starts_is_taken_for_noise_only_where_nothing_better_is_known(make_study):
+    folder = make_study(preflight="true")
+    with Store.open(folder) as store:
+        known = noise_of(StudyRun(opened(folder, store), store))
+        unknown = noise_of(StudyRun(open_study(make_study(preflight="false")), store))
+    assert known.caution == ""
+    assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
+
+
+def test_failed_episodes_of_the_pre_flight_are_left_out(make_study):
+    folder = make_study(domain={"faults": '["agent3:1:raises"]'}, preflight="true")
+    with Store.open(folder) as store:
+        study = opened(folder, store)
+        found = noise_of(StudyRun(study, store))
+        assert np.array_equal(goal_of(StudyRun(study, store)).noise, found.variance.ravel())
+    assert np.isfinite(found.variance).all()
 
 
 def run(folder, **changes):
@@ -67,7 +200,7 @@ def test_a_parameter_that_matters_is_not_looked_at_twice_and_nothing_is_simulate
     spent, found = run(folder)
     looked = {"base and noise": 2 * PAIRS, "matters": 2 * PAIRS // LOOKS, "the others": 4 * PAIRS}
     assert spent.episodes == found.episodes == sum(looked.values())
-    assert spent.episodes < most_episodes(open_study(folder).settings)
+    assert spent.episodes < most_preflight_episodes(open_study(folder).settings)
     assert run(folder) == (replace(spent, episodes=0, seconds=0), found)
 
 
@@ -99,7 +232,7 @@ def test_what_need_not_be_run_is_taken_off_the_bar(planted):
         study_run = StudyRun(study, store, watcher)
         run_preflight(study_run)
         spent = study_run.spent
-    assert spent.episodes + watcher.off == most_episodes(study.settings)
+    assert spent.episodes + watcher.off == most_preflight_episodes(study.settings)
 
 
 def test_the_trials_are_those_of_a_study_without_it(make_study, finished):
@@ -124,7 +257,7 @@ def test_it_can_be_turned_off(make_study):
     folder = make_study(preflight="false")
     spent, found = run(folder)
     assert (spent.episodes, found) == (0, None)
-    assert most_episodes(open_study(folder).settings) == 0
+    assert most_preflight_episodes(open_study(folder).settings) == 0
 
 
 def test_failed_episodes_are_left_out_of_the_comparison(make_study):
@@ -172,3 +305,51 @@ def test_one_metric_that_a_parameter_moves_is_enough_and_it_is_named():
     found = judge(Interval("blur", 0.0, 1.0), ["a", "b"], values)
     assert found.moves
     assert found.metric == "b"
+
+
+EPISODE = make_episode({}, agent="agent2", start=0, seed=2**40 + 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_agents_that_remember_or_draw_unseeded_are_named_at_once_and_for_good(make_study, capsys, jobs):
+    folder = make_study(family='"moody:moody"', preflight="true", jobs=jobs, budget="3", initial="3")
+    named = [
+        f"pre-flight: agent '{agent}' scores otherwise in the same episode; {REMEDY}" for agent in ("agent1", "agent3")
+    ]
+    assert main(["study", str(folder), "--json"]) == 0
+    first = capsys.readouterr()
+    assert [line for line in first.err.splitlines() if "otherwise" in line] == [f"proxytune study: {n}" for n in named]
+    assert json.loads(first.out)["preflight"]["warnings"][:2] == named
+    assert main(["study", str(folder), "--json"]) == 0
+    again = capsys.readouterr()
+    assert "otherwise" not in again.err
+    assert json.loads(again.out)["preflight"]["warnings"][:2] == named
+    assert named[0].removeprefix("pre-flight: ").split(";")[0].replace("'", "&#39;") in (
+        (folder / "report.html").read_text().replace("&#x27;", "&#39;")
+    )
+
+
+def test_a_study_of_repeatable_agents_has_nothing_to_say(make_study, capsys):
+    assert main(["study", str(make_study(preflight="true", budget="2", initial="2")), "--json"]) == 0
+    assert "otherwise" not in "".join(capsys.readouterr())
+
+
+@pytest.mark.parametrize("agent", ["agent2", "agent4"])
+def test_draws_from_the_generators_of_the_process_follow_from_the_episode_s_seed(agent):
+    episode, another = (make_episode({}, agent=agent, start=0, seed=seed) for seed in (2**40 + 3, 5))
+    np.random.seed(1)
+    first, other = run_episode(Moody(), episode).metrics, run_episode(Moody(), another).metrics
+    np.random.seed(2)
+    random.seed(2)
+    assert run_episode(Moody(), episode).metrics == first != other
+
+
+def test_the_generators_of_the_process_go_on_as_if_no_episode_had_been_driven():
+    np.random.seed(1)
+    random.seed(1)
+    expected = np.random.normal(), random.random()
+    np.random.seed(1)
+    random.seed(1)
+    run_episode(Moody(), EPISODE)
+    assert (np.random.normal(), random.random()) == expected

@@ -1,19 +1,296 @@
+"""The answer is what fresh episodes confirm, never the luckiest trial.
+
+A study's trials as a search of any kind has them.
+"""
+
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
+from stopping import Stopping
 
-from proxytune.errors import RunError
-from proxytune.search.engines.registry import make_proposer
-from proxytune.storage.records import TrialRecord
-from proxytune.storage.store import Store
-from proxytune.study.result import result_of
-from proxytune.study.run import run_study
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.domain import Outcome
+from proxytune.errors import EpisodeError, RunError
+from proxytune.report.study.document import study_document
+from proxytune.report.study.usefulness_table import prpv_rows
+from proxytune.running import Silent
+from proxytune.search import make_proposer
+from proxytune.search.posterior import Misfit
+from proxytune.seeds import fresh_seed
+from proxytune.storage import Store, TrialRecord
+from proxytune.study import (
+    StudyRun,
+    history_of,
+    most_confirmation_episodes,
+    open_study,
+    plan,
+    result_of,
+    run_confirmation,
+    run_study,
+    table,
+)
+from proxytune.study import result as confirmation
+from proxytune.study.pruning import knowledge_of
+from proxytune.study.result import CANDIDATES, candidates, confirmation_of
+from proxytune.study.settings import StopRules
 from proxytune.usefulness import assess
+from proxytune.usefulness.pairs import prpv
+
+ONE = 6 * 3
+"""Episodes of one repetition of one θ."""
 
 
-def result(folder):
+def opened(folder, **changes):
+    study = open_study(folder)
+    return replace(study, settings=replace(study.settings, **{"confirm": 1, **changes}))
+
+
+def confirmed(folder, watcher=None, **changes):
+    """What it cost, and what there is to tell."""
+    study = opened(folder, **changes)
+    with Store.open(folder) as store:
+        study_run = StudyRun(study, store, watcher or Silent())
+        run_confirmation(study_run)
+        spent = study_run.spent
+        return spent, result_of(StudyRun(study, store))
+
+
+def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_seen(finished):
+    spent, found = confirmed(finished)
+    answer = found.confirmation.answer
+    assert found.best.trial == answer.trial
+    assert spent.episodes == ONE * len(found.confirmation.candidates) == found.episodes - 7 * ONE
+    assert answer.scores == (answer.assessment.prpv.value,)
+    assert answer.optimism == answer.scores[0] - answer.trial.prpv
+    with Store.read(finished) as store:
+        known = store.outcomes(found.study.identity, answer.trial.theta)
+    seen = plan(found.study.settings, answer.trial.theta, found.study.settings.seed)
+    assert len(set(known) - set(seen)) == ONE
+    assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
+
+
+def test_a_second_time_nothing_is_simulated(finished):
+    _, found = confirmed(finished)
+    spent, again = confirmed(finished)
+    assert spent.episodes == 0
+    assert study_document(again) == study_document(found)
+
+
+def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_likeliest_and_few(finished):
+    study = opened(finished)
+    with Store.read(finished) as store:
+        trials = store.trials()
+        known = knowledge_of(StudyRun(study, store), trials)
+    chosen = [study.settings.space.values(trial.theta) for trial in candidates(trials, known)]
+    ranked = list(known.expected)
+    noise = known.fresh_scores(ranked[0]).std()
+    near = [values for values in ranked if known.expected[values] - known.expected[ranked[0]] <= noise]
+    assert chosen[0] == known.answer == ranked[0]
+    assert set(chosen) <= {*near, known.likeliest_of(ranked)}
+    assert known.likeliest_of(ranked) in chosen
+    assert len(chosen) == min(CANDIDATES, len({*near, known.likeliest_of(ranked)}))
+
+
+def plant(study, store, trial, shift):
+    """Fresh episodes of this trial in which the agents rank as on the target, or the other way round."""
+    for episode in plan(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
+        row = study.target.agents.index(episode.agent)
+        metrics = dict(zip(study.target.metrics, (shift * study.target.means[row]).tolist(), strict=True))
+        store.save_outcome(study.identity, Outcome(episode, metrics, "", 0.0))
+
+
+def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_confirm(finished, monkeypatch):
+    study = opened(finished)
+    with Store.open(finished) as store:
+        trials = store.trials()
+        chosen = sorted(trials, key=lambda trial: trial.prpv)[:CANDIDATES]
+        monkeypatch.setattr(confirmation, "candidates", lambda *_: chosen)
+        lucky, *rivals = chosen
+        plant(study, store, lucky, -1.0)
+        for rival in rivals:
+            plant(study, store, rival, 1.0)
+        found = confirmation_of(StudyRun(study, store), trials, knowledge_of(StudyRun(study, store), trials))
+    assert found.answer.trial != lucky
+    assert found.answer.scores == (0,)
+    assert found.candidates[0].optimism > 0
+
+
+def test_the_noise_floor_is_what_the_answer_s_own_trial_scores_against_its_fresh_episodes(finished):
+    _, found = confirmed(finished)
+    answer, study = found.confirmation.answer, found.study
+    with Store.read(finished) as store:
+        known = store.outcomes(study.identity, answer.trial.theta).values()
+    seeds = {episode.seed for episode in plan(study.settings, answer.trial.theta, study.settings.seed)}
+    own, fresh = ([o for o in known if (o.episode.seed in seeds) is mine] for mine in (True, False))
+    floor = prpv(proxy=table(fresh), target=table(own), metrics=study.settings.metrics).value
+    assert (found.floor.kind, found.floor.value) == ("same starts", floor)
+
+
+def test_trials_do_not_depend_on_it(finished, make_study):
+    with Store.read(finished) as store:
+        before = store.trials()
+    confirmed(finished)
+    longer = opened(finished, budget=9)
+    other = opened(make_study("other"), budget=9, confirm=0)
+    trials = []
+    for study in (longer, other):
+        with Store.open(study.settings.folder) as store:
+            study_run = StudyRun(study, store)
+            run_study(study_run, make_proposer("gp", 5))
+            trials.append(store.trials())
+    assert trials[0] == trials[1]
+    assert trials[0][:7] == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
+    study = opened(finished, jobs=jobs, confirm=2)
+    for episodes in (1, 20):
+        with Store.open(finished) as store:
+            with pytest.raises(KeyboardInterrupt):
+                study_run = StudyRun(study, store, Stopping(episodes))
+                run_confirmation(study_run)
+            assert result_of(StudyRun(study, store)).confirmation is None
+    spent, found = confirmed(finished, jobs=jobs, confirm=2)
+    assert spent.episodes == 2 * ONE * len(found.confirmation.candidates) - 21
+    assert found.confirmation.answer.trial in found.trials
+
+
+def test_what_need_not_be_run_is_taken_off_the_bar(finished):
+    watcher = Stopping()
+    spent, found = confirmed(finished, watcher)
+    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings) == CANDIDATES * ONE
+
+
+def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
+    _, found = confirmed(finished, confirm=3)
+    answer = found.confirmation.answer
+    assert len(answer.scores) == 3
+    assert int(answer.assessment.inputs.proxy.counts.min()) == 9
+    assert answer.optimism == pytest.approx(sum(answer.scores) / 3 - answer.trial.prpv)
+
+
+def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, finished):
+    assert confirmed(finished, budget=8)[0].episodes == 0
+    folder = make_study("ruled")
+    study = opened(folder, stop=StopRules(no_improvement=1e9))
+    with Store.open(folder) as store:
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer("gp", 5))
+        assert len(store.trials()) == 5
+    assert confirmed(folder, stop=StopRules(no_improvement=1e9))[0].episodes >= ONE
+
+
+def test_it_can_be_turned_off(finished):
+    spent, found = confirmed(finished, confirm=0)
+    assert (spent.episodes, found.confirmation) == (0, None)
+    assert [row[0] for row in prpv_rows(found)] == ["PRPV"]
+    assert study_document(found)["best"]["fresh"] is None
+
+
+def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished):
+    study = opened(finished, budget=8)
+    with Store.open(finished) as store:
+        taken = sum(o.seconds for t in store.trials() for o in store.outcomes(study.identity, t.theta).values())
+    confirmed(finished, confirm=9)
+    _, found = confirmed(finished, budget=8, stop=StopRules(wall_time_s=1.01 * taken))
+    assert found.stopped == ""
+
+
+def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_score(finished):
+    study = opened(finished)
+    with Store.open(finished) as store:
+        for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
+            for episode in plan(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
+                if episode.agent == "agent3":
+                    store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
+    _, found = confirmed(finished)
+    assert found.confirmation.answer.scores == (None,)
+    assert found.best.trial == found.confirmation.candidates[0].trial
+    assert prpv_rows(found)[0] == ("PRPV", "–", "", "none on fresh episodes: an agent failed in all of them")
+    assert study_document(found)["best"]["fresh"]["prpv"] is None
+
+
+def test_where_failures_stop_the_study_they_stop_it_here(finished):
+    broken = opened(finished, stop_on_failure=True)
+    broken = replace(broken, family=replace(broken.family.family, faults=("agent3:1:raises",)))
+    with Store.open(finished) as store, pytest.raises(EpisodeError, match="agent 'agent3'"):
+        study_run = StudyRun(broken, store)
+        run_confirmation(study_run)
+
+
+def test_how_much_was_luck_is_in_the_row_of_the_search(finished):
+    _, found = confirmed(finished)
+    answer = found.confirmation.answer
+    lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
+    fresh, searched = prpv_rows(replace(found, confirmation=replace(found.confirmation, answer=lucky)))
+    assert fresh[:2] == ("PRPV", str(answer.assessment.prpv.value))
+    assert "; fresh episodes" in fresh[3]
+    assert searched[:2] == ("  in search", str(found.best.assessment.prpv.value))
+    assert searched[3].startswith("4 lower by luck")
+    unlucky = replace(answer, scores=(int(answer.trial.prpv),))
+    _, searched = prpv_rows(replace(found, confirmation=replace(found.confirmation, answer=unlucky)))
+    assert searched[3].startswith("no optimism")
+
+
+def test_the_document_has_the_answer_and_every_candidate(finished):
+    _, found = confirmed(finished)
+    fresh = study_document(found)["best"]["fresh"]
+    answer = found.confirmation.answer
+    inner = answer.assessment.prpv_interval
+    assert (fresh["prpv"], fresh["prpv_interval"]) == (answer.scores[0], [inner.low, inner.high])
+    assert fresh["optimism"] == answer.optimism
+    assert [one["index"] for one in fresh["candidates"]] == [c.trial.number for c in found.confirmation.candidates]
+
+
+@pytest.mark.parametrize(
+    ("inside", "fits", "perfect"), [(True, True, True), (False, True, False), (True, False, False)]
+)
+def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_target(
+    finished, monkeypatch, inside, fits, perfect
+):
+    study = opened(finished)
+    with Store.open(finished) as store:
+        for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
+            plant(study, store, trial, 1.0)
+        found = result_of(StudyRun(study, store))
+    monkeypatch.setattr(type(found.knowledge), "holds", lambda *_: inside)
+    monkeypatch.setattr(type(found.knowledge), "misfit", Misfit(1.0, 1.0, 0.5 if fits else 0.01))
+    assert found.judged.prpv.value == 0
+    assert found.perfect is (perfect and bool(found.judged.at_noise_floor))
+    assert found.judged.at_noise_floor is True
+
+
+TRIALS = (
+    TrialRecord(1, {"delay": 0.1, "trim": 0.0}, "finished", 4.0, {"prpv": 4, "ppv": None}, failed_episodes=1),
+    TrialRecord(2, {"delay": 0.2, "trim": 0.1}, "cut", 12.0, {}, decided=("agent1", "agent0"), bound=9.0),
+    TrialRecord(3, {"delay": 0.3, "trim": 0.1}, "failed", None, {}, failed_episodes=3, failure="agent0 failed"),
+)
+
+
+def result(folder, **changes):
+    study = open_study(folder)
+    study = replace(study, objective=replace(study.objective, **changes))
+    return SimpleNamespace(study=study, trials=TRIALS, best=SimpleNamespace(trial=TRIALS[0]))
+
+
+def test_every_trial_has_its_state_its_value_where_it_was_measured_and_what_is_known(make_study):
+    found = history_of(result(make_study()))
+    assert (found.name, found.space.names, found.answer, found.maximise) == ("wobbly", ("delay", "trim"), 0, False)
+    assert [(trial.state, trial.value) for trial in found.trials] == [("finished", 4), ("cut", None), ("failed", None)]
+    assert [dict(trial.facts) for trial in found.trials] == [
+        {"trial": 1, "prpv": 4, "failed_episodes": 1},
+        {"trial": 2, "at_least": 9.0, "expected": 12.0, "failed_episodes": 0},
+        {"trial": 3, "failed_episodes": 3, "failure": "agent0 failed"},
+    ]
+
+
+def test_an_objective_that_is_to_be_large_is_one(make_study):
+    assert history_of(result(make_study(), maximise=True)).maximise
+
+
+def result_of_result(folder):
     with Store.read(folder) as store:
         return result_of(StudyRun(open_study(folder), store))
 
@@ -23,11 +300,11 @@ def run(folder):
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
         run_study(study_run, make_proposer("gp", study.settings.initial))
-    return result(folder)
+    return result_of_result(folder)
 
 
 def test_the_best_theta_is_a_visited_one_and_its_measures_are_those_of_its_episodes(finished):
-    found = result(finished)
+    found = result_of_result(finished)
     assert found.best.trial in found.trials
     assert found.best.assessment.prpv.value == found.best.trial.prpv
     assert found.best.assessment.ppv.value == found.best.trial.ppv
@@ -43,11 +320,11 @@ def test_the_best_is_the_surrogate_s_and_not_the_lowest_score(finished):
         lucky = TrialRecord(8, near, "finished", 0.0, {"prpv": 0.0})
         StudyRun(study, store).evaluate(near, "")
         store.save_trial(study.identity, lucky)
-    assert result(finished).best.trial.number not in (8, worst.number)
+    assert result_of_result(finished).best.trial.number not in (8, worst.number)
 
 
 def test_noise_floor_and_chance_are_those_of_the_target(finished):
-    found = result(finished)
+    found = result_of_result(finished)
     study = found.study
     table = found.best.assessment.inputs.proxy
     again = assess(proxy=table, target=study.target, metrics=study.settings.metrics)
@@ -66,7 +343,7 @@ def test_an_open_trial_does_not_count(finished):
     study = open_study(finished)
     with Store.open(finished) as store:
         store.save_trial(study.identity, TrialRecord(8, {"trim": 0.0, "delay": 0.0}))
-    assert len(result(finished).trials) == 7
+    assert len(result_of_result(finished).trials) == 7
 
 
 def test_without_a_scored_trial_it_says_so(make_study):

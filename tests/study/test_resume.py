@@ -11,7 +11,7 @@ from launched import Launched, launching, never_stopped
 from processes import besides_progress, episodes, finished_episodes, start, trials, wait_for
 
 from proxytune.cli.main import COMMANDS, main
-from proxytune.search.engines.registry import STUDY_ENGINES
+from proxytune.search import STUDY_ENGINES
 
 PER_TRIAL = 18
 EPISODES = 7 * PER_TRIAL

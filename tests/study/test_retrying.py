@@ -8,10 +8,8 @@ from stopping import Stopping
 
 from proxytune.api.studies import run_study
 from proxytune.errors import RunError
-from proxytune.storage.store import Store
-from proxytune.study.stages.retrying import retry_failed
-from proxytune.study.study import open_study
-from proxytune.study.study_run import StudyRun
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, retry_failed
 
 FAMILY = """
 from wobbly import Wobbly, wobbly

@@ -6,12 +6,11 @@ from taught import GRID, make_taught
 from telling import Telling
 
 from proxytune.errors import SettingsError
-from proxytune.learning.settings import NONE
-from proxytune.learning.spending import Examination, curves_of
-from proxytune.running.progress import Silent
-from proxytune.study.settings import read_study_settings
-from proxytune.teaching.examining import count_examinations, examine_curves
-from proxytune.teaching.experiment import load_setup, run_experiment
+from proxytune.learning import NONE, Examination, curves_of
+from proxytune.running import Silent
+from proxytune.study import read_study_settings
+from proxytune.teaching import count_examinations, load_setup, run_experiment
+from proxytune.teaching.examining import examine_curves
 
 CURVES = 4
 CHOSEN = "examinations = 14"

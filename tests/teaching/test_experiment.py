@@ -1,17 +1,75 @@
-"""The learning experiment finds which proxy teaches, goes on where it was left, and says what cannot be used."""
+"""Two rankings agree as far as their draws do, and pairs count as contrary only where both orders are sure.
 
+The learning experiment finds which proxy teaches, goes on where it was left, and says what cannot be used.
+Each family teaches at its best θ, for one target; what they share is made once.
+The paper's observations are said to hold only where intervals show it.
+PRPV of a learning experiment's proxies: an interval for each, and θ drawn for each start where a proxy draws it.
+"""
+
+from contextlib import nullcontext
 from dataclasses import replace
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
-from taught import GRID, make_taught
+from several import make_several
+from taught import GRID, TEACHING, make_taught
 from telling import Telling
 
 from proxytune.errors import EpisodeError, InputError, LearnerError, SettingsError
-from proxytune.learning.costs import Costs
-from proxytune.running.progress import Silent
-from proxytune.study.settings import read_study_settings
-from proxytune.teaching.experiment import judge_curves, load_setup, run_experiment
+from proxytune.learning import Costs, Curve, Distribution, difference, mean_score, sample_needs, teaching
+from proxytune.report.teaching.observations import observation_lines
+from proxytune.running import Silent
+from proxytune.storage import Store
+from proxytune.study import StudyRun, adopt, open_study, read_study_settings
+from proxytune.teaching import (
+    Experiment,
+    TeacherResult,
+    classrooms,
+    load_setup,
+    observe,
+    predictivity,
+    run_experiment,
+    teach_families,
+)
+from proxytune.teaching.experiment import agreement, judge_curves
+
+NAMES = ("low", "middle", "high")
+SURE = np.tile([1.0, 2.0, 3.0], (200, 1))
+
+
+def noisy(spread, seed):
+    return SURE + spread * np.random.default_rng(seed).normal(size=SURE.shape)
+
+
+def test_the_same_ranking_is_1_and_its_reverse_minus_1():
+    assert agreement(NAMES, SURE, 10.0 * SURE).tau == 1.0
+    assert agreement(NAMES, SURE, -SURE).tau == -1.0
+
+
+def test_a_pair_of_contrary_order_is_named_with_who_is_ahead_by_the_second_figure_first():
+    found = agreement(NAMES, SURE, np.tile([1.0, 3.0, 2.0], (200, 1)))
+    assert found.reversed == (("middle", "high"),)
+    assert found.tau == pytest.approx(1.0 / 3.0)
+
+
+def test_where_an_order_is_open_no_pair_is_contrary_and_the_interval_is_wide():
+    found = agreement(NAMES, noisy(3.0, 1), -noisy(3.0, 2))
+    assert found.reversed == ()
+    assert found.low < found.tau < found.high
+    assert found.high - found.low > 1.0
+
+
+def test_tied_proxies_count_for_neither_order():
+    found = agreement(NAMES, SURE, np.tile([1.0, 2.0, 2.0], (200, 1)))
+    assert found.tau == pytest.approx(2.0 / np.sqrt(3.0 * 2.0))
+    assert agreement(NAMES, SURE, np.full_like(SURE, -np.inf)).tau == 0.0
+
+
+def test_what_was_not_reached_is_behind_all_that_was():
+    unreached = SURE.copy()
+    unreached[:, 2] = -np.inf
+    assert agreement(NAMES, SURE, unreached).reversed == (("low", "high"), ("middle", "high"))
 
 
 def run(folder):
@@ -170,3 +228,202 @@ def test_a_study_without_proxies_has_nothing_to_compare(make_study):
     path.write_text(path.read_text().split("[teaching.proxies")[0])
     with pytest.raises(SettingsError, match=r"teaching\.proxies: is missing"):
         run(folder)
+
+
+FAMILIES_GRID = [0, 20, 40, 80, 160, 320, 640]
+BLOCKED = "[families.right]\n[families.blocked.domain]\nblocked = 0.9\n"
+RIGHT, FAR = {"trim": 0.12, "delay": 0.21}, {"trim": -0.3}
+
+
+@pytest.fixture
+def taught(make_study):
+    """A study of several schoolrooms."""
+
+    def make(families="[families.right]\n[families.far]\n", grid=FAMILIES_GRID, **changes):
+        table = TEACHING.format(grid=grid, more="").split("[teaching.proxies.right]")[0]
+        changes = {"family": '"schoolroom:schoolroom"', **changes}
+        folder = make_several(make_study, families=table + families, **changes)
+        (folder / "twin.toml").write_text("trim = 0.12\ndelay = 0.21\n")
+        return read_study_settings(folder)
+
+    return make
+
+
+def teach(settings, *thetas):
+    return teach_families(
+        settings, dict(zip(settings.families, thetas, strict=True)), lambda points: nullcontext(Silent())
+    )
+
+
+@pytest.mark.slow
+def test_a_family_is_worth_what_teach_says_of_its_best_theta(taught):
+    settings = taught()
+    lessons = teach(settings, RIGHT, FAR)
+    both = "[teaching.proxies.right]\ntrim = 0.12\ndelay = 0.21\n[teaching.proxies.far]\ntrim = -0.3\n"
+    settings.path.write_text(f"{settings.path.read_text()}{both}")
+    known = read_study_settings(settings.path)
+    experiment = run_experiment(known, load_setup(known), Silent())
+    for teacher in experiment.teachers:
+        assert teacher.worth is not None
+        assert lessons[teacher.name].plv == teacher.worth.plv
+        assert lessons[teacher.name].needed == teacher.worth.needed
+        assert lessons[teacher.name].zero_shot == teacher.zero_shot.value
+    right, far = lessons["right"], lessons["far"]
+    assert (right.theta, right.more) == (RIGHT, None)
+    assert right.plv.value > far.plv.value
+    assert far.more == difference(experiment.needs, more="far", less="right")
+
+
+@pytest.mark.slow
+def test_the_learner_without_a_proxy_is_examined_once_for_all_and_nothing_is_made_again(taught, tmp_path):
+    journal = tmp_path / "journal"
+    settings = taught(domain={"teaching_journal": f'"{journal}"'})
+    teach(settings, RIGHT, FAR)
+    exams = sum(line.startswith("exam") for line in journal.read_text().splitlines())
+    # Three curves, not four, of three repetitions; before its first sample the one without a proxy is not examined.
+    assert exams == settings.starts * 3 * (3 * len(FAMILIES_GRID) - 1)
+    before = journal.read_text()
+    teach(settings, RIGHT, FAR)
+    assert journal.read_text() == before
+
+
+def test_a_family_whose_expert_cannot_drive_there_cannot_teach_and_the_others_can(taught):
+    lessons = teach(taught(BLOCKED), RIGHT, RIGHT)
+    assert lessons["right"].plv is not None
+    assert lessons["blocked"].plv is None
+    assert "blocked: the expert cannot drive here" in lessons["blocked"].failure
+
+
+def test_where_none_can_teach_the_first_says_why(taught):
+    both = BLOCKED.replace("[families.right]", "[families.shut.domain]\nblocked = 0.8")
+    with pytest.raises(LearnerError, match="shut: the expert cannot drive here"):
+        teach(taught(both), RIGHT, RIGHT)
+
+
+def test_a_family_that_is_no_classroom_is_refused_by_its_name(taught):
+    settings = taught('[families.right]\n[families.mute]\nfamily = "wobbly:wobbly"\n')
+    with pytest.raises(SettingsError, match=r"families\.mute: family: wobbly:wobbly cannot teach: it lacks best_score"):
+        classrooms(settings)
+
+
+def test_a_grid_too_short_to_converge_gives_no_plv(taught):
+    lessons = teach(taught(grid=[0, 3, 6]), RIGHT, FAR)
+    assert [(one.plv, one.more, one.failure) for one in lessons.values()] == [(None, None, "")] * 2
+
+
+OBSERVATIONS_GRID = (0, 100, 200, 400, 800)
+MEANS = {
+    "none": (np.nan, 5.0, 10.0, 30.0, 50.0),
+    "slow starter": (0.0, 48.0, 50.0, 50.0, 50.0),
+    "early bird": (30.0, 30.0, 35.0, 48.0, 50.0),
+    "twin": (50.0, 50.0, 50.0, 50.0, 50.0),
+}
+
+
+def curve(means):
+    return Curve(
+        OBSERVATIONS_GRID, np.array(means) + 0.5 * np.random.default_rng(1).normal(size=(5, len(OBSERVATIONS_GRID)))
+    )
+
+
+def experiment(settled=True, names=()):
+    needs = sample_needs(
+        {name: curve(means) for name, means in MEANS.items()}, none="none", best_score=60.0, tolerance=5.0
+    )
+    needs = replace(needs, gain=0.0 if settled else 5.1)
+    teachers = [
+        TeacherResult(
+            name,
+            Distribution(MappingProxyType({})),
+            needs.curves[name],
+            mean_score(needs, name, 0),
+            teaching(needs, none="none", proxy=name),
+            None,
+        )
+        for name in names or list(MEANS)[1:]
+    ]
+    return Experiment(SimpleNamespace(), 60.0, needs, tuple(teachers))
+
+
+def predicting(values, poor=()):
+    """PRPV of each proxy, a little uncertain; by chance for those named."""
+    noise = np.random.default_rng(2).normal(size=(3, 2000))
+    return {
+        name: SimpleNamespace(prpv=value, resampled=value + row, chance=SimpleNamespace(explains=name in poor))
+        for (name, value), row in zip(values.items(), noise, strict=True)
+    }
+
+
+GOOD = {"slow starter": 60.0, "early bird": 30.0, "twin": 5.0}
+
+
+def test_a_proxy_that_starts_lower_and_saves_more_shows_that_a_zero_shot_score_does_not_measure_plv():
+    found = observe(experiment(), predicting(GOOD, poor=("slow starter",)))
+    assert found.zero_shot.reversed == (("slow starter", "early bird"),)
+    first, _ = observation_lines(found, experiment())
+    assert "shown here, since slow starter saves more than early bird though it starts lower (0.2 for 30.0)" in first
+
+
+def test_a_proxy_that_saves_though_chance_predicts_as_well_shows_that_a_bad_predictor_can_teach():
+    found = observe(experiment(), predicting(GOOD, poor=("slow starter",)))
+    assert found.poor_predictors == ("slow starter",)
+    assert found.prpv.tau == pytest.approx(1.0 / 3.0)
+    _, second = observation_lines(found, experiment())
+    assert "slow starter saves samples though a random ranking would predict as well" in second
+    assert "Kendall's τ between PRPV and PLV is 0.33" in second
+
+
+def test_where_no_proxy_shows_it_that_is_said():
+    found = observe(experiment(), predicting(GOOD))
+    assert "none of these proxies shows it" in observation_lines(found, experiment())[1]
+
+
+def test_a_single_proxy_is_not_ranked_but_may_teach_though_it_predicts_badly():
+    alone = experiment(names=["slow starter"])
+    found = observe(alone, predicting(GOOD, poor=("slow starter",)))
+    assert (found.zero_shot, found.prpv, found.poor_predictors) == (None, None, ("slow starter",))
+    (only,) = observation_lines(found, alone)
+    assert only.startswith("A proxy that predicts badly can still teach")
+    assert "shown here, since slow starter saves samples" in only
+
+
+def test_where_plv_is_unknown_nothing_is_observed():
+    assert observe(experiment(settled=False), predicting(GOOD)) is None
+    assert observation_lines(None, experiment()) == ()
+
+
+TRUE = Distribution(MappingProxyType({"delay": (0.21, 0.21), "trim": (0.12, 0.12)}))
+WIDE = Distribution(MappingProxyType({"trim": (-0.3, 0.3)}))
+
+
+def found(make_study):
+    study = open_study(make_taught(make_study))
+    with Store.open(study.settings.folder) as store:
+        adopt(study, store)
+        run = StudyRun(study, store)
+        return study, predictivity(run, {"true": TRUE, "wide": WIDE}), run
+
+
+def test_each_proxy_has_a_prpv_with_an_interval_that_holds_it_and_the_right_one_predicts_better_than_chance(make_study):
+    _, each, _ = found(make_study)
+    for one in each.values():
+        assert one.interval[0] <= one.prpv <= one.interval[1]
+        assert one.resampled.shape == (2000,)
+    assert each["true"].prpv < each["true"].chance.mean
+    assert not each["true"].chance.explains
+
+
+def test_a_proxy_that_draws_theta_draws_it_for_every_start_the_same_for_all_agents(make_study):
+    study = open_study(make_taught(make_study))
+    with Store.open(study.settings.folder) as store:
+        adopt(study, store)
+        driven = []
+        run = StudyRun(study, store)
+        run.outcomes = lambda planned, what, plain=run.outcomes: driven.extend(planned) or plain(planned, what)
+        predictivity(run, {"wide": WIDE})
+    by_start = {start: {e.theta for e in driven if e.start == start} for start in range(study.settings.starts)}
+    assert all(len(thetas) == 1 for thetas in by_start.values())
+    assert len(set.union(*by_start.values())) == study.settings.starts
+    trims = [dict(theta)["trim"] for theta in set.union(*by_start.values())]
+    assert all(-0.3 <= trim <= 0.3 for trim in trims)
+    assert np.std(trims) > 0.0

@@ -1,14 +1,29 @@
-"""What is cached of a learning experiment is found again only by what would make the very same."""
+"""What is cached of a learning experiment is found again only by what would make the very same.
 
-from dataclasses import dataclass, field
+Who drives in lessons, in which rounds, and what each round depends on.
+Whatever code that is not ours does in a lesson, a training or an examination is told in one line that names it.
+"""
 
+import functools
+import re
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 import pytest
 from schoolroom import Matrix, Schoolroom
-from taught import PROXY, setup
+from stuck import StuckRoom, StuckTogether, acts, trains
+from taught import PROXY, make_taught, setup
+from tightrope import Cells, Tightrope
 from wobbly import Wobbly
 
-from proxytune.learning.cache import digest
-from proxytune.teaching.points import Point
+from proxytune.cli.terminal.interruption import signals_as_interruptions
+from proxytune.errors import EpisodeError, LearnerError, RunError, SettingsError
+from proxytune.learning import Cache, Distribution, TeachingSettings, digest
+from proxytune.running import Silent
+from proxytune.study import read_study_settings
+from proxytune.teaching import load_setup, run_experiment
+from proxytune.teaching.examining import prepare_points, score_points
+from proxytune.teaching.points import Point, TeachingSetup, equal_rounds
 
 
 @dataclass(frozen=True)
@@ -107,3 +122,316 @@ KEPT = {
 @pytest.mark.parametrize("name", KEPT)
 def test_what_was_kept_before_there_was_rehearsal_is_found_again(tmp_path, name):
     assert digest(setup(tmp_path).exam_facts(KEPT[name])) == name
+
+
+GRID = (0, 20, 40, 80, 160, 320, 640)
+NEAR = Distribution({})
+ON_POLICY = 'target_lessons = "learner"\nproxy_lessons = "learner"'
+
+
+def setup_of_stages(folder, **changes):
+    """An experiment on the tightrope; the target's deviations grow faster than the proxy's."""
+    settings = TeachingSettings(
+        target=folder / "twin.toml",
+        learner="tightrope:Cells",
+        proxy_samples=40,
+        target_samples=GRID,
+        seeds=4,
+        lesson_s=2.0,
+        level=None,
+        tolerance=5.0,
+        budget=1,
+        narrow=False,
+        widths={},
+        proxies={"near": NEAR},
+    )
+    folder.mkdir(exist_ok=True)
+    return TeachingSetup(
+        proxy=Tightrope(Wobbly()),
+        target=Tightrope(Wobbly(theta=(("trim", 0.1),)), journal=str(folder / "journal")),
+        learner=Cells(),
+        learner_identity="cells",
+        settings=replace(settings, **changes),
+        seed=1,
+        starts=5,
+        cache=Cache(folder / "cache"),
+    )
+
+
+def mean_scores(made, proxy):
+    """Of four repetitions, at each count of the grid."""
+    points = [[Point("near", proxy, repetition, count) for count in GRID] for repetition in range(4)]
+    return np.mean([[made.score(point) for point in row] for row in points], axis=0)
+
+
+def first_within(scores, tolerance):
+    """The first count from which on scores are within a tolerance of the best there is."""
+    below = np.flatnonzero(~(scores >= 60.0 - tolerance))
+    return GRID[below[-1] + 1 if len(below) else 0]
+
+
+@pytest.mark.parametrize("proxy", [None, NEAR], ids=["without a proxy", "after a proxy"])
+def test_a_learner_that_errs_to_where_the_expert_never_is_needs_fewer_samples_of_its_own_driving(tmp_path, proxy):
+    off, on = (mean_scores(setup_of_stages(tmp_path / by, target_lessons=by), proxy) for by in ("expert", "learner"))
+    assert 0 < first_within(on, 5.0) <= first_within(off, 5.0) / 4
+
+
+def test_a_proxy_teaches_better_where_the_learner_drives_in_it(tmp_path):
+    off, on = (mean_scores(setup_of_stages(tmp_path / by, proxy_lessons=by), NEAR) for by in ("expert", "learner"))
+    assert on[0] > off[0] + 20.0
+
+
+def samples(made, count, proxy=None):
+    return made._stage(Point("near", proxy, 0, count)).samples(count)
+
+
+@pytest.mark.parametrize("by", ["expert", "learner"])
+@pytest.mark.parametrize("proxy", [None, NEAR], ids=["without a proxy", "after a proxy"])
+@pytest.mark.parametrize("count", [1, 20, 21, 71, 283])
+def test_more_samples_begin_with_the_same_ones_whatever_the_count(tmp_path, by, proxy, count):
+    whole = samples(setup_of_stages(tmp_path / "whole", target_lessons=by), 320, proxy)
+    first = samples(setup_of_stages(tmp_path / "first", target_lessons=by), count, proxy)
+    assert len(first.commands) == count
+    np.testing.assert_array_equal(first.observations, whole.observations[:count])
+    np.testing.assert_array_equal(first.commands, whole.commands[:count])
+
+
+def test_no_samples_are_those_of_no_round(tmp_path):
+    made = setup_of_stages(tmp_path, target_lessons="learner")
+    assert np.isnan(made.score(Point("none", None, 0, 0)))
+    assert made.score(Point("near", NEAR, 0, 0)) > 0.0
+    assert not any(line.startswith("guided") for line in (tmp_path / "journal").read_text().splitlines())
+
+
+@pytest.mark.parametrize(("proxy", "first"), [(None, "lesson"), (NEAR, "guided")])
+def test_the_expert_drives_where_nothing_has_been_learnt_and_the_learner_ever_after(tmp_path, proxy, first):
+    made = setup_of_stages(tmp_path, target_lessons="learner")
+    for count, kind in ((20, first), (71, "guided"), (160, "guided")):
+        samples(made, count, proxy)
+        journal = (tmp_path / "journal").read_text().splitlines()
+        assert {line.split()[0] for line in journal} == {kind}
+        (tmp_path / "journal").unlink()
+
+
+def test_each_round_has_lessons_of_its_own(tmp_path):
+    samples(setup_of_stages(tmp_path, target_lessons="learner"), 640)
+    seeds = [line.split()[1] for line in (tmp_path / "journal").read_text().splitlines()]
+    assert len(seeds) > 30
+    assert len(set(seeds)) == len(seeds)
+
+
+def test_a_round_is_another_by_another_learner_proxy_or_repetition_and_not_by_what_comes_after_it(tmp_path):
+    made = setup_of_stages(tmp_path, target_lessons="learner")
+    facts = made._stage(Point("near", NEAR, 0, 0)).round_facts(2)
+    others = [
+        replace(made, learner_identity="others")._stage(Point("near", NEAR, 0, 0)),
+        made._stage(Point("far", Distribution({"trim": (0.2, 0.2)}), 0, 0)),
+        made._stage(Point("near", NEAR, 1, 0)),
+        made._stage(Point("none", None, 0, 0)),
+        setup_of_stages(tmp_path, target_lessons="learner", rehearsal=0.5)._stage(Point("near", NEAR, 0, 0)),
+        setup_of_stages(tmp_path, target_lessons="learner", proxy_lessons="learner")._stage(Point("near", NEAR, 0, 0)),
+        setup_of_stages(tmp_path, target_lessons="learner", target_samples=(0, 20, 60, 80))._stage(
+            Point("near", NEAR, 0, 0)
+        ),
+    ]
+    assert all(other.round_facts(2) != facts for other in others)
+    longer = setup_of_stages(tmp_path, target_lessons="learner", target_samples=(*GRID, 2000))
+    assert longer._stage(Point("near", NEAR, 0, 0)).round_facts(2) == facts
+
+
+@pytest.mark.parametrize(
+    ("count", "rounds", "ends"),
+    [(4000, 4, (1000, 2000, 3000, 4000)), (10, 4, (2, 5, 8, 10)), (2, 4, (1, 2)), (1, 4, (1,)), (7, 1, (7,))],
+)
+def test_equal_rounds_end_with_the_last_sample(count, rounds, ends):
+    assert equal_rounds(count, rounds) == ends
+
+
+def run(folder):
+    settings = read_study_settings(folder)
+    found = run_experiment(settings, load_setup(settings), Silent())
+    return np.stack([found.without.scores, *(one.curve.scores for one in found.teachers)])
+
+
+def make_tightrope(make_study, tmp_path, *, more=ON_POLICY, grid=GRID, **changes):
+    domain = {"teaching_journal": f'"{tmp_path / "journal"}"', **changes.pop("domain", {})}
+    family = {"family": '"tightrope:tightrope"', "domain": domain}
+    folder = make_taught(make_study, more=more, grid=list(grid), **family, **changes)
+    path = folder / "study.toml"
+    path.write_text(path.read_text().replace("schoolroom:Matrix", "tightrope:Cells"))
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("lost", ["exam", "weights", "samples"])
+def test_a_run_of_learners_that_drive_comes_to_the_same_whatever_its_cache_has_lost(make_study, tmp_path, jobs, lost):
+    folder = make_tightrope(make_study, tmp_path, jobs=jobs)
+    whole = run(folder)
+    for path in sorted((folder / "teaching").glob(f"{lost}-*.npz"))[::2]:
+        path.unlink()
+    for path in sorted((folder / "teaching").glob("exam-*.npz"))[::3]:
+        path.unlink()
+    np.testing.assert_array_equal(run(folder), whole)
+
+
+@pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_no_round_is_driven_twice(make_study, tmp_path, jobs):
+    folder = make_tightrope(make_study, tmp_path, grid=[0, 20, 40], jobs=jobs)
+    run(folder)
+    driven = (tmp_path / "journal").read_text().splitlines()
+    run(folder)
+    assert (tmp_path / "journal").read_text().splitlines() == driven
+    curves, repetitions, starts = 4, 3, int(read_study_settings(folder).starts)
+    assert sum(line.startswith("exam") for line in driven) == starts * repetitions * (curves * 3 - 1)
+    assert len(list((folder / "teaching").glob("samples-*.npz"))) == repetitions * (curves * 2 + 3 * 4)
+
+
+def test_an_expert_without_labels_where_the_learner_drives_is_one_line_with_the_proxys_name(make_study, tmp_path):
+    folder = make_tightrope(make_study, tmp_path, domain={"silent": "true"})
+    with pytest.raises(LearnerError, match=r"^none: an expert without labels on the learner's states: .*; have it"):
+        run(folder)
+
+
+@pytest.mark.parametrize("key", ["target_lessons", "proxy_lessons"])
+def test_a_family_that_cannot_guide_is_refused_where_the_learner_is_to_drive(make_study, key):
+    folder = make_taught(make_study, more=f'{key} = "learner"')
+    with pytest.raises(SettingsError) as told:
+        load_setup(read_study_settings(folder))
+    assert str(told.value) == (
+        f"{folder / 'study.toml'}: teaching.{key}: schoolroom:schoolroom cannot teach a learner that drives: "
+        "it lacks guide; add it, or take 'expert'"
+    )
+
+
+POINT = Point("near", PROXY, 0, 20)
+ALONE = Point("none", None, 0, 20)
+LESSON = r"near: the expert's lesson in the proxy at trim = 0\.1\d+, start \d"
+EXAM = "none: the learner's examination in the target at start 2"
+
+
+def room(*faults, kind=StuckRoom):
+    return kind(Wobbly(theta=(("trim", 0.12), ("delay", 0.21)), faults=faults))
+
+
+MOMENTS = {
+    "a lesson": ({"proxy": room("lesson:*:raises")}, POINT, LESSON),
+    "a training": ({"learner": trains("raises")}, ALONE, "none: the learner's training"),
+    "an answer": ({"learner": acts("raises")}, ALONE, "none: the learner's examination in the target at start 0"),
+    "an examination": ({"target": room("exam:2:raises")}, ALONE, EXAM),
+    "examinations at once": (
+        {"target": room("together:2:raises", kind=StuckTogether)},
+        ALONE,
+        "none: the learner's examination in the target at start 0 and the others beside it",
+    ),
+}
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_what_raises_is_named_with_its_start(tmp_path, moment):
+    changes, point, named = MOMENTS[moment]
+    with pytest.raises(EpisodeError) as told:
+        setup(tmp_path, **changes).score(point)
+    assert re.fullmatch(rf"{named} raised ValueError: of its own \(deadly\.py, line \d+\); correct it", str(told.value))
+
+
+@pytest.mark.parametrize("ending", ["exits", "own error", "interrupts"])
+def test_what_exits_or_interrupts_is_named_alike(tmp_path, ending):
+    with signals_as_interruptions(), pytest.raises(EpisodeError, match=f"^{EXAM} raised (System|Own|Keyboard)"):
+        setup(tmp_path, target=room(f"exam:2:{ending}")).score(ALONE)
+
+
+@pytest.mark.parametrize("ending", ["memory", "files"])
+def test_what_the_machine_lacks_is_no_failure_of_the_learner(tmp_path, ending):
+    told = r"the learner's training: the machine failed \((Memory|OS)Error.*run again to continue"
+    with pytest.raises(RunError, match=told) as found:
+        setup(tmp_path, learner=trains(ending)).score(ALONE)
+    assert not isinstance(found.value, EpisodeError)
+
+
+class Silly(Schoolroom):
+    """Its scores are none."""
+
+    def examine(self, episode, policy):
+        return "much"
+
+
+def test_what_is_no_score_is_named(tmp_path):
+    with pytest.raises(EpisodeError, match="none: an examination raised TypeError"):
+        setup(tmp_path, target=Silly(Wobbly())).score(ALONE)
+
+
+HANGING = {
+    "a lesson": ({"proxy": room("lesson:*:hangs")}, POINT, LESSON),
+    "a learner's answer": (
+        {"learner": acts("hangs in C")},
+        ALONE,
+        "none: the learner's examination in the target at start 0",
+    ),
+    "an examination": ({"target": room("exam:2:hangs")}, ALONE, EXAM),
+    "one of several at once": (
+        {"target": room("together:2:hangs", "exam:2:hangs", kind=StuckTogether)},
+        ALONE,
+        EXAM,
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("moment", HANGING)
+def test_what_hangs_is_ended_and_named_with_its_start(tmp_path, moment, jobs):
+    changes, point, named = HANGING[moment]
+    limited = setup(tmp_path, timeout_s=0.5, **changes)
+    with pytest.raises(EpisodeError) as told:
+        make(limited, [point, replace(point, count=0)], jobs)
+    remedy = "correct the learner or the domain family, or raise episode_timeout_s, and run again to continue"
+    assert re.fullmatch(rf"{named} took longer than 0\.5 s; {remedy}", str(told.value))
+
+
+def make(made, points, jobs):
+    """The scores, in the points' order."""
+    prepare_points(made, points, jobs)
+    with score_points(made, points, jobs) as scored:
+        found = {repr(point): score for point, score in scored}
+    return [found[repr(point)] for point in points]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_examinations_that_hang_only_side_by_side_come_to_the_same_one_after_the_other(tmp_path, jobs):
+    points = [POINT, ALONE]
+    whole = make(setup(tmp_path / "whole", target=room()), points, jobs)
+    stuck = setup(tmp_path / "stuck", target=room("together:2:hangs", kind=StuckTogether), timeout_s=1.0)
+    assert make(stuck, points, jobs) == whole
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_limit_that_nothing_overruns_changes_no_score_and_is_none_for_trainings(tmp_path, jobs):
+    points = [Point("near", PROXY, 0, count) for count in (0, 20, 40)]
+    whole = make(setup(tmp_path / "whole"), points, jobs=1)
+    slow = setup(tmp_path / "slow", learner=trains("lingers"), timeout_s=1.0)
+    found = make(slow, points, jobs)
+    assert np.isfinite(found).all()
+    assert found == whole
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("timeout_s", [None, 5.0])
+def test_what_ends_its_process_is_named(tmp_path, timeout_s):
+    deadly = setup(tmp_path, target=room("exam:2:aborts"), timeout_s=timeout_s)
+    with pytest.raises(RunError, match=rf"^{EXAM} ended its process \(SIGABRT\); correct that, and run again"):
+        make(deadly, [ALONE, replace(ALONE, count=40)], jobs=2)
+
+
+@pytest.mark.slow
+def test_what_an_ended_command_had_made_is_there(tmp_path):
+    limited = functools.partial(setup, tmp_path, timeout_s=1.0)
+    with pytest.raises(EpisodeError):
+        make(limited(target=room("exam:2:hangs")), [POINT], 1)
+    kept = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.npz")}
+    assert {path.name.partition("-")[0] for path in kept} == {"samples", "weights"}
+    make(limited(target=room()), [POINT], 1)
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    assert len(list(tmp_path.glob("exam-*.npz"))) == 1

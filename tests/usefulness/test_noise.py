@@ -1,5 +1,10 @@
-"""The noise floor is a domain against itself from the same starts; halves are called halves."""
+"""Chance is a proxy that knows nothing about which agent is which.
 
+The noise floor is a domain against itself from the same starts; halves are called halves.
+Success rates have intervals of their own, and ties are counted.
+"""
+
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -8,15 +13,50 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from proxytune.scores import Metric, ScoreTable, read_domains
-from proxytune.usefulness import floor_of_repeats, noise_floor
-from proxytune.usefulness.noise import split_halves
-from proxytune.usefulness.prpv import prpv_of_means
+from proxytune.usefulness import assess, chance, compare, floor_of_repeats, prpv_of_means
+from proxytune.usefulness.noise import noise_floor, split_halves, success_rates
 
-SCORES = Path(__file__).parents[2] / "../shared/data/scores"
-M = (Metric("m"),)
+M = (Metric("m"), Metric("n"))
 
 
 def table(values):
+    return ScoreTable(tuple(f"A{i}" for i in range(len(values))), ("1",), ("m", "n"), values[:, None])
+
+
+def test_it_agrees_with_all_permutations_of_five_agents():
+    proxy, target = np.random.default_rng(0).normal(size=(2, 5, 2))
+    every = np.array([prpv_of_means(proxy[list(order)], target, M) for order in permutations(range(5))])
+    result = chance(proxy=table(proxy), target=table(target), metrics=M, permutations=4000)
+    assert result.mean == pytest.approx(every.mean(), abs=0.2)
+    assert result.deviation == pytest.approx(every.std(), abs=0.2)
+    assert result.p_value == pytest.approx((every <= prpv_of_means(proxy, target, M)).mean(), abs=0.03)
+
+
+def test_ten_agents_and_two_unrelated_metrics_give_33_9_and_7_1():
+    """The 7.1 is over tables and permutations together; for two given tables permutations alone vary by less."""
+    rng = np.random.default_rng(1)
+    found = [
+        chance(
+            proxy=table(rng.normal(size=(10, 2))), target=table(rng.normal(size=(10, 2))), metrics=M, permutations=300
+        )
+        for _ in range(60)
+    ]
+    means, deviations = np.array([(result.mean, result.deviation) for result in found]).T
+    assert means.mean() == pytest.approx(33.9, abs=1.5)
+    assert np.sqrt(means.var() + (deviations**2).mean()) == pytest.approx(7.1, abs=0.7)
+
+
+def test_a_perfect_proxy_is_hardly_by_chance_and_a_useless_one_is():
+    target = np.random.default_rng(2).normal(size=(8, 1)).repeat(2, axis=1)
+    assert chance(proxy=table(target), target=table(target), metrics=M).p_value == pytest.approx(1 / 1001, abs=2e-3)
+    assert chance(proxy=table(-target), target=table(target), metrics=M).p_value == 1.0
+
+
+SCORES = Path(__file__).parents[2] / "../shared/data/scores"
+NOISE_M = (Metric("m"),)
+
+
+def table_of_noise(values):
     agents, episodes = values.shape
     return ScoreTable(
         tuple(f"A{i}" for i in range(agents)), tuple(map(str, range(episodes))), ("m",), values[:, :, None]
@@ -25,7 +65,7 @@ def table(values):
 
 def repeated(values, repeats):
     """A table of START/REPEAT from values of shape (agents, starts · repeats)."""
-    plain = table(values)
+    plain = table_of_noise(values)
     labels = (f"{episode // repeats}/{episode % repeats}" for episode in range(values.shape[1]))
     return ScoreTable(plain.agents, tuple(labels), plain.metrics, plain.values)
 
@@ -42,21 +82,24 @@ def interleaved(one, two):
 
 
 def test_episodes_without_noise_have_no_floor_above_zero():
-    result = noise_floor(target=table(np.arange(5.0)[:, None].repeat(4, axis=1)), metrics=M)
+    result = noise_floor(target=table_of_noise(np.arange(5.0)[:, None].repeat(4, axis=1)), metrics=NOISE_M)
     assert (result.value, result.low, result.high) == (0.0, 0.0, 0.0)
 
 
 def test_more_noise_gives_a_higher_floor():
     rng = np.random.default_rng(0)
     noise = rng.normal(size=(8, 6))
-    floors = [noise_floor(target=table(np.arange(8.0)[:, None] + size * noise), metrics=M).value for size in (0.3, 3.0)]
+    floors = [
+        noise_floor(target=table_of_noise(np.arange(8.0)[:, None] + size * noise), metrics=NOISE_M).value
+        for size in (0.3, 3.0)
+    ]
     assert floors[0] < floors[1]
 
 
 def test_halves_are_disjoint_and_take_all_episodes_of_each_agent():
     values = np.zeros((3, 5))
     values[0, 4], values[1, :2] = np.nan, np.nan
-    uneven = table(values)
+    uneven = table_of_noise(values)
     first, second = split_halves(uneven.driven, np.random.default_rng(0), 50)
     assert ((first ^ second) == uneven.driven[:, None]).all()
     assert (first.sum(axis=-1) == np.array([[2], [1], [2]])).all()
@@ -68,11 +111,11 @@ def test_halves_are_disjoint_and_take_all_episodes_of_each_agent():
 def test_agents_with_the_same_episodes_are_split_alike():
     """Scores that depend on the start alone leave the order as it is in both halves."""
     starts = np.random.default_rng(0).normal(size=(1, 4))
-    assert noise_floor(target=table(starts + np.arange(3.0)[:, None]), metrics=M).high == 0.0
+    assert noise_floor(target=table_of_noise(starts + np.arange(3.0)[:, None]), metrics=NOISE_M).high == 0.0
 
 
 def test_one_episode_gives_no_floor_and_says_why():
-    result = noise_floor(target=table(np.arange(3.0)[:, None]), metrics=M)
+    result = noise_floor(target=table_of_noise(np.arange(3.0)[:, None]), metrics=NOISE_M)
     assert result.value is None
     assert result.kind == "none"
     assert "each agent has one episode on the target" in result.reason
@@ -81,17 +124,17 @@ def test_one_episode_gives_no_floor_and_says_why():
 @given(seed=st.integers(0, 10_000), starts=st.integers(2, 5), repeats=st.integers(2, 5))
 def test_without_placement_noise_a_domain_has_a_floor_of_zero(seed, starts, repeats):
     values = np.random.default_rng(seed).normal(size=(6, starts))
-    result = noise_floor(target=repeated(values.repeat(repeats, axis=1), repeats), metrics=M, splits=20)
+    result = noise_floor(target=repeated(values.repeat(repeats, axis=1), repeats), metrics=NOISE_M, splits=20)
     assert (result.kind, result.value, result.high) == ("same starts", 0.0, 0.0)
-    same = floor_of_repeats(domain=table(values), again=table(values), metrics=M, resamples=20)
+    same = floor_of_repeats(domain=table_of_noise(values), again=table_of_noise(values), metrics=NOISE_M, resamples=20)
     assert (same.kind, same.value, same.low, same.high) == ("same starts", 0.0, 0.0, 0.0)
 
 
 def test_with_strong_starts_and_little_noise_the_floor_lies_far_below_that_of_halves():
     (one, two), _ = planted(1)
-    halves = noise_floor(target=table(interleaved(one, two)), metrics=M)
-    floor = noise_floor(target=repeated(interleaved(one, two), 2), metrics=M)
-    again = floor_of_repeats(domain=table(one), again=table(two), metrics=M)
+    halves = noise_floor(target=table_of_noise(interleaved(one, two)), metrics=NOISE_M)
+    floor = noise_floor(target=repeated(interleaved(one, two), 2), metrics=NOISE_M)
+    again = floor_of_repeats(domain=table_of_noise(one), again=table_of_noise(two), metrics=NOISE_M)
     assert (halves.kind, floor.kind, again.kind) == ("halves", "same starts", "same starts")
     assert 0.0 < floor.value < 0.4 * halves.value
     assert again.high < 0.4 * halves.value
@@ -104,8 +147,8 @@ def test_the_floor_is_what_a_perfect_proxy_scores():
     for seed in range(60):
         (one, two), rng = planted(seed, noise=1.0)
         third = planted(seed, noise=0.0)[0][0] + rng.normal(size=one.shape)
-        perfect = float(prpv_of_means(third.mean(axis=1)[:, None], one.mean(axis=1)[:, None], M))
-        floor = floor_of_repeats(domain=table(one), again=table(two), metrics=M, resamples=200)
+        perfect = float(prpv_of_means(third.mean(axis=1)[:, None], one.mean(axis=1)[:, None], NOISE_M))
+        floor = floor_of_repeats(domain=table_of_noise(one), again=table_of_noise(two), metrics=NOISE_M, resamples=200)
         scored.append(perfect)
         values.append(floor.value)
         within.append(perfect <= floor.high)
@@ -115,21 +158,21 @@ def test_the_floor_is_what_a_perfect_proxy_scores():
 
 def test_starts_are_paired_by_their_label_and_those_not_driven_both_times_left_out():
     (one, _), rng = planted(2)
-    again = table(one).arrange(agents=table(one).agents, episodes=tuple("543210"))
+    again = table_of_noise(one).arrange(agents=table_of_noise(one).agents, episodes=tuple("543210"))
     holes = again.values.copy()
     holes[0, 2], holes[3, :4] = np.nan, np.nan
     again = ScoreTable(again.agents, again.episodes, again.metrics, holes)
-    found = floor_of_repeats(domain=table(one), again=again, metrics=M)
+    found = floor_of_repeats(domain=table_of_noise(one), again=again, metrics=NOISE_M)
     assert (found.value, found.low, found.high) == (0.0, 0.0, 0.0)
     assert found.again.driven.sum() == again.driven.sum()
     loud = ScoreTable(again.agents, again.episodes, again.metrics, holes + rng.normal(size=holes.shape))
-    assert floor_of_repeats(domain=table(one), again=loud, metrics=M).value > 0.0
+    assert floor_of_repeats(domain=table_of_noise(one), again=loud, metrics=NOISE_M).value > 0.0
 
 
 def test_both_sides_may_have_repeats():
     (one, _), _ = planted(3)
     domain, again = repeated(one.repeat(2, axis=1), 2), repeated(one.repeat(3, axis=1), 3)
-    assert floor_of_repeats(domain=domain, again=again, metrics=M).high == 0.0
+    assert floor_of_repeats(domain=domain, again=again, metrics=NOISE_M).high == 0.0
 
 
 @pytest.mark.parametrize(
@@ -139,15 +182,15 @@ def test_an_agent_with_less_than_two_starts_driven_both_times_gives_no_floor_but
     (one, two), _ = planted(4)
     two[5, [column for column in range(6) if column not in driven]] = np.nan
     two[5, 0] = two[4, 0] if driven else np.nan
-    found = floor_of_repeats(domain=table(one), again=table(two), metrics=M)
+    found = floor_of_repeats(domain=table_of_noise(one), again=table_of_noise(two), metrics=NOISE_M)
     assert (found.kind, found.value, found.high) == ("none", None, None)
     assert told in found.reason
 
 
 def test_tables_without_a_start_in_common_give_no_floor():
     (one, two), _ = planted(5)
-    other = ScoreTable(table(two).agents, tuple("abcdef"), ("m",), two[:, :, None])
-    assert "both times" in floor_of_repeats(domain=table(one), again=other, metrics=M).reason
+    other = ScoreTable(table_of_noise(two).agents, tuple("abcdef"), ("m",), two[:, :, None])
+    assert "both times" in floor_of_repeats(domain=table_of_noise(one), again=other, metrics=NOISE_M).reason
 
 
 @pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
@@ -158,3 +201,57 @@ def test_the_real_duckiebots_two_episodes_have_one_split():
     assert (result.value, result.low, result.high) == (56.0, 56.0, 56.0)
     loose = noise_floor(target=real.unpaired(), metrics=chosen)
     assert loose.low < loose.value < loose.high
+
+
+METRICS = [Metric("success"), Metric("distance")]
+
+
+def table_of_rates(successes, episodes=10):
+    """Agents A, B, … with so many successes each."""
+    return ScoreTable.from_episodes(
+        {
+            ("ABCD"[row], episode): {"success": float(episode < count), "distance": 0.5 * row + 0.1 * episode}
+            for row, count in enumerate(successes)
+            for episode in range(episodes)
+        }
+    )
+
+
+def test_a_rate_has_wilson_s_interval():
+    (rates,) = success_rates(compare(proxy=table_of_rates([8, 10]), target=table_of_rates([0, 10]), metrics=METRICS))
+    one = rates.proxy["A"]
+    assert (rates.metric, one.value, one.episodes) == ("success", 0.8, 10)
+    assert (one.low, one.high) == pytest.approx((0.4902, 0.9433), abs=1e-4), "Brown, Cai, DasGupta (2001), eq. (4)"
+    assert rates.target["A"].low == pytest.approx(0.0, abs=1e-12)
+    assert 0.2 < rates.target["A"].high < 0.3, "no success in ten is no proof of none"
+
+
+@given(st.lists(st.integers(0, 10), min_size=2, max_size=4), st.integers(0, 10))
+def test_an_interval_holds_its_rate_and_lies_within_0_and_1(successes, other):
+    sides = {"proxy": table_of_rates(successes), "target": table_of_rates([other] * len(successes))}
+    for rates in success_rates(compare(**sides, metrics=METRICS)):
+        for one in (*rates.proxy.values(), *rates.target.values()):
+            assert 0.0 <= one.low <= one.value + 1e-12
+            assert one.value - 1e-12 <= one.high <= 1.0
+
+
+def test_pairs_that_tie_are_counted_and_told_once():
+    found = assess(
+        proxy=table_of_rates([3, 3, 5]), target=table_of_rates([2, 4, 6]), metrics=METRICS[:1], resamples=100
+    )
+    told = [note for note in found.notes if "tie" in note]
+    expected = "success is a success rate: 1 of 3 pairs of agents tie in the proxy, 0 on the target; a tie counts half"
+    assert len(told) == 1
+    assert told[0].startswith(expected)
+    assert found.prpv.value == 1
+    untied = assess(
+        proxy=table_of_rates([3, 4, 5]), target=table_of_rates([2, 4, 6]), metrics=METRICS[:1], resamples=100
+    )
+    assert not [note for note in untied.notes if "tie" in note]
+
+
+@pytest.mark.parametrize("successes", [[10, 10], [0, 0]])
+def test_what_is_always_alike_or_no_zero_or_one_is_no_rate(successes):
+    both = {"proxy": table_of_rates(successes), "target": table_of_rates(successes)}
+    assert success_rates(compare(**both, metrics=METRICS)) == ()
+    assert np.unique(both["proxy"].values[..., 1]).size > 2

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import bootstrap_prpv, compare, resampling
-from proxytune.usefulness.prpv import prpv_of_means
-from proxytune.usefulness.resampling import bootstrap_means, draw_counts
+from proxytune.usefulness import bootstrap_means, compare, prpv_of_means, resampling
+from proxytune.usefulness.resampling import bootstrap_prpv, draw_counts
 
 M = (Metric("m"), Metric("n"))
 

@@ -7,7 +7,7 @@ from functools import wraps
 from typing import TypeVar
 
 from proxytune.errors import InputError
-from proxytune.running.cluster import on_cluster
+from proxytune.running import on_cluster
 
 PROCESSES, DASK = "processes", "dask"
 Result = TypeVar("Result")

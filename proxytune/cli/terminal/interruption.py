@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from proxytune.extensions.interrupting import Interrupted, interrupt
+from proxytune.extensions import Interrupted, interrupt
 
 INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
 """Exit statuses that shells and schedulers expect: 130 and 143."""

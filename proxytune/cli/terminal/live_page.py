@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 
 from proxytune.errors import ProxytuneError
-from proxytune.report.page import html_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.study.live_page import RENEW_S, live_page
 from proxytune.report.writing import write_text
-from proxytune.running.progress import Watcher
-from proxytune.storage.store import Store
-from proxytune.study.settings import StudySettings
+from proxytune.running import Watcher
+from proxytune.storage import Store
+from proxytune.study import StudySettings
 
 
 class LivePage:

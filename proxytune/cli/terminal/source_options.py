@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 
 from proxytune.errors import InputError
-from proxytune.importing.facts import Facts, finite, read_geometry
-from proxytune.importing.wanted import Wanted
+from proxytune.importing import Facts, Wanted, finite, read_geometry
 from proxytune.logs import COMMANDS
 
 

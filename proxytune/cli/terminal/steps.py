@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from proxytune.running.progress import Lines, progress_bar
+from proxytune.running import Lines, progress_bar
 
 
 class Steps:

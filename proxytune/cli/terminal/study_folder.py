@@ -6,13 +6,10 @@ import sys
 from pathlib import Path
 
 from proxytune.cli.terminal.trusting import remember
-from proxytune.drafts import draft_path
 from proxytune.errors import InputError, ProxytuneError, StoreError
+from proxytune.files import draft_path, shipped
 from proxytune.settings import nearest
-from proxytune.shipped import shipped
-from proxytune.study.families.reading import study_around
-from proxytune.study.settings import FILE_NAME
-from proxytune.study.weights import MADE
+from proxytune.study import FILE_NAME, MADE, study_around
 
 NOT_COPIED = (*MADE, "study.db*", "study.lock", "report.html", "__pycache__")
 """What running a study adds; not copied."""

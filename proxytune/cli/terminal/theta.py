@@ -7,11 +7,9 @@ from proxytune.domain import DomainFamily
 from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
 from proxytune.space import Theta
-from proxytune.storage.store import FILE_NAME
-from proxytune.study.settings import StudySettings
-from proxytune.study.side_by_side import check_robot
-from proxytune.study.study import open_settings
-from proxytune.sweep.answer import best_theta, has_answer
+from proxytune.storage import FILE_NAME
+from proxytune.study import StudySettings, check_robot, open_settings
+from proxytune.sweep import best_theta, has_answer
 
 
 class ChosenTheta(NamedTuple):

@@ -12,9 +12,9 @@ from importlib.machinery import BYTECODE_SUFFIXES, EXTENSION_SUFFIXES
 from pathlib import Path
 
 from proxytune.errors import ExtensionError, InputError
-from proxytune.extensions.trust import permitting
-from proxytune.meaning import files_beside, modules_beside
-from proxytune.shipped import shipped
+from proxytune.extensions import permitting
+from proxytune.files import shipped
+from proxytune.identity import files_beside, modules_beside
 
 ALL = "PROXYTUNE_TRUST"
 """The environment variable that trusts whatever is run, as in tests and on a cluster."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from proxytune.running.progress import Lines
+from proxytune.running import Lines
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """ROS 1 and ROS 2 bags: which topics are commands, poses and pictures, and their messages as numbers."""
 
-from proxytune.importing.ros.bag import is_bag
-from proxytune.importing.ros.reading import read_bag
+from proxytune.importing.bag import is_bag
+from proxytune.importing.topics import read_bag
 
 __all__ = ["is_bag", "read_bag"]

@@ -6,7 +6,8 @@ from rich.console import Group
 
 from proxytune.comparison.summary import EngineSummary
 from proxytune.report.compare.document import compare_lines, compare_tables
-from proxytune.report.page import Foot, Page, Picture, Table, Words, terminal_tables
+from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
+from proxytune.report.page.tables import terminal_tables
 
 CAPTION = (
     "The lower, the nearer the best so far is to the optimum; medians over the seeds, with the 95 % band of the first "

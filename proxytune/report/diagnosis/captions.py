@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from proxytune.report.page import Picture
+from proxytune.report.page.parts import Picture
 
 SAID = {
     "error": (

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from proxytune.diagnosis.measured.clocks import Clocks, Offset
+from proxytune.diagnosis import Clocks, Offset
 
 
 def clocks_document(clocks: Sequence[Clocks]) -> dict[str, Any]:

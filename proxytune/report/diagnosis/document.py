@@ -7,11 +7,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.diagnosis.horizon.windows import Ratio
-from proxytune.diagnosis.horizon_error import HorizonError
-from proxytune.diagnosis.naming.findings import AdoptedEffect
-from proxytune.diagnosis.naming.materiality import Worth
-from proxytune.diagnosis.result import Diagnosis, Estimate, main_error
+from proxytune.diagnosis import AdoptedEffect, Diagnosis, Estimate, HorizonError, Ratio, Worth, main_error
 from proxytune.effects import Catalogue
 from proxytune.report.diagnosis.clocks import clocks_document
 from proxytune.report.diagnosis.learnt import learnt_document, ratio_document, ratios_document

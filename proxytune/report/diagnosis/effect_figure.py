@@ -7,11 +7,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.measured.drives import Drives, Floats
-from proxytune.diagnosis.model.replay import RANDOM_EFFECTS, drawn_wheel_speeds, wheel_speeds
-from proxytune.diagnosis.naming.findings import AdoptedEffect
-from proxytune.diagnosis.naming.flexible import Curve
-from proxytune.diagnosis.result import Diagnosis
+from proxytune.diagnosis import (
+    RANDOM_EFFECTS,
+    AdoptedEffect,
+    Curve,
+    Diagnosis,
+    Drives,
+    Floats,
+    drawn_wheel_speeds,
+    wheel_speeds,
+)
 from proxytune.effects import Catalogue, Means, WheelCurve
 from proxytune.report.diagnosis.means import ANY, GROUPS, draw_means, means_figure, rates_of, retuned
 from proxytune.report.diagnosis.model_names import BEFORE, after

@@ -7,9 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from proxytune.diagnosis.horizon.windows import Rmse
-from proxytune.diagnosis.horizon_error import HorizonError
-from proxytune.diagnosis.result import Diagnosis
+from proxytune.diagnosis import Diagnosis, HorizonError, Rmse
 from proxytune.report.diagnosis.model_names import BEFORE, after
 from proxytune.report.style import BLUE, COLUMN, GREEN, VERMILLION, dress, legend_below
 

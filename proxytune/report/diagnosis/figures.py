@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.result import Diagnosis
+from proxytune.diagnosis import Diagnosis
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.error_figure import error_figure
 from proxytune.report.diagnosis.learnt_figure import learnt_figure

@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from proxytune.diagnosis.horizon.windows import Ratio
-from proxytune.diagnosis.remainder.learning import Learning
-from proxytune.diagnosis.remainder.lookalike import Lookalike
+from proxytune.diagnosis import Learning, Lookalike, Ratio
 
 
 def learnt_document(learning: Learning) -> dict[str, Any]:

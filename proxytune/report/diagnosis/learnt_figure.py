@@ -8,10 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.remainder.learning import Learning
-from proxytune.effects.learnt.effect import Curve, Learnt
-from proxytune.effects.learnt.features import GROUPS, HEADING, LEVEL
-from proxytune.effects.learnt.table import learnt_effect
+from proxytune.diagnosis import Learning
+from proxytune.effects import GROUPS, HEADING, LEVEL, Curve, Learnt, learnt_effect
 from proxytune.report.style import BLUE, COLUMN, GREY, dress, plain
 
 SHOWN_AS = {

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from proxytune.diagnosis.naming.likeness import Unlike
+from proxytune.diagnosis import Unlike
 
 
 def unlike_document(unlike: Unlike | None, names: Sequence[str]) -> dict[str, Any] | None:

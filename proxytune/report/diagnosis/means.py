@@ -8,14 +8,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.measured.drives import Drives, Floats
-from proxytune.diagnosis.model.coordinates import span, theta_at
-from proxytune.diagnosis.model.fitting import Fit
-from proxytune.diagnosis.model.innovations import HUBER
-from proxytune.diagnosis.model.replay import disturbed_increments, increments
-from proxytune.diagnosis.naming.flexible import Curve
-from proxytune.diagnosis.result import Diagnosis
-from proxytune.effects.trace import TURN, Panel
+from proxytune.diagnosis import (
+    HUBER,
+    Curve,
+    Diagnosis,
+    Drives,
+    Fit,
+    Floats,
+    disturbed_increments,
+    increments,
+    span,
+    theta_at,
+)
+from proxytune.effects import TURN, Panel
 from proxytune.report.diagnosis.model_names import BEFORE, after
 from proxytune.report.style import BLUE, COLUMN, GREY, PURPLE, VERMILLION, dress, legend_below
 from proxytune.space import Theta

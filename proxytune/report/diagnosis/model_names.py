@@ -1,6 +1,6 @@
 """What the figures of a diagnosis call its two models."""
 
-from proxytune.diagnosis.result import Diagnosis
+from proxytune.diagnosis import Diagnosis
 from proxytune.report.style import plain
 
 BEFORE = "declared model"

@@ -1,10 +1,6 @@
 """What a diagnosis says in sentences: each effect and its worth, what does not matter, what is left, what to drive."""
 
-from proxytune.diagnosis.horizon.windows import Ratio
-from proxytune.diagnosis.naming.findings import AdoptedEffect
-from proxytune.diagnosis.naming.materiality import Worth
-from proxytune.diagnosis.result import Diagnosis
-from proxytune.diagnosis.rules import RULES
+from proxytune.diagnosis import RULES, AdoptedEffect, Diagnosis, Ratio, Worth
 from proxytune.report.diagnosis.clocks import clocks_notes
 from proxytune.report.diagnosis.learnt import learnt_notes
 from proxytune.report.diagnosis.likeness import unlike_notes

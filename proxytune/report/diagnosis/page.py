@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 
-from proxytune.diagnosis.log_diagnosis import LogDiagnosis
+from proxytune.diagnosis import LogDiagnosis
 from proxytune.report.diagnosis.captions import pictures
 from proxytune.report.diagnosis.notes import next_drives
 from proxytune.report.diagnosis.whole import whole_headline, whole_notes, whole_tables_and_notes
-from proxytune.report.page import Foot, Page, Words, terminal_tables
+from proxytune.report.page.parts import Foot, Page, Words
+from proxytune.report.page.tables import terminal_tables
 
 NEXT_STEPS = {
     "nothing missing": "use the fitted values: name model.toml as `proxy` in study.toml, or read it with "

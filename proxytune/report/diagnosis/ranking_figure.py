@@ -7,8 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from proxytune.diagnosis.naming.findings import Findings, TriedEffect
-from proxytune.diagnosis.rules import RULES
+from proxytune.diagnosis import RULES, Findings, TriedEffect
 from proxytune.report.style import BLUE, COLUMN, GREY, LIGHT_BLUE, PURPLE, dress, legend_below, plain
 
 SHOWN = 12

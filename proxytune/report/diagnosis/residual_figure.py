@@ -11,9 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from proxytune.diagnosis.horizon.windows import cut, pose_errors
-from proxytune.diagnosis.measured.drives import Drives, Floats, Whole
-from proxytune.diagnosis.result import Diagnosis
+from proxytune.diagnosis import Diagnosis, Drives, Floats, Whole, cut, pose_errors
 from proxytune.report.diagnosis.model_names import BEFORE, after
 from proxytune.report.style import BLUE, COLUMN, GREY, VERMILLION, dress, legend_below
 from proxytune.space import Theta

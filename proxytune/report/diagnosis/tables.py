@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from rich.markup import escape
 from rich.table import Table
 
-from proxytune.diagnosis.result import Estimate
+from proxytune.diagnosis import Estimate
 
 TEXTS = ("parameter", "unit", "window", "effect", "form", "error")
 """Columns of words; all others are of numbers."""

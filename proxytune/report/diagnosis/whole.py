@@ -7,10 +7,8 @@ from matplotlib.figure import Figure
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.diagnosis.camera.result import CameraDiagnosis
-from proxytune.diagnosis.log_diagnosis import LogDiagnosis
-from proxytune.diagnosis.result import Diagnosis
-from proxytune.driving.robot import robot_names
+from proxytune.diagnosis import CameraDiagnosis, Diagnosis, LogDiagnosis
+from proxytune.driving import robot_names
 from proxytune.effects import Model, model_text
 from proxytune.logs import GEOMETRY
 from proxytune.report.diagnosis.camera.document import camera_document

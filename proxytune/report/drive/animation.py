@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from proxytune.report.drive.path import draw_start
 from proxytune.report.drive.scene import COLOURS, draw_map
 from proxytune.report.style import dress, plain
-from proxytune.study.side_by_side import SideBySide
-from proxytune.study.single_episode import RecordedEpisode
+from proxytune.study import RecordedEpisode, SideBySide
 
 FRAME_HZ = 10
 """Frames a second, of the episode and of who watches it."""

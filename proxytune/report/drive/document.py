@@ -8,7 +8,7 @@ from rich.text import Text
 
 from proxytune.report.numbers import short
 from proxytune.report.style import with_unit
-from proxytune.study.side_by_side import APART_M, SideBySide
+from proxytune.study import APART_M, SideBySide
 
 
 def episode_document(pair: SideBySide, study_seed: int) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from proxytune.report.drive.path import draw_parting, draw_paths
 from proxytune.report.drive.scene import COLOURS, draw_map, map_aspect
 from proxytune.report.numbers import short
 from proxytune.report.style import COLUMN, GREY, LIGHT_GREY, dress, plain
-from proxytune.study.side_by_side import APART_M, SideBySide
+from proxytune.study import APART_M, SideBySide
 
 CHANNEL_INCH, PICTURES_INCH, LINE_INCH = 0.62, 0.62, 0.13
 """Heights of a channel of commands, of a row of pictures, and of a line of text."""

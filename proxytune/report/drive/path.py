@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from proxytune.report.drive.labels import corners_of
 from proxytune.report.drive.scene import CASING, COLOURS, HALO
-from proxytune.study.side_by_side import SideBySide
+from proxytune.study import SideBySide
 
 ARROWS, LEAST_M = 6, 0.5
 """About so many arrows on a path, and at least so far apart [m]."""

@@ -9,8 +9,8 @@ from proxytune.report.drive.animation import FRAME_HZ, Animation
 from proxytune.report.drive.figure import episode_figure
 from proxytune.report.drive.movie import Frame, ffmpeg, write_gif, write_mp4
 from proxytune.report.writing import save
-from proxytune.running.progress import Bars, Watcher
-from proxytune.study.side_by_side import SideBySide
+from proxytune.running import Bars, Watcher
+from proxytune.study import SideBySide
 
 STILL, GIF, MP4 = ".png", ".gif", ".mp4"
 NO_PLACES = "nothing can be drawn, as this study's domain family records no x and y"

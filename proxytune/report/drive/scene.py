@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import Stroke, withStroke
 from numpy.typing import NDArray
 
-from proxytune.driving.road.maps import Road
-from proxytune.driving.road.texture import draw_floor
+from proxytune.driving import Road, draw_floor
 from proxytune.report.style import BLUE, VERMILLION, dress
 
 COLOURS: Mapping[str, str] = MappingProxyType({"proxy": BLUE, "target": VERMILLION})

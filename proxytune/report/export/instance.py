@@ -6,11 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proxytune.driving.cameras import CameraFigures
-from proxytune.driving.mounting import mounted_camera
-from proxytune.driving.robot import CAMERA, Robot
-from proxytune.effects import Effect, effect_of, effects_from
-from proxytune.effects.motors.power import SMALLEST_LIMIT
+from proxytune.driving import CAMERA, CameraFigures, Robot, mounted_camera
+from proxytune.effects import SMALLEST_LIMIT, Effect, effect_of, effects_from
 from proxytune.errors import InputError
 from proxytune.report.export.places import place_of
 from proxytune.space import Theta

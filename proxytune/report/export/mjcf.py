@@ -6,7 +6,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from proxytune.driving.cameras import CameraFigures, orientation
+from proxytune.driving import CameraFigures, orientation
 from proxytune.report.export.instance import Instance, xml_comment
 
 TIMESTEP_S = 0.0005

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.cameras import CameraFigures, orientation
+from proxytune.driving import CameraFigures, orientation
 from proxytune.report.export.instance import Instance, header
 
 TIMEOUT_S = 0.5

@@ -7,17 +7,17 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.body import (
+from proxytune.driving import (
     AXLES,
     add_little_mass,
     link_pose,
     links_called,
+    orientation,
     origin_of,
     parse_urdf,
     read_body,
     sound_urdf,
 )
-from proxytune.driving.cameras import orientation
 from proxytune.report.export.instance import Instance, xml_comment
 
 Pose = NDArray[np.float64]

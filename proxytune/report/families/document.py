@@ -5,8 +5,7 @@ from typing import Any
 from proxytune.report.families.words import families_sentence
 from proxytune.report.study.knowledge_document import intervals_document
 from proxytune.report.teaching.document import estimate
-from proxytune.study.families.compared import Choice, ComparedFamilies, Lesson, TunedFamily
-from proxytune.study.settings import as_document
+from proxytune.study import Choice, ComparedFamilies, Lesson, TunedFamily, as_document
 
 
 def families_document(compared: ComparedFamilies) -> dict[str, Any]:

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
-from proxytune.learning.plv import Estimate
+from proxytune.learning import Estimate
 from proxytune.report.style import BLUE, COLUMN, VERMILLION, dress, legend_below
-from proxytune.study.families.compared import Choice, ComparedFamilies
+from proxytune.study import Choice, ComparedFamilies
 from proxytune.usefulness import Assessment
 
 BEST, ALIKE, WORSE = "best", "cannot be told from it", "worse"

@@ -1,17 +1,11 @@
 """Several families as a page."""
 
-from proxytune.report.families.table import (
-    THETA,
-    USES,
-    columns_of,
-    theta_rows,
-    use_notes,
-    use_rows,
-)
+from proxytune.report.families.table import THETA, USES, columns_of, theta_rows, use_notes, use_rows
 from proxytune.report.families.words import families_answer, families_next_step
-from proxytune.report.page import Page, Picture, Table, Words, foot_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.parts import Page, Picture, Table, Words
 from proxytune.report.study.page import study_command, study_settings
-from proxytune.study.families.compared import ComparedFamilies
+from proxytune.study import ComparedFamilies
 
 CAPTION = (
     "A row per family, each at the best θ that was found in the same time; lines are 95 % intervals, without an end "

@@ -20,7 +20,7 @@ from proxytune.report.numbers import short, span
 from proxytune.report.study.finding import known_parameters
 from proxytune.report.study.theta_table import short4
 from proxytune.report.teaching.table import UNKNOWN, count
-from proxytune.study.families.compared import ComparedFamilies, Lesson, TunedFamily
+from proxytune.study import ComparedFamilies, Lesson, TunedFamily
 
 Row = tuple[str, ...]
 USES, THETA = "Which simulator, and for what (95 % intervals)", "Best θ of each"

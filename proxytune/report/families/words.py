@@ -1,11 +1,10 @@
 """Which simulator to use, and for what, in sentences that claim no more than the intervals allow."""
 
-from proxytune.learning.plv import Estimate
+from proxytune.learning import Estimate
 from proxytune.report.numbers import fixed, listed, short
 from proxytune.report.teaching.table import UNKNOWN, count
-from proxytune.study.families.compared import ComparedFamilies, Lesson
-from proxytune.usefulness import Assessment
-from proxytune.usefulness.selection import Difference
+from proxytune.study import ComparedFamilies, Lesson
+from proxytune.usefulness import Assessment, Difference
 
 NOT_APART = "cannot be told from it"
 

@@ -4,8 +4,8 @@ import platform
 from collections.abc import Iterable
 from datetime import datetime
 
+from proxytune.identity import versions_of
 from proxytune.report.page.parts import Foot
-from proxytune.versions import versions_of
 
 PACKAGES = ("proxytune", "numpy", "scipy", "pybullet")
 """What figures may depend on."""

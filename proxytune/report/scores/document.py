@@ -3,9 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from proxytune.usefulness import MEASURES, Assessment, Measure, Measured, Selection
-from proxytune.usefulness.catalogue import PPV, PRPV
-from proxytune.usefulness.measure import ALL
+from proxytune.usefulness import ALL, MEASURES, PPV, PRPV, Assessment, Measure, Measured, Selection
 
 
 def document_of(assessment: Assessment) -> dict[str, Any]:

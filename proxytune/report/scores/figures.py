@@ -7,9 +7,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.stats import rankdata
 
+from proxytune.arrays import Floats
 from proxytune.report.line_names import spread
 from proxytune.report.style import BLUE, COLUMN, LIGHT_BLUE, LIGHT_GREY, ORANGE, VERMILLION, dress, plain
-from proxytune.scores import Array, ScoreTable
+from proxytune.scores import ScoreTable
 from proxytune.usefulness import Assessment, Comparison, Prpv
 
 PANEL = 2.2
@@ -60,7 +61,7 @@ def flipped_pairs(prpv: Prpv) -> Figure:
     return figure
 
 
-def _draw_pairs(axes: Axes, cells: Array, *, named: bool) -> None:
+def _draw_pairs(axes: Axes, cells: Floats, *, named: bool) -> None:
     """Squares with gaps between them, or a picture where there are more than can be named."""
     colours, ends = ListedColormap(list(FLIP_COLOURS.values())), (-0.5, len(FLIP_COLOURS) - 0.5)
     if named:
@@ -88,7 +89,7 @@ def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
     dress(axes)
 
 
-def _standard_errors(table: ScoreTable) -> Array:
+def _standard_errors(table: ScoreTable) -> Floats:
     """Standard error of each agent's mean, shape (agents, metrics); zero for a single episode."""
     squares = np.nansum((table.values - table.means[:, None, :]) ** 2, axis=1)
     counts = table.counts[:, None]
@@ -111,7 +112,7 @@ def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> N
         )  # fmt: skip
 
 
-def _to_name(proxy: Array, target: Array) -> list[int]:
+def _to_name(proxy: Floats, target: Floats) -> list[int]:
     """The agents to name: all, or of many those whose ranks in proxy and target differ most."""
     moved = np.abs(rankdata(proxy) - rankdata(target))
     return [int(row) for row in np.argsort(-moved, kind="stable")[:MOST]]

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from proxytune.report.page import Foot, Page, Picture, Table, terminal_tables
+from proxytune.report.page.parts import Foot, Page, Picture, Table
+from proxytune.report.page.tables import terminal_tables
 from proxytune.report.scores.figures import MOST
 from proxytune.report.scores.table import measures, ranking
 from proxytune.report.scores.words import score_answer, score_next_step

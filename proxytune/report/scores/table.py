@@ -7,9 +7,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.usefulness import MEASURES, Assessment, Measure, Selection, SuccessRates
-from proxytune.usefulness.catalogue import PRPV
-from proxytune.usefulness.measure import Measured
+from proxytune.usefulness import MEASURES, PRPV, Assessment, Measure, Measured, Selection, SuccessRates
 
 Row = tuple[str, str, str, str, str]
 BESIDE_PRPV = tuple(measure for measure in MEASURES if measure is not PRPV)

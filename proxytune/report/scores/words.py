@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 
 from proxytune.report.numbers import listed, short
-from proxytune.usefulness import Assessment, Selection
-from proxytune.usefulness.noise import NoiseFloor
+from proxytune.usefulness import Assessment, NoiseFloor, Selection
 
 
 def score_answer(assessments: Mapping[str, Assessment], selection: Selection | None, *, target: str) -> str:

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from proxytune.report.page import Picture
-from proxytune.study.result import StudyResult
+from proxytune.report.page.parts import Picture
+from proxytune.study import StudyResult
 
 TITLES = {
     "profiles": "What is left of each parameter's range",

@@ -7,8 +7,7 @@ from matplotlib.ticker import MaxNLocator
 
 from proxytune.report.line_names import LineName, name_lines
 from proxytune.report.style import BLUE, COLUMN, GREEN, VERMILLION, dress, floor_name, legend_below
-from proxytune.study.objective import PRPV
-from proxytune.study.result import StudyResult
+from proxytune.study import PRPV, StudyResult
 
 TWO_LINES = 0.14
 """How far apart names of two lines are, as a share of the panel's height."""

@@ -6,13 +6,9 @@ from proxytune.report.scores.document import document_of
 from proxytune.report.study.finding import finding_of
 from proxytune.report.study.knowledge_document import intervals_document, knowledge_document
 from proxytune.report.study.verdict import sentence
-from proxytune.search.knowledge.importance import Importance
-from proxytune.storage.records import TrialRecord
-from proxytune.study.objective import PRPV
-from proxytune.study.result import StudyResult
-from proxytune.study.settings import as_document
-from proxytune.study.stages.confirmation import Confirmation
-from proxytune.study.stages.preflight import Preflight
+from proxytune.search import Importance
+from proxytune.storage import TrialRecord
+from proxytune.study import PRPV, Confirmation, Preflight, StudyResult, as_document
 
 
 def study_document(result: StudyResult) -> dict[str, Any]:

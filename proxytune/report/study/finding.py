@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from proxytune.diagnosis.naming.candidates import MOTION_EFFECTS
+from proxytune.diagnosis import MOTION_EFFECTS
 from proxytune.report.numbers import Ends
-from proxytune.search.knowledge.information import Information
-from proxytune.study.result import StudyResult
-from proxytune.usefulness import NoiseFloor
-from proxytune.usefulness.chance import Chance
+from proxytune.search import Information
+from proxytune.study import StudyResult
+from proxytune.usefulness import Chance, NoiseFloor
 
 
 @dataclass(frozen=True)

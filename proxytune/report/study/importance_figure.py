@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from proxytune.report.style import BLUE, COLUMN, dress, legend_below, plain
-from proxytune.study.result import StudyResult
+from proxytune.study import StudyResult
 
 
 def importance_figure(result: StudyResult) -> Figure:

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from proxytune.search.knowledge.information import Information
-from proxytune.study.result import StudyResult
+from proxytune.search import Information
+from proxytune.study import StudyResult
 
 Row = tuple[str, str, str, str]
 

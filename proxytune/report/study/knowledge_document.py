@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from proxytune.report.numbers import Ends
-from proxytune.search.knowledge.information import Information
-from proxytune.search.knowledge.knowledge import Knowledge
+from proxytune.search import Information, Knowledge
 
 
 def knowledge_document(learnt: Knowledge) -> dict[str, Any]:

@@ -6,13 +6,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from proxytune.report.numbers import short
-from proxytune.report.page import Page, Picture, foot_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.parts import Page, Picture
 from proxytune.report.study.page import study_command, study_settings
 from proxytune.report.study.trials_table import MEASURES, trials_table
 from proxytune.report.style import BLUE, COLUMN, dress
 from proxytune.report.writing import png_of
-from proxytune.storage.records import TrialRecord
-from proxytune.study.settings import LEARNING, StudySettings
+from proxytune.storage import TrialRecord
+from proxytune.study import LEARNING, StudySettings
 
 RENEW_S = 5
 WAIT = "wait for the end, which brings intervals and figures; `python -m proxytune plot` draws them as of now."

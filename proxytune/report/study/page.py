@@ -3,7 +3,8 @@
 import shlex
 from collections.abc import Mapping
 
-from proxytune.report.page import Page, Picture, Table, Words, foot_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.parts import Page, Picture, Table, Words
 from proxytune.report.study.captions import pictures
 from proxytune.report.study.finding import finding_of
 from proxytune.report.study.information_table import INFORMATION_COLUMNS, information_rows
@@ -13,8 +14,7 @@ from proxytune.report.study.theta_table import theta_columns, theta_notes, theta
 from proxytune.report.study.trials_table import trials_table
 from proxytune.report.study.usefulness_table import USEFULNESS_COLUMNS, usefulness_notes, usefulness_rows
 from proxytune.report.study.verdict import answer, next_step
-from proxytune.study.result import StudyResult
-from proxytune.study.settings import StudySettings
+from proxytune.study import StudyResult, StudySettings
 
 
 def study_page(result: StudyResult, figures: Mapping[str, bytes], command: str = "") -> Page:

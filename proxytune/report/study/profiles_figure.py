@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.ndimage import gaussian_filter1d
 
+from proxytune.arrays import Floats
 from proxytune.report.numbers import span
 from proxytune.report.style import BLUE, COLUMN, VERMILLION, dress, legend_below, with_unit
-from proxytune.search.surrogate import Array
-from proxytune.study.result import StudyResult
+from proxytune.study import StudyResult
 
 COLUMNS = 2
 BINS = 60
@@ -64,7 +64,7 @@ def _panel(axes: Axes, result: StudyResult, place: int) -> None:
     dress(axes)
 
 
-def density_of(result: StudyResult, place: int) -> tuple[Array, Array]:
+def density_of(result: StudyResult, place: int) -> tuple[Floats, Floats]:
     """Values of a parameter, and the density there: a smoothed histogram of the posterior's points.
 
     The density is per unit of the parameter; it is 0 where the posterior has no points at all.
@@ -79,7 +79,7 @@ def density_of(result: StudyResult, place: int) -> tuple[Array, Array]:
     return places, np.concatenate([[0.0, smooth[0]], smooth, [smooth[-1], 0.0]])
 
 
-def _reach(values: Array, weights: Array) -> float:
+def _reach(values: Floats, weights: Floats) -> float:
     """Over how much of its range a parameter's histogram is smoothed: the less, the more points count."""
     deviation = np.sqrt(weights @ (values - weights @ values) ** 2)
     return float(SMOOTH * deviation * (weights**2).sum() ** 0.2)

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.ndimage import gaussian_filter
 
+from proxytune.arrays import Floats
 from proxytune.report.style import COLUMN, LIGHT_BLUE, VERMILLION, dress, floor_name, with_unit
-from proxytune.search.surrogate import Array
-from proxytune.study.result import StudyResult
+from proxytune.study import StudyResult
 
 PANEL = 0.92
 """Width in inches of a pair's panel, at least."""
@@ -83,7 +83,7 @@ def _alone(axes: Axes, result: StudyResult, norm: Normalize) -> None:
     dress(axes)
 
 
-def _trials(axes: Axes, result: StudyResult, points: Array, norm: Normalize) -> None:
+def _trials(axes: Axes, result: StudyResult, points: Floats, norm: Normalize) -> None:
     scored = np.array([trial.score is not None for trial in result.trials])
     scores = [trial.score for trial in result.trials if trial.score is not None]
     across, up = points[scored].T

@@ -1,6 +1,6 @@
 """How a study's search went, a fact a row."""
 
-from proxytune.study.result import StudyResult
+from proxytune.study import StudyResult
 
 Row = tuple[str, str]
 

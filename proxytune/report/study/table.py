@@ -14,7 +14,7 @@ from proxytune.report.study.search_rows import search_rows
 from proxytune.report.study.theta_table import theta_columns, theta_notes, theta_rows
 from proxytune.report.study.usefulness_table import USEFULNESS_COLUMNS, usefulness_notes, usefulness_rows
 from proxytune.report.study.verdict import sentence
-from proxytune.study.result import StudyResult
+from proxytune.study import StudyResult
 
 THETA, USEFULNESS, INFORMATION, SEARCH = (
     "Parameters",

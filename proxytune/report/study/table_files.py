@@ -8,7 +8,7 @@ from proxytune.report.study.theta_table import theta_columns, theta_rows
 from proxytune.report.study.usefulness_table import USEFULNESS_COLUMNS, usefulness_rows
 from proxytune.report.table_files import write_latex
 from proxytune.report.writing import write_text
-from proxytune.study.result import StudyResult
+from proxytune.study import StudyResult
 
 
 def write_tables(result: StudyResult, trials: pd.DataFrame, folder: Path) -> list[Path]:

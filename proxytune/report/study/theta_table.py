@@ -3,7 +3,7 @@
 from proxytune.report.numbers import Ends, digits, fixed, listed, percent, short, span
 from proxytune.report.study.finding import known_parameters
 from proxytune.report.style import plain
-from proxytune.study.result import StudyResult
+from proxytune.study import StudyResult
 
 Row = tuple[str, ...]
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from proxytune.report.page import Table
-from proxytune.storage.records import TrialRecord
+from proxytune.report.page.parts import Table
+from proxytune.storage import TrialRecord
 
 MEASURES = ("prpv", "ppv")
 

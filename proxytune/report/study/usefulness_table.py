@@ -1,11 +1,8 @@
 """How useful the proxy is at the best θ: a row per measure, and what to keep in mind."""
 
 from proxytune.report.numbers import Ends, fixed, probability, short
-from proxytune.study.objective import PRPV
-from proxytune.study.result import StudyResult
-from proxytune.study.stages.confirmation import Confirmation
-from proxytune.usefulness import Assessment, NoiseFloor
-from proxytune.usefulness.assessment import PAIRED, PERFECT
+from proxytune.study import PRPV, Confirmation, StudyResult
+from proxytune.usefulness import PAIRED, PERFECT, Assessment, NoiseFloor
 
 Row = tuple[str, str, str, str]
 

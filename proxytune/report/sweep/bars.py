@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from proxytune.report.numbers import short
 from proxytune.report.style import BLUE, COLUMN, LIGHT_BLUE, dress, legend_below
 from proxytune.report.sweep.lines import HELD, INTERVAL, axis_of, draw_levels, label_of
-from proxytune.sweep.sweep import Curve, SweepPoint
-from proxytune.usefulness.catalogue import PRPV
+from proxytune.sweep import Curve, SweepPoint
+from proxytune.usefulness import PRPV
 
 BESIDE = "lower and higher value"
 SIDE = 1 / 3

@@ -12,12 +12,8 @@ from rich.table import Table
 
 from proxytune.report.scores.document import document_of
 from proxytune.space import Theta
-from proxytune.sweep.curves import Series, series_of
-from proxytune.sweep.discrepancy import METRICS
-from proxytune.sweep.sweep import Curve, PodMean, SweepPoint
-from proxytune.sweep.trend import describe, shape_of
-from proxytune.usefulness import MEASURES
-from proxytune.usefulness.catalogue import PRPV
+from proxytune.sweep import METRICS, Curve, PodMean, Series, SweepPoint, describe, series_of, shape_of
+from proxytune.usefulness import MEASURES, PRPV
 
 OF_PRPV = ("prpv", "prpv_interval", "prpv_normalised", "expected_prpv")
 KEYS = (

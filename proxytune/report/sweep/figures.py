@@ -10,9 +10,8 @@ from matplotlib.ticker import MaxNLocator
 from proxytune.report.style import BLUE, COLUMN, GREEN, ORANGE, PURPLE, VERMILLION, legend_below
 from proxytune.report.sweep.lines import axis_of, draw_ppv, draw_prpv, draw_series, explain, label_of, mark_values
 from proxytune.space import Theta
-from proxytune.sweep.curves import Series, series_of
-from proxytune.sweep.sweep import Curve
-from proxytune.usefulness.catalogue import POD_IMAGE, POD_POSE, PPV, PRPV, SRCC
+from proxytune.sweep import Curve, Series, series_of
+from proxytune.usefulness import POD_IMAGE, POD_POSE, PPV, PRPV, SRCC
 
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 MARKERS = "osD^v"

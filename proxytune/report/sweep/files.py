@@ -7,7 +7,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from proxytune.report.page import foot_of, html_of
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from proxytune.report.study.page import study_settings
 from proxytune.report.sweep.bars import bars_figure
 from proxytune.report.sweep.document import curve_csv, curve_document, curve_name, held_mark
@@ -15,8 +16,8 @@ from proxytune.report.sweep.figures import panels_figure, sweep_figure
 from proxytune.report.sweep.page import sweep_page
 from proxytune.report.writing import save, write_text
 from proxytune.space import Theta
-from proxytune.study.settings import StudySettings
-from proxytune.sweep.sweep import Curve
+from proxytune.study import StudySettings
+from proxytune.sweep import Curve
 
 
 def draw_curves(curves: Sequence[Curve], folder: Path, truth: Theta | None) -> list[Path]:

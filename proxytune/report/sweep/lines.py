@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 
 from proxytune.report.style import BLUE, GREEN, dress, floor_name, with_unit
 from proxytune.space import Theta
-from proxytune.sweep.curves import Series
-from proxytune.sweep.sweep import Curve
+from proxytune.sweep import Curve, Series
 from proxytune.usefulness import Assessment, Measure
 
 HELD, TRUTH, INTERVAL = "held value", "truth", "95 % interval"

@@ -5,11 +5,10 @@ from dataclasses import replace
 
 from rich.console import Group
 
-from proxytune.report.page import Foot, Page, Picture, Table, Words, terminal_tables
+from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
+from proxytune.report.page.tables import terminal_tables
 from proxytune.report.sweep.document import curve_lines, curve_name, curve_tables, failures
-from proxytune.sweep.curves import series_of
-from proxytune.sweep.sweep import Curve
-from proxytune.sweep.trend import shape_of
+from proxytune.sweep import Curve, series_of, shape_of
 
 BANDS = "Bands are 95 % intervals: where they overlap, the values cannot be told apart."
 LINES = (

@@ -4,14 +4,9 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from proxytune.learning.curves import Curve
-from proxytune.learning.lessons import Distribution
-from proxytune.learning.plv import Estimate
-from proxytune.study.settings import as_document
-from proxytune.teaching.agreement import Agreement
-from proxytune.teaching.experiment import Experiment, TeacherResult, teaching_settings
-from proxytune.teaching.observations import observe
-from proxytune.teaching.predictivity import Predictivity
+from proxytune.learning import Curve, Distribution, Estimate
+from proxytune.study import as_document
+from proxytune.teaching import Agreement, Experiment, Predictivity, TeacherResult, observe, teaching_settings
 
 
 def teach_document(experiment: Experiment, prpv: Mapping[str, Predictivity | None]) -> dict[str, Any]:

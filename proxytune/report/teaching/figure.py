@@ -7,12 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.learning.curve_model import places
-from proxytune.learning.curves import Array
-from proxytune.learning.plv import LEVELS, Estimate
-from proxytune.learning.settings import NONE
+from proxytune.arrays import Floats
+from proxytune.learning import LEVELS, NONE, Estimate, places
 from proxytune.report.style import BLUE, COLUMN, GREY, dress, legend_below
-from proxytune.teaching.experiment import Experiment, TeacherResult, teaching_settings
+from proxytune.teaching import Experiment, TeacherResult, teaching_settings
 
 COLUMNS = 2
 
@@ -65,7 +63,7 @@ def _panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> None:
     dress(axes)
 
 
-def _places(experiment: Experiment, counts: Array) -> Array:
+def _places(experiment: Experiment, counts: Floats) -> Floats:
     """Where counts stand on the axis: as doublings, none at 0."""
     return places(counts, experiment.needs.draws.first)
 

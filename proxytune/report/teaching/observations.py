@@ -3,9 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from proxytune.report.numbers import fixed, listed
-from proxytune.teaching.agreement import Agreement
-from proxytune.teaching.experiment import Experiment
-from proxytune.teaching.observations import Observations
+from proxytune.teaching import Agreement, Experiment, Observations
 
 FIRST = "A zero-shot score does not measure PLV (the paper's first observation)"
 SECOND = "A proxy that predicts badly can still teach (the paper's second observation)"

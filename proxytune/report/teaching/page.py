@@ -2,15 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 
-from proxytune.report.page import Foot, Page, Picture, Table, Words, terminal_tables
+from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
+from proxytune.report.page.tables import terminal_tables
 from proxytune.report.teaching.observations import observation_lines
 from proxytune.report.teaching.plv_document import CONFIRMED, plv_table
 from proxytune.report.teaching.table import COLUMNS, PLV_MEANING, columns_of, convergence_lines, meanings, table_rows
 from proxytune.report.teaching.words import plv_answer, plv_next_step, teach_answer, teach_next_step
-from proxytune.teaching.experiment import Experiment
-from proxytune.teaching.observations import observe
-from proxytune.teaching.predictivity import Predictivity
-from proxytune.teaching.search import PlvStudy
+from proxytune.teaching import Experiment, PlvStudy, Predictivity, observe
 
 CURVES = (
     "One panel per proxy, against the learner without one (grey): mean scores with their 95 % bands, from all "

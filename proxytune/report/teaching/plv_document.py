@@ -7,14 +7,12 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.learning.lessons import Distribution
+from proxytune.learning import Distribution
 from proxytune.report.numbers import short
 from proxytune.report.teaching.document import estimate, theta_of
 from proxytune.report.teaching.table import CONVERGED, PLV_MEANING, UNKNOWN, count, one_decimal
-from proxytune.study.settings import as_document
-from proxytune.teaching.experiment import Experiment
-from proxytune.teaching.finalists import best_teacher, saves_more
-from proxytune.teaching.search import PlvStudy, PlvTrial
+from proxytune.study import as_document
+from proxytune.teaching import Experiment, PlvStudy, PlvTrial, best_teacher, saves_more
 
 CONFIRMED = "Finalists, taught anew with fresh lessons, learners and examinations:"
 SCORES = ("zero-shot score", "samples needed", "PLV")

@@ -6,7 +6,7 @@ from matplotlib.ticker import MaxNLocator
 
 from proxytune.report.line_names import LineName, name_lines
 from proxytune.report.style import BLUE, COLUMN, VERMILLION, dress, legend_below
-from proxytune.teaching.search import PlvStudy, plv_or_worst
+from proxytune.teaching import PlvStudy, plv_or_worst
 
 HIGHEST = LineName("highest\nso far", VERMILLION, 0.0)
 

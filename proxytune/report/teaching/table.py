@@ -8,15 +8,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.learning.costs import Costs
-from proxytune.learning.plv import Estimate
-from proxytune.learning.settings import NONE
+from proxytune.learning import NONE, Costs, Estimate
 from proxytune.report.numbers import fixed, short, span
 from proxytune.report.teaching.observations import observation_lines
-from proxytune.teaching.convergence import why_unknown
-from proxytune.teaching.experiment import Experiment, TeacherResult, teaching_settings
-from proxytune.teaching.observations import observe
-from proxytune.teaching.predictivity import Predictivity
+from proxytune.teaching import Experiment, Predictivity, TeacherResult, observe, teaching_settings, why_unknown
 
 COLUMNS = ("proxy", "PRPV", "zero-shot score", "samples needed", "PLV", "reduction")
 COST = "PLV in cost"

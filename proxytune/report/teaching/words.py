@@ -2,14 +2,10 @@
 
 from collections.abc import Sequence
 
-from proxytune.learning.lessons import describe
-from proxytune.learning.plv import Estimate
+from proxytune.learning import Estimate, describe
 from proxytune.report.numbers import listed
 from proxytune.report.teaching.table import UNKNOWN, count
-from proxytune.teaching.convergence import why_unknown
-from proxytune.teaching.experiment import Experiment, TeacherResult
-from proxytune.teaching.finalists import best_teacher, saves_more
-from proxytune.teaching.search import PlvStudy
+from proxytune.teaching import Experiment, PlvStudy, TeacherResult, best_teacher, saves_more, why_unknown
 
 MORE_PROXIES = "raise teaching.budget, or widen [parameters], so that other proxies are tried"
 SEARCH = '`study` with objective = "plv" looks for'

@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from proxytune.search.design import from_unit
-from proxytune.search.engines.engine import Engine, Library, Look
-from proxytune.search.engines.one_thread import on_one_thread
-from proxytune.search.proposer import Trial, Values
+from proxytune.arrays import Floats
+from proxytune.search.engine import Engine, Library, Look, from_unit
+from proxytune.search.loop import Trial, Values
+from proxytune.search.optuna_bridge import on_one_thread
 from proxytune.search.surrogate import unit_array
 from proxytune.seeds import proposal_seed
 from proxytune.space import Space
-
-Array = NDArray[np.float64]
 
 SAMPLES = 128
 RESTARTS, RAW_SAMPLES = 10, 512
@@ -45,7 +42,7 @@ class BotorchNEI:
             return from_unit(space, _most_improving(unit[~pending], merits, unit[pending], drawn))
 
 
-def _most_improving(visited: Array, merits: Array, pending: Array, seed: int) -> Array:
+def _most_improving(visited: Floats, merits: Floats, pending: Floats, seed: int) -> Floats:
     """Where a larger merit than those seen is most expected, in the unit cube, those pending being there too."""
     import torch
     from botorch.acquisition.logei import qLogNoisyExpectedImprovement
@@ -65,7 +62,7 @@ def _most_improving(visited: Array, merits: Array, pending: Array, seed: int) ->
     return np.asarray(found[0].numpy(), dtype=float)
 
 
-def _fitted(known: Any, merits: Array) -> Any:
+def _fitted(known: Any, merits: Floats) -> Any:
     import torch
     from botorch.fit import fit_gpytorch_mll
     from botorch.models import SingleTaskGP

@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from proxytune.search.engines.engine import Engine, Library, Look
-from proxytune.search.engines.one_thread import on_one_thread
-from proxytune.search.engines.tree_parzen import quiet, suggested
-from proxytune.search.proposer import Trial, Values
+from proxytune.search.engine import Engine, Library, Look
+from proxytune.search.loop import Trial, Values
+from proxytune.search.optuna_bridge import on_one_thread, quiet, suggested
 from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
-from proxytune.search.engines.engine import Engine, Look
-from proxytune.search.proposer import Trial, Values
+from proxytune.search.engine import Engine, Look
+from proxytune.search.loop import Trial, Values
 from proxytune.seeds import proposal_seed
 from proxytune.space import Space
 

@@ -10,10 +10,11 @@ import numpy as np
 from mujoco_duckiebot import family
 from mujoco_plant import TICK_S
 
-from proxytune.diagnosis.manoeuvres import LIBRARY
-from proxytune.diagnosis.recording import log_text, samples_text, tracked
+from proxytune.diagnosis import log_text, samples_text
+from proxytune.diagnosis.motion.manoeuvres import LIBRARY
+from proxytune.diagnosis.recording import tracked
 from proxytune.logs import Log, LogEpisode
-from proxytune.study.settings import read_study_settings
+from proxytune.study import read_study_settings
 
 RATE_HZ, SECONDS, REPEATS, SEED = 20, 60.0, 2, 0
 

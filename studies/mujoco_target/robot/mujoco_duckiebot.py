@@ -12,14 +12,10 @@ import mujoco
 import numpy as np
 from mujoco_plant import BODY, TICK_S, MujocoPlant
 
-from proxytune import Parameter
-from proxytune.driving.agents.loading import load_agent
-from proxytune.driving.episode import Course, drive
-from proxytune.driving.family import lane_following
-from proxytune.driving.road.lane import off_map
-from proxytune.driving.task import METRICS, score_trajectory, start_pose
-from proxytune.meaning import meaning_of, modules_beside
+from proxytune.driving import METRICS, Course, drive, lane_following, load_agent, off_map, score_trajectory, start_pose
+from proxytune.identity import meaning_of, modules_beside
 from proxytune.settings import Section, read_settings
+from proxytune.space import Parameter
 
 PARAMETERS = {
     "gear_friction": Parameter(name="gear_friction", unit="", low=0.0, high=0.4, neutral=0.0),

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, zoom
 
 from camera_truth.tape import Tape, lay_tape, line_distances
-from proxytune.driving.road.maps import Road
-from proxytune.driving.road.texture import COLOURS, MARGIN, Floor
+from proxytune.driving import COLOURS, Road
+from proxytune.driving.road_picture import MARGIN, Floor
 
 PIXELS_PER_METRE = 600
 STRIP = 64

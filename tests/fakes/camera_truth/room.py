@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.cameras import SKY
+from proxytune.driving.optics import SKY
 
 Values = NDArray[np.float64]
 

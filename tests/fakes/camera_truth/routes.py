@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from proxytune.driving.road.lane import lane_length, lane_point
-from proxytune.driving.road.maps import Road
+from proxytune.driving import Road, lane_length, lane_point
 
 Values = NDArray[np.float64]
 

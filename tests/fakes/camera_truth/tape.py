@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.road.centre_line import find_nearest, way_round
-from proxytune.driving.road.layout import lay_out
-from proxytune.driving.road.maps import Road
-from proxytune.driving.road.segments import Straight, length, tightened
+from proxytune.driving import Road
+from proxytune.driving.lane import find_nearest, lay_out, way_round
+from proxytune.driving.road import Straight, length, tightened
 
 Values = NDArray[np.float64]
 

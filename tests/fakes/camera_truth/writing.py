@@ -18,10 +18,9 @@ from camera_truth.ground import photographed_floor
 from camera_truth.pinhole import Pinhole
 from camera_truth.room import sky, walls
 from camera_truth.routes import ROWS_HZ, Drive, drives, places
-from proxytune.driving.road.maps import Road
-from proxytune.driving.road.reading import shipped_map
-from proxytune.driving.road.texture import Floor, draw_floor
-from proxytune.shipped import shipped
+from proxytune.driving import Road, draw_floor, shipped_map
+from proxytune.driving.road_picture import Floor
+from proxytune.files import shipped
 
 Values = NDArray[np.float64]
 

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from proxytune.report.page import Foot, Page, Picture, Table, Words, foot_of, html_of
-from proxytune.report.page.rendering import MANY
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
+from proxytune.report.page.rendering import MANY, html_of
 
 VOID = {"meta", "link", "img", "br"}
 EVIL = "<script>alert('\"&')</script>"

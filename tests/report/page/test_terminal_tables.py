@@ -5,7 +5,8 @@ from rich.markup import escape
 from rich.table import Table as TerminalTable
 from rich.text import Text
 
-from proxytune.report.page import Table, terminal_tables
+from proxytune.report.page.parts import Table
+from proxytune.report.page.tables import terminal_tables
 
 
 def terminal(title, *rows):

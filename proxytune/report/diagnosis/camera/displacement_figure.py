@@ -8,14 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.model.fitting import CameraFit
-from proxytune.diagnosis.camera.model.projection import project
-from proxytune.diagnosis.camera.naming.gate import Leftover
-from proxytune.diagnosis.camera.result import CameraDiagnosis
+from proxytune.arrays import Floats
+from proxytune.diagnosis import CameraDiagnosis, CameraFit, Leftover, project
 from proxytune.report.diagnosis.camera.models import COLOURS, camera_models, label_places
 from proxytune.report.style import COLUMN
-
-Floats = NDArray[np.float64]
 
 ACROSS = 12
 """Arrows across the picture."""

@@ -6,10 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from proxytune.diagnosis.camera.look.blemishes import Blemish
-from proxytune.diagnosis.camera.naming.gate import Leftover
-from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect, Comparison, LaidMap
-from proxytune.diagnosis.result import Estimate
+from proxytune.diagnosis import Blemish, CameraDiagnosis, CameraEffect, Comparison, Estimate, LaidMap, Leftover
 
 
 def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:

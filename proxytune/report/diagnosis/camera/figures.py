@@ -6,9 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis.camera.model.optics import effects_of
-from proxytune.diagnosis.camera.naming.choice import LEAST_NATS, rank_subsets
-from proxytune.diagnosis.camera.result import CameraDiagnosis, Comparison
+from proxytune.diagnosis import LEAST_NATS, CameraDiagnosis, Comparison, effects_of, rank_subsets
 from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure
 from proxytune.report.diagnosis.camera.markings_figure import markings_figure
 from proxytune.report.diagnosis.model_names import BEFORE

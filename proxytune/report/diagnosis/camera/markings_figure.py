@@ -7,16 +7,11 @@ from textwrap import fill
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.measured.edges import Edges
-from proxytune.diagnosis.camera.model.fitting import CameraFit
-from proxytune.diagnosis.camera.model.projection import project
-from proxytune.diagnosis.camera.result import CameraDiagnosis
+from proxytune.arrays import Floats
+from proxytune.diagnosis import CameraDiagnosis, CameraFit, Edges, project
 from proxytune.report.diagnosis.camera.models import COLOURS, camera_models, label_places
 from proxytune.report.style import COLUMN
-
-Floats = NDArray[np.float64]
 
 SHOWN = 2
 """Frames, one of each half of the log."""

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.camera.model.fitting import CameraFit
-from proxytune.diagnosis.camera.result import CameraDiagnosis
+from proxytune.diagnosis import CameraDiagnosis, CameraFit
 from proxytune.report.diagnosis.model_names import BEFORE, LONGEST
 from proxytune.report.style import BLUE, VERMILLION, plain
 

@@ -6,8 +6,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.diagnosis.camera.error.unseen import PictureError
-from proxytune.diagnosis.camera.result import CameraDiagnosis
+from proxytune.diagnosis import CameraDiagnosis, PictureError
 from proxytune.report.diagnosis.camera.document import noise_floor
 from proxytune.report.diagnosis.camera.words import camera_headline, camera_notes
 from proxytune.report.diagnosis.tables import parameters_table, plain_table

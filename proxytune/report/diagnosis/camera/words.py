@@ -2,9 +2,7 @@
 
 from collections.abc import Mapping
 
-from proxytune.diagnosis.camera.look.blemishes import Blemish
-from proxytune.diagnosis.camera.result import CameraDiagnosis, CameraEffect, LaidLine, LaidMap
-from proxytune.diagnosis.result import Estimate
+from proxytune.diagnosis import Blemish, CameraDiagnosis, CameraEffect, Estimate, LaidLine, LaidMap
 from proxytune.report.numbers import fixed, listed, short
 
 MEANINGS = {

@@ -1,1 +1,0 @@
-"""Closing the loop: tune, diagnose, extend, tune again, and compare before with after."""

@@ -1,0 +1,362 @@
+"""Errors of cameras on frames that they were not fitted to: displacement of markings, and brightness of the floor.
+
+The error of a camera on frames that it was not fitted to, in pixels of marking displacement.
+What a log's frames say of a robot's camera.
+What each effect on where things are in the picture is worth; those of no matter leave the model.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.arrays import Floats
+from proxytune.diagnosis.answer import Estimate
+from proxytune.diagnosis.camera.appearance import floor_pixels
+from proxytune.diagnosis.camera.edges import Gathered, Views, effects_of
+from proxytune.diagnosis.camera.fitting import SCALE_PX, CameraFit, count_points, eliminate_poses, fit_camera
+from proxytune.diagnosis.camera.light import Blemish
+from proxytune.diagnosis.camera.model import Pictures, State, draw_pictures, project
+from proxytune.diagnosis.camera.selection import Leftover, Named, Subset, cost_of, fit_set
+from proxytune.effects import effect_of
+
+FOLDS = 3
+"""Every frame is left out once, a third of them at a time."""
+
+SCALES = (2.0 * SCALE_PX, *(SCALE_PX,) * 4)
+POSE_STEPS = 4
+CAP_PX = 4.0
+"""A marking that lies farther off counts as so far [pixel]: what is no marking has no distance."""
+
+DRAWS = 400
+"""Bootstrap samples over frames."""
+
+
+@dataclass(frozen=True)
+class PictureError:
+    """Mean error on unseen frames.
+
+    Attributes:
+        value: Over all points, in pixels or grey levels.
+        interval: 95 %, from a bootstrap over frames.
+        frames: Mean of each frame, NaN where it shows no marking (N,).
+    """
+
+    value: float
+    interval: tuple[float, float]
+    frames: Floats
+
+
+def unseen_residuals(views: Views, state: State, names: Sequence[str]) -> Floats:
+    """Residuals of every edge point (n,) [pixel], by cameras that were fitted without its frame.
+
+    Poses of frames left out are fitted under the tracker's scatter. CAP_PX where no marking is near.
+    """
+    residuals = np.full(len(views.edges.row), CAP_PX)
+    for fold in range(FOLDS):
+        out = np.arange(views.count) % FOLDS == fold
+        fit = fit_camera(views, state, names, SCALES, ~out)
+        own = out[views.edges.frame]
+        there = project(views, fit_poses(views, fit.state, out))
+        residuals[own] = np.where(there.valid, np.clip(there.residual, -CAP_PX, CAP_PX), CAP_PX)[own]
+    return residuals
+
+
+def fit_poses(views: Views, state: State, frames: NDArray[np.bool_]) -> State:
+    """Fit the poses of some frames (N,), everything else held."""
+    state = replace(state, poses=np.where(frames[:, None], 0.0, state.poses))
+    for scale in np.geomspace(4.0 * SCALE_PX, SCALE_PX, POSE_STEPS):
+        there = project(views, state)
+        points = count_points(views, there, scale, frames, least=0.0)
+        own = eliminate_poses(views, state, there, points, np.zeros((len(points.rows), 0))).own
+        state = replace(state, poses=state.poses - np.where(frames[:, None], own, 0.0))
+    return state
+
+
+def pixel_errors(views: Views, residuals: Sequence[Floats], seed: int) -> list[PictureError]:
+    """Errors of several cameras over the same points: those that any of them brings to a marking."""
+    sizes = np.abs(np.stack(residuals))
+    chosen = (sizes < CAP_PX).any(axis=0)
+    frame = views.edges.frame[chosen]
+    counts = np.bincount(frame, minlength=views.count).astype(float)
+    sums = [np.bincount(frame, each[chosen], minlength=views.count) for each in sizes]
+    return [error_over(total.astype(float), counts, seed) for total in sums]
+
+
+def error_over(sums: Floats, counts: Floats, seed: int) -> PictureError:
+    """The mean over all points of frames, from each frame's sum and number of points (N,)."""
+    draws = np.random.default_rng(seed).integers(0, len(sums), (DRAWS, len(sums)))
+    means = sums[draws].sum(axis=1) / np.maximum(counts[draws].sum(axis=1), 1.0)
+    low, high = np.quantile(means, (0.025, 0.975))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        frames = np.where(counts > 0, sums / counts, np.nan)
+    return PictureError(float(sums.sum() / max(counts.sum(), 1.0)), (float(low), float(high)), frames)
+
+
+TWO_SIDED = 1.96
+"""Standard deviations on either side of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class CameraEffect:
+    """An effect on the camera or its pictures that the model lacked.
+
+    Attributes:
+        effect: Its name.
+        names: Its parameters by name in θ.
+        nats: What leaving it out costs, None for what shows in brightness or sharpness.
+        error_without: Error on unseen frames without it over the error with it; None for noise, which no
+            model predicts.
+        rivals: Effects, the tracker's among them, that explain the same pictures.
+    """
+
+    effect: str
+    names: tuple[str, ...]
+    nats: float | None
+    error_without: float | None
+    rivals: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Errors on unseen frames.
+
+    Attributes:
+        before: Of the declared model.
+        after: Of the model with the effects that were found.
+        floor: Of the most flexible camera there is, what no camera could remove; None where none is known.
+        unit: "px" or "grey levels".
+    """
+
+    before: PictureError
+    after: PictureError
+    floor: PictureError | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class LaidLine:
+    """A line that lies beside its place on the map.
+
+    Attributes:
+        line: Which, as in "left white line".
+        stretch: On which of the road's segments, from 0.
+        right_m: How far to the right of its place, seen driving counter-clockwise; dashes: how far ahead [m].
+        interval: 95 % [m].
+    """
+
+    line: str
+    stretch: int
+    right_m: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class LaidMap:
+    """How the map was laid.
+
+    Attributes:
+        offset: Of the whole map by name: x_m, y_m, heading_deg.
+        lines: Lines that lie measurably beside their places, the farthest first.
+        widths: How much wider lines and dashes are [m], by what they are.
+    """
+
+    offset: Mapping[str, Estimate]
+    lines: tuple[LaidLine, ...]
+    widths: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True)
+class CameraDiagnosis:
+    """What frames say of a camera.
+
+    Attributes:
+        verdict: As a diagnosis of motion has it.
+        declared: Declared parameters, fitted without any other effect, by name in θ.
+        theta: All parameters of the extended model, by name in θ.
+        effects: The effects that were added.
+        immaterial: Effects that there is evidence for, and which hardly change the error: no part of the model.
+        dropped: Parameters of those effects, as they were fitted before they were dropped, by name in θ.
+        candidates: What each effect of the catalogue costs if it is the only one added [nats], the best first.
+        pixels: Displacement of markings.
+        grey: Differences in brightness on the floor.
+        gates: What is fixed to the camera and left over, before and after.
+        blemishes: Places in the picture that no camera effect explains: dirt, a bumper in view.
+        could_not_be_seen: Effects that these frames could not have shown.
+        next_views: What to take to tell what could not be told.
+        laid: How the map was laid.
+        matched: Share of the markings' edges that lie within 2 pixels of the map's.
+        notes: What else is to be known, a line each.
+        named: All fits.
+        gathered: All frames that were used.
+    """
+
+    verdict: str
+    declared: Mapping[str, Estimate]
+    theta: Mapping[str, Estimate]
+    effects: tuple[CameraEffect, ...]
+    immaterial: tuple[CameraEffect, ...]
+    dropped: Mapping[str, Estimate]
+    candidates: Sequence[Subset]
+    pixels: Comparison
+    grey: Comparison
+    gates: tuple[Leftover, Leftover]
+    blemishes: tuple[Blemish, ...]
+    could_not_be_seen: tuple[str, ...]
+    next_views: tuple[str, ...]
+    laid: LaidMap
+    matched: float
+    notes: tuple[str, ...]
+    named: Named
+    gathered: Gathered
+
+
+def interval_of(value: float, sd: float) -> tuple[float, float]:
+    """The 95 % interval of a value with this standard deviation."""
+    return float(value - TWO_SIDED * sd), float(value + TWO_SIDED * sd)
+
+
+def estimate_of(value: float, sd: float, unit: str) -> Estimate:
+    """A value with this standard deviation as an estimate."""
+    return Estimate(float(value), interval_of(value, sd), unit)
+
+
+Look = Mapping[str, float]
+"""Values of effects on pictures, by name in θ."""
+
+
+def compare_displacement(views: Views, residuals: tuple[Floats, Floats, Floats], seed: int) -> Comparison:
+    """Displacement of markings before and after, from residuals on unseen frames.
+
+    Args:
+        views: Whose edge points these are.
+        residuals: Of the declared camera, of the model's and of the one with every effect (n,) each [pixel].
+        seed: Of the bootstrap.
+    """
+    before, after, floor = pixel_errors(views, residuals, seed)
+    return Comparison(before, after, floor if floor.value < after.value else after, "px")
+
+
+def displacement_ratio(views: Views, residuals: tuple[Floats, Floats], seed: int) -> float:
+    """The error without an effect over the error with it, from residuals of both on unseen frames (n,) [pixel]."""
+    without, with_it = pixel_errors(views, residuals, seed)
+    return without.value / max(with_it.value, 1e-9)
+
+
+def compare_brightness(
+    gathered: Gathered, named: Named, looks: tuple[Look, Look], seed: int
+) -> tuple[Comparison, dict[str, float]]:
+    """Differences of brightness on the floor, of a third of the frames, and the error without each effect.
+
+    Args:
+        gathered: The measured pictures.
+        named: The cameras that were fitted.
+        looks: Effects on pictures before and after.
+        seed: Of the bootstrap.
+
+    Returns:
+        The errors before and after, and by effect that was added the error without it over the error with all.
+    """
+    out = np.arange(named.full.views.count) % FOLDS == 0
+    plain, full = looks
+    added = [effect for effect in effects_of(tuple(full)) if effect not in effects_of(tuple(plain))]
+    without = [{name: value for name, value in full.items() if effect_of(name) != effect} for effect in added]
+    before = _grey_errors(gathered, named.declared, [plain], out, seed)[0]
+    after, *others = _grey_errors(gathered, named.model, [full, *without], out, seed)
+    ratios = {effect: one.value / max(after.value, 1e-9) for effect, one in zip(added, others, strict=True)}
+    return Comparison(before, after, None, "grey levels"), ratios
+
+
+def grey_differences(
+    measured: Pictures, drawn: Pictures, floor: NDArray[np.bool_], *, fixed_exposure: bool
+) -> Pictures:
+    """Absolute differences on the floor (n, floor pixels, 3) [grey levels].
+
+    Args:
+        measured: Pictures (n, rows, columns, 3).
+        drawn: The same as a model has them.
+        floor: Pixels that look at the floor (rows, columns).
+        fixed_exposure: Whether pictures compare as they are; else each at its own brightness, which no model knows.
+    """
+    measured, drawn = measured[:, floor], drawn[:, floor]
+    levels = 1.0 if fixed_exposure else _levels(measured, drawn)
+    return np.asarray(np.abs(measured - np.clip(drawn * levels, 0.0, 255.0)))
+
+
+def _grey_errors(
+    gathered: Gathered, fit: CameraFit, looks: Sequence[Look], out: NDArray[np.bool_], seed: int
+) -> list[PictureError]:
+    """Errors of frames left out (N,), by a camera that was fitted without them, for each look."""
+    views, frames = fit.views, np.flatnonzero(out)
+    state = fit_poses(views, fit_camera(views, fit.state, fit.names, SCALES, ~out).state, out)
+    measured, floor = gathered.pictures[frames].astype(np.float32), floor_pixels(fit)
+    counts, errors = np.full(len(frames), float(floor.sum())), []
+    for look in looks:
+        drawn = draw_pictures(views, state, look, frames)
+        differences = grey_differences(measured, drawn, floor, fixed_exposure=gathered.frames.fixed_exposure)
+        errors.append(error_over(differences.mean(axis=-1).sum(axis=1).astype(float), counts, seed))
+    return errors
+
+
+def _levels(measured: Pictures, drawn: Pictures) -> Pictures:
+    """How much brighter each frame was exposed than drawn (n, 1, 1), of pixels (n, pixels, 3)."""
+    ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
+    return np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)
+
+
+MATERIAL = 1.03
+"""An effect matters if the error on unseen frames is larger by this factor without it."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A camera with those effects alone that matter.
+
+    Attributes:
+        named: The fits; the model's without what was dropped.
+        with_dropped: The model as it was named, with what was dropped.
+        pixels: Errors on unseen frames, before and after.
+        ratios: Error without each effect over the error with all that were named, the dropped ones too.
+        nats: What leaving each of these out costs.
+        dropped: Effects that there is evidence for, and which hardly change the error.
+    """
+
+    named: Named
+    with_dropped: CameraFit
+    pixels: Comparison
+    ratios: Mapping[str, float]
+    nats: Mapping[str, float]
+    dropped: tuple[str, ...]
+
+
+class _Tested(NamedTuple):
+    """A fit with its residuals on frames that it is not made from (n,) [pixel]."""
+
+    fit: CameraFit
+    residuals: Floats
+
+
+def weigh_effects(named: Named, seed: int) -> Weighed:
+    """Weigh every effect that was named, and fit the camera again without those of no matter."""
+    views, cost = named.full.views, cost_of(named.model)
+    declared, model, full = (_test(fit) for fit in (named.declared, named.model, named.full))
+    without = {effect: _test(_fit_without(named, (effect,))) for effect in named.effects}
+    nats = {effect: cost_of(one.fit) - cost for effect, one in without.items()}
+    pairs = {effect: (one.residuals, model.residuals) for effect, one in without.items()}
+    ratios = {effect: displacement_ratio(views, pair, seed) for effect, pair in pairs.items()}
+    dropped = tuple(effect for effect in named.effects if ratios[effect] < MATERIAL)
+    kept = tuple(effect for effect in named.effects if effect not in dropped)
+    if dropped:
+        model = without[dropped[0]] if len(dropped) == 1 else _test(_fit_without(named, dropped))
+    pixels = compare_displacement(views, (declared.residuals, model.residuals, full.residuals), seed)
+    return Weighed(replace(named, model=model.fit, effects=kept), named.model, pixels, ratios, nats, dropped)
+
+
+def _test(fit: CameraFit) -> _Tested:
+    return _Tested(fit, unseen_residuals(fit.views, fit.state, fit.names))
+
+
+def _fit_without(named: Named, effects: Sequence[str]) -> CameraFit:
+    return fit_set(named.full, [one for one in effects_of(named.model.names) if one not in effects])

@@ -1,1 +1,0 @@
-"""Errors on frames that were not fitted."""

@@ -1,0 +1,287 @@
+"""Fitting a camera to edge points, with the tape, the whole map and every frame's pose as nuisances.
+
+Normal equations of edge points, with what is of no interest eliminated: every frame's pose, or other unknowns.
+How much a tracker scatters, from what fits of the camera add to its poses.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.arrays import Floats
+from proxytune.diagnosis.camera.edges import MAP_SCATTER, Tape, Views
+from proxytune.diagnosis.camera.model import (
+    Projection,
+    State,
+    camera_slopes,
+    map_slopes,
+    pose_slopes,
+    project,
+    tape_slopes,
+)
+
+EVIDENCE = 0.1
+"""Edge points of a picture are not independent: so much of a point's evidence counts."""
+
+LEAST_WEIGHT = 1e-4
+"""Edge points of less weight are left out of a fit: they would only cost time."""
+
+
+class Counted(NamedTuple):
+    """Edge points that count in a fit.
+
+    Attributes:
+        rows: Which (m,), in ascending order.
+        weight: Of each (m,), the share of its evidence that counts included.
+    """
+
+    rows: NDArray[np.intp]
+    weight: Floats
+
+
+def robust_weight(residual: Floats, scale_px: float) -> Floats:
+    """Weights of Geman and McClure's loss: 1 at zero, none far beyond the scale."""
+    return np.asarray(1.0 / (1.0 + (residual / scale_px) ** 2) ** 2)
+
+
+def count_points(
+    views: Views,
+    there: Projection,
+    scale_px: float,
+    frames: NDArray[np.bool_] | None = None,
+    least: float = LEAST_WEIGHT,
+) -> Counted:
+    """Weigh edge points by how far they lie from the map's markings.
+
+    Args:
+        views: Whose edge points these are.
+        there: Where they fall; those that are not valid have no weight.
+        scale_px: The loss' scale [pixel].
+        frames: Which frames count (N,); all if not given.
+        least: Points of less weight are left out.
+    """
+    valid = there.valid if frames is None else there.valid & frames[views.edges.frame]
+    weight = np.where(valid, robust_weight(there.residual, scale_px), 0.0)
+    rows = np.flatnonzero(weight >= least)
+    return Counted(rows, EVIDENCE * weight[rows])
+
+
+class Marginal(NamedTuple):
+    """Normal equations of the common columns with every frame's pose eliminated.
+
+    Attributes:
+        matrix: Of the common columns.
+        right: Their right side.
+        inverse: Of each pose's block (N, 3, 3).
+        coupling: How poses follow the common columns (N, 3, columns).
+        own: Where poses would go by themselves (N, 3).
+    """
+
+    matrix: Floats
+    right: Floats
+    inverse: Floats
+    coupling: Floats
+    own: Floats
+
+
+def eliminate_poses(views: Views, state: State, there: Projection, points: Counted, columns: Floats) -> Marginal:
+    """Normal equations of these columns (m, columns) of the points that count, poses eliminated under their prior."""
+    rows, weight = points
+    problem = Normal(columns, pose_slopes(there)[rows], there.residual[rows], weight)
+    return problem.marginal(views.edges.frame[rows], state.poses, views.pose_scatter)
+
+
+def eliminate(own: Floats, across: Floats, inner: Floats, other: Floats) -> Floats:
+    """What is left of normal equations for some unknowns with all others eliminated: the Schur complement.
+
+    Args:
+        own: Block or right side of the unknowns that are kept.
+        across: Their part with the others.
+        inner: Block of the others.
+        other: The others' part with those kept, or their right side.
+    """
+    return np.asarray(own - across @ np.linalg.solve(inner, other))
+
+
+class Normal(NamedTuple):
+    """A weighted linear problem: columns that all frames share, and three of each frame's own pose."""
+
+    columns: Floats
+    poses: Floats
+    residual: Floats
+    weight: Floats
+
+    def marginal(self, frame: NDArray[np.intp], corrections: Floats, scatter: Floats) -> Marginal:
+        """Eliminate every frame's pose under its prior.
+
+        Args:
+            frame: Of each row (n,), in ascending order.
+            corrections: What is added to each frame's tracked pose so far (N, 3).
+            scatter: Standard deviations of tracked poses (3,).
+        """
+        weighted = self.columns * self.weight[:, None]
+        matrix, right = weighted.T @ self.columns, weighted.T @ self.residual
+        count = len(corrections)
+        blocks, cross, pulls = self._by_frame(frame, count)
+        blocks[:, (0, 1, 2), (0, 1, 2)] += 1.0 / scatter**2
+        pulls += corrections / scatter**2
+        inverse = np.asarray(np.linalg.inv(blocks), dtype=float)
+        coupling = inverse @ cross
+        own_step = (inverse @ pulls[..., None])[..., 0]
+        flat = cross.reshape(3 * count, self.columns.shape[1])
+        matrix -= flat.T @ coupling.reshape(3 * count, self.columns.shape[1])
+        right -= flat.T @ own_step.ravel()
+        return Marginal(matrix, right, inverse, coupling, own_step)
+
+    def _by_frame(self, frame: NDArray[np.intp], count: int) -> tuple[Floats, Floats, Floats]:
+        """Each pose's block (count, 3, 3), its part with the common columns (count, 3, columns) and right side."""
+        first = np.searchsorted(frame, np.arange(count + 1))
+        blocks, cross = np.zeros((count, 3, 3)), np.zeros((count, 3, self.columns.shape[1]))
+        pulls = np.zeros((count, 3))
+        for number in range(count):
+            own = slice(first[number], first[number + 1])
+            slopes = self.poses[own] * self.weight[own, None]
+            blocks[number], cross[number] = slopes.T @ self.poses[own], slopes.T @ self.columns[own]
+            pulls[number] = slopes.T @ self.residual[own]
+        return blocks, cross, pulls
+
+
+SCALE_PX = 1.0
+"""Standard deviation of an edge point in the end; what is far beyond counts no more."""
+
+LARGEST_STEP = 0.75
+"""No parameter of the camera moves farther in one step, in spreads of it."""
+
+
+@dataclass(frozen=True)
+class CameraFit:
+    """A camera fitted to views.
+
+    Attributes:
+        views: What it was fitted to.
+        names: Parameters that were free, by name in θ.
+        state: All values.
+        information: What the views say of the free parameters, tape, map and poses left open (names, names).
+        tape_sd: Standard deviations of the tape's errors [m].
+        offset_sd: Standard deviations of the map's offset (3,).
+        pose_sd: Standard deviations of what is added to poses (N, 3).
+    """
+
+    views: Views
+    names: tuple[str, ...]
+    state: State
+    information: Floats
+    tape_sd: Floats
+    offset_sd: Floats
+    pose_sd: Floats
+
+    @property
+    def theta(self) -> Mapping[str, float]:
+        """Values of the camera, by name in θ."""
+        return self.state.theta
+
+    @property
+    def sd(self) -> Floats:
+        """Standard deviations of the free parameters (names,)."""
+        return np.sqrt(np.diag(np.linalg.inv(self.information + np.diag(_precisions(self.views, self.names)))))
+
+
+class _Step(NamedTuple):
+    """A linear step with all that it came from: the columns are camera, map, tape."""
+
+    common: Floats
+    poses: Floats
+    matrix: Floats
+    pose_sd: Floats
+
+
+def fit_camera(
+    views: Views,
+    state: State,
+    names: Sequence[str],
+    scales_px: Sequence[float],
+    frames: NDArray[np.bool_] | None = None,
+) -> CameraFit:
+    """Fit by Gauss–Newton with a redescending loss.
+
+    Args:
+        views: Edge points.
+        state: Where to begin.
+        names: Free parameters by name in θ; those not named stay where they are.
+        scales_px: The loss' scale in each step, large ones first where the beginning is far off [pixel].
+        frames: Which frames count (N,); all if not given.
+    """
+    names = tuple(names)
+    for scale in scales_px:
+        there = project(views, state)
+        step = _solve(views, state, names, there, count_points(views, there, scale, frames))
+        state = _moved(views, state, names, step)
+    return _fit_of(views, names, state, step)
+
+
+def _solve(views: Views, state: State, names: tuple[str, ...], there: Projection, points: Counted) -> _Step:
+    columns = common_slopes(views, state, there, names)[points.rows]
+    matrix, right, inverse, coupling, own = eliminate_poses(views, state, there, points, columns)
+    precision, pull = _priors(views, state, names)
+    matrix[np.diag_indices_from(matrix)] += precision
+    common = np.asarray(-np.linalg.solve(matrix, right + pull), dtype=float)
+    poses = -own - np.einsum("fij,j->fi", coupling, common)
+    return _Step(common, poses, matrix, np.sqrt(np.diagonal(inverse, axis1=1, axis2=2)))
+
+
+def common_slopes(views: Views, state: State, there: Projection, names: tuple[str, ...]) -> Floats:
+    """How residuals change with camera, map and tape (n, names + 3 + tape)."""
+    first = len(names) + 3
+    columns = np.zeros((len(there.residual), first + Tape(views.markings.stretches).size))
+    columns[:, : len(names)] = camera_slopes(views, state, there, names)
+    columns[:, len(names) : first] = map_slopes(views, state, there)
+    rows = np.arange(len(columns))
+    for place, slope in tape_slopes(views, there):
+        columns[rows, first + place] += slope
+    return columns
+
+
+def _precisions(views: Views, names: tuple[str, ...]) -> Floats:
+    return np.array([views.optics.spread(name) ** -2.0 for name in names])
+
+
+def _priors(views: Views, state: State, names: tuple[str, ...]) -> tuple[Floats, Floats]:
+    """Precision of each common column, and its pull to where it is expected."""
+    precision = np.concatenate((_precisions(views, names), MAP_SCATTER**-2.0, views.tape_scatter**-2.0))
+    off = np.array([state.theta[name] - views.optics.neutral(name) for name in names])
+    return precision, precision * np.concatenate((off, state.offset, state.tape))
+
+
+def _moved(views: Views, state: State, names: tuple[str, ...], step: _Step) -> State:
+    theta = dict(state.theta)
+    for name, by in zip(names, step.common, strict=False):
+        most = LARGEST_STEP * views.optics.spread(name)
+        theta[name] = views.optics.clipped(name, theta[name] + float(np.clip(by, -most, most)))
+    first = len(names)
+    offset, tape = state.offset + step.common[first : first + 3], state.tape + step.common[first + 3 :]
+    return replace(state, theta=theta, offset=offset, tape=tape, poses=state.poses + step.poses)
+
+
+def _fit_of(views: Views, names: tuple[str, ...], state: State, step: _Step) -> CameraFit:
+    camera, rest = slice(len(names)), slice(len(names), None)
+    matrix = step.matrix
+    across = matrix[camera, rest]
+    information = eliminate(matrix[camera, camera], across, matrix[rest, rest], across.T)
+    sd = np.sqrt(np.diag(np.linalg.inv(matrix)))[len(names) :]
+    return CameraFit(
+        views, names, state, information - np.diag(_precisions(views, names)), sd[3:], sd[:3], step.pose_sd
+    )
+
+
+PASSES = 4
+"""The scatter is estimated so many times over, each with poses fitted under the one before."""
+
+
+def pose_scatter(fit: CameraFit) -> tuple[float, float]:
+    """Standard deviations of places [m] and headings [rad], as expectation maximisation has them."""
+    squares = fit.state.poses**2 + fit.pose_sd**2
+    place, turn = float(np.sqrt(squares[:, :2].mean())), float(np.sqrt(squares[:, 2].mean()))
+    return place, turn

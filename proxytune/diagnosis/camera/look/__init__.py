@@ -1,1 +1,0 @@
-"""Brightness, sharpness, noise and blemishes of pictures."""

@@ -1,1 +1,0 @@
-"""What frames show, and where they were taken."""

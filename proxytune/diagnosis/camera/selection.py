@@ -1,0 +1,415 @@
+"""Naming what a camera lacks: fit everything, find the fewest effects that do as well, and fit those.
+
+Which camera effects are needed: the fewest whose fit is no worse than with all of them free.
+Whether anything fixed to the camera is left over: a smooth field of displacements over the picture.
+Whether frames, poses and map belong together; if not, what is wrong with them.
+What frames cannot show of a camera, what cannot be told apart, and what to take next.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.arrays import Floats
+from proxytune.diagnosis.camera.edges import LATENCY, MAP_SCATTER, MOVING, READOUT, Edges, Views, effects_of
+from proxytune.diagnosis.camera.fitting import (
+    EVIDENCE,
+    PASSES,
+    SCALE_PX,
+    CameraFit,
+    common_slopes,
+    count_points,
+    eliminate,
+    eliminate_poses,
+    fit_camera,
+    pose_scatter,
+)
+from proxytune.diagnosis.camera.model import Projection, neutral_state, project
+from proxytune.effects import effect_of
+from proxytune.errors import LogError
+
+LEAST_NATS = 6.0
+"""An effect is needed if leaving it out costs more evidence; by chance one in 2000 does."""
+
+MOST = 4
+"""No more than so many effects are named at once; a camera with more faults is better calibrated anew."""
+
+TRIED = 3
+"""So many sets of equal size are fitted, those that promise most."""
+
+
+@dataclass(frozen=True)
+class Subset:
+    """A set of effects.
+
+    Attributes:
+        effects: Those besides what is declared.
+        loss: What leaving all others out costs, at the least [nats].
+    """
+
+    effects: tuple[str, ...]
+    loss: float
+
+
+def rank_subsets(full: CameraFit, declared: Sequence[str], size: int) -> list[Subset]:
+    """Sets of so many effects besides those declared, the best first.
+
+    The loss is the quadratic form about the fit with everything free: exact where the camera is near its neutral
+    values, and cheap enough for every set.
+    """
+    others = [effect for effect in effects_of(full.names) if effect not in declared]
+    sets = [Subset(chosen, _loss(full, (*declared, *chosen))) for chosen in combinations(others, size)]
+    return sorted(sets, key=lambda one: one.loss)
+
+
+def _loss(full: CameraFit, effects: Sequence[str]) -> float:
+    """What is lost if only these effects' parameters may differ from their neutral values [nats]."""
+    kept = np.array([effect_of(name) in effects for name in full.names])
+    if kept.all():
+        return 0.0
+    off = np.array([full.theta[name] - full.views.optics.neutral(name) for name in full.names])[~kept]
+    matrix = full.information
+    across, inner = matrix[np.ix_(~kept, kept)], matrix[np.ix_(kept, kept)]
+    left = matrix[np.ix_(~kept, ~kept)]
+    if kept.any():
+        left = eliminate(left, across, inner + 1e-9 * np.diag(np.diag(inner)), across.T)
+    return float(0.5 * off @ left @ off)
+
+
+FIRST = ("camera_pitch", "camera_roll", "camera_yaw", "camera_height", "field_of_view", "camera_latency")
+"""What is fitted first, from far away: nothing of it stands in for something else."""
+
+FAR = tuple(16.0 * SCALE_PX * 2.0 ** (-step / 2.0) for step in range(7))
+NEAR = (3.0 * SCALE_PX, 2.0 * SCALE_PX, *(SCALE_PX,) * 4)
+AGAIN = (SCALE_PX,) * 2
+FROM_ALL = (4.0 * SCALE_PX, 2.0 * SCALE_PX, *(SCALE_PX,) * 5)
+"""Scales of the loss: from far, near the answer, once more, and from the answer of all effects together [pixel]."""
+
+LEAST_SHARE = 0.01
+"""Effects whose absence costs a smaller share of all cost are not needed either."""
+
+RIVAL_NATS = 3.0
+"""Sets of effects that cost no more beyond the best are its rivals."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """What a camera was found to be.
+
+    Attributes:
+        declared: With the declared effects alone.
+        model: With those that are needed besides.
+        full: With every effect of the catalogue.
+        effects: Needed besides those declared.
+        losses: Of the best set of each size that was tried, all effects together being 0 [nats].
+        alone: What each effect explains by itself beyond what is declared [nats].
+        rivals: Other sets of as many effects that do as well.
+    """
+
+    declared: CameraFit
+    model: CameraFit
+    full: CameraFit
+    effects: tuple[str, ...]
+    losses: tuple[Subset, ...]
+    alone: tuple[Subset, ...]
+    rivals: tuple[tuple[str, ...], ...]
+
+
+def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float], *, learn_scatter: bool) -> CameraFit:
+    """Fit all parameters from far away.
+
+    Args:
+        views: What is fitted to; its pose scatter is replaced by what is found where that is to be learnt.
+        names: All parameters that may differ from neutral, by name in θ.
+        fixed: Values that are known.
+        learn_scatter: Whether the tracker's scatter is not known.
+    """
+    theta = {name: views.optics.neutral(name) for name in (*views.optics.mounting, *MOVING)} | dict(fixed)
+    start = neutral_state(views, theta)
+    # From far away an edge may be taken for another: the tape must not follow it
+    fit = fit_camera(replace(views, tape_m=0.0), start, [name for name in names if name in FIRST], FAR)
+    fit = fit_camera(views, fit.state, names, NEAR)
+    for _ in range(PASSES if learn_scatter else 0):
+        fit = fit_camera(views.with_scatter(*pose_scatter(fit)), fit.state, names, AGAIN)
+    return fit
+
+
+def name_camera_effects(full: CameraFit, declared: Sequence[str]) -> Named:
+    """Find the fewest effects besides those declared that explain what all together do."""
+    least = cost_of(full)
+    enough = max(LEAST_NATS, LEAST_SHARE * least)
+    best: list[tuple[Subset, CameraFit]] = []
+    rivals: list[Subset] = []
+    for size in range(MOST + 1):
+        sets = rank_subsets(full, declared, size)[:TRIED]
+        if not sets:
+            break
+        fits = sorted((_fitted(full, least, declared, one) for one in sets), key=lambda pair: pair[0].loss)
+        best.append(fits[0])
+        rivals = [one for one, _ in fits[1:] if one.loss <= fits[0][0].loss + RIVAL_NATS]
+        if fits[0][0].loss <= enough:
+            break
+    subset, model = best[-1]
+    losses, others = tuple(one for one, _ in best), tuple(one.effects for one in rivals)
+    return Named(best[0][1], model, full, subset.effects, losses, tuple(rank_subsets(full, declared, 1)), others)
+
+
+def cost_of(fit: CameraFit) -> float:
+    """Cost of a fit: that of its edge points, as the loss has it, and of what is added to poses and tape [nats]."""
+    there = project(fit.views, fit.state)
+    squares = (there.residual / SCALE_PX) ** 2
+    points = np.where(there.valid, squares / (1.0 + squares), 1.0)[there.near].sum()
+    poses = ((fit.state.poses / fit.views.pose_scatter) ** 2).sum()
+    tape = ((fit.state.tape / fit.views.tape_scatter) ** 2).sum()
+    return float(0.5 * (EVIDENCE * points + poses + tape))
+
+
+def fit_set(full: CameraFit, effects: Sequence[str]) -> CameraFit:
+    """The camera with the parameters of these effects alone, from where all together have them."""
+    names = [name for name in full.names if effect_of(name) in effects]
+    optics = full.views.optics
+    theta = {name: optics.neutral(name) if name in full.names else value for name, value in full.theta.items()}
+    state = replace(full.state, theta={**theta, **{name: full.theta[name] for name in names}})
+    return fit_camera(full.views, state, names, FROM_ALL)
+
+
+def _fitted(full: CameraFit, least: float, declared: Sequence[str], subset: Subset) -> tuple[Subset, CameraFit]:
+    """A set fitted, with what it really costs beyond the full fit where that is less than promised."""
+    fit = fit_set(full, (*declared, *subset.effects))
+    return Subset(subset.effects, min(subset.loss, cost_of(fit) - least)), fit
+
+
+POWERS = tuple((right, down) for right in range(4) for down in range(4) if right + down <= 3)
+"""The terms of a cubic polynomial of the place in the picture."""
+
+FIELD_PX = 1.0
+"""Standard deviation that each term's coefficient is expected to have [pixel]."""
+
+FIELD_NATS = 2.5
+"""A field that explains less on frames that it was not fitted to is chance."""
+
+FIELD_SHARE = 0.035
+"""A field that explains a smaller share of the cost is of no matter."""
+
+LEAST_PX = 0.1
+"""A smaller field is of no matter either [pixel, root mean square over the points]."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """A field of displacements that a fitted camera leaves over.
+
+    Attributes:
+        nats: What it explains on frames that it was not fitted to.
+        share: The same as a share of those frames' cost.
+        rms_px: Root mean square over the edge points [pixel].
+        field: Coefficients of POWERS to the right and down (terms, 2) [pixel].
+    """
+
+    nats: float
+    share: float
+    rms_px: float
+    field: Floats
+
+    @property
+    def open(self) -> bool:
+        """Whether something fixed to the camera is left over."""
+        return self.nats > FIELD_NATS and self.share > FIELD_SHARE and self.rms_px > LEAST_PX
+
+    def displacement(self, right: Floats, down: Floats) -> Floats:
+        """How far the model has markings from where they lie [pixel], at places from −1 to 1 across the picture."""
+        return _terms(right, down) @ self.field
+
+
+def find_leftover(fit: CameraFit) -> Leftover:
+    """Fit the field to one half of the frames and test it on the other, both ways.
+
+    What the free parameters, the tape, the map and the poses could explain is left to them.
+    """
+    there = project(fit.views, fit.state)
+    halves = [np.arange(fit.views.count) % 2 == part for part in (0, 1)]
+    systems = [_system(fit, there, half) for half in halves]
+    ridge = np.eye(len(systems[0][1])) / FIELD_PX**2
+    fields = [np.asarray(-np.linalg.solve(matrix + ridge, right), dtype=float) for matrix, right, _ in systems]
+    gains = [_gain(fields[1 - part], *systems[part][:2]) for part in (0, 1)]
+    cost = sum(system[2] for system in systems)
+    field = np.mean(fields, axis=0).reshape(2, -1).T
+    moved = _terms(*_places(fit.views))[there.valid] @ field
+    rms = float(np.sqrt((moved**2).sum(axis=1).mean())) if len(moved) else 0.0
+    return Leftover(float(sum(gains)), float(sum(gains) / max(cost, 1e-9)), rms, field)
+
+
+def _gain(field: Floats, matrix: Floats, right: Floats) -> float:
+    return float(-(right @ field + 0.5 * field @ matrix @ field))
+
+
+def _system(fit: CameraFit, there: Projection, half: NDArray[np.bool_]) -> tuple[Floats, Floats, float]:
+    """Normal equations of the field on some frames, all else eliminated, and those frames' cost [nats]."""
+    views, names = fit.views, fit.names
+    points = count_points(views, there, SCALE_PX, half)
+    terms, normal = _terms(*_places(views))[points.rows], views.edges.normal[points.rows]
+    field = np.concatenate((normal[:, :1] * terms, normal[:, 1:] * terms), axis=1)
+    columns = np.concatenate((field, common_slopes(views, fit.state, there, names)[points.rows]), axis=1)
+    matrix, right, *_ = eliminate_poses(views, fit.state, there, points, columns)
+    own, rest = slice(field.shape[1]), slice(field.shape[1], None)
+    precision = np.concatenate((np.full(len(names), 1e-9), MAP_SCATTER**-2.0, views.tape_scatter**-2.0))
+    pull = precision * np.concatenate((np.zeros(len(names)), fit.state.offset, fit.state.tape))
+    across, inner = matrix[own, rest], matrix[rest, rest] + np.diag(precision)
+    cost = 0.5 * float((points.weight * there.residual[points.rows] ** 2).sum())
+    return (
+        eliminate(matrix[own, own], across, inner, matrix[rest, own]),
+        eliminate(right[own], across, inner, right[rest] + pull),
+        cost,
+    )
+
+
+def _places(views: Views) -> tuple[Floats, Floats]:
+    """Places of the edge points from −1 to 1 across and down the picture."""
+    optics = views.optics
+    return 2.0 * views.edges.column / optics.columns - 1.0, 2.0 * views.edges.row / optics.rows - 1.0
+
+
+def _terms(right: Floats, down: Floats) -> Floats:
+    return np.stack([right**one * down**other for one, other in POWERS], axis=-1)
+
+
+MATCHED_PX = 2.0
+"""An edge that lies no farther from the map's is matched."""
+
+FEWEST_MATCHED = 0.2
+"""Frames of which a smaller share of edges is matched do not belong to these poses, or to this map."""
+
+USUAL_MATCHED = 0.6
+"""A smaller share is told."""
+
+LIKELY = 0.4
+"""A mistake that, undone, brings this share to the map is the cause where hardly any match as they are."""
+
+ADVICE = (
+    "check that frames and rows are the same instants, the map is the right one, heading is counter-clockwise in "
+    "radians, and the pictures are not mirrored"
+)
+
+
+def matched_share(fit: CameraFit) -> float:
+    """Share of edge points near markings that lie on the map's, as the fit has them."""
+    there = project(fit.views, fit.state)
+    matched = there.valid & (np.abs(there.residual) < MATCHED_PX)
+    return float(matched.sum() / max(int(there.near.sum()), 1))
+
+
+def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
+    """What is to be said of frames that match poorly; nothing where they match as usual.
+
+    Raises:
+        LogError: If they do not belong to the poses, with what would make them, where that is found.
+    """
+    share = matched_share(fit)
+    if share >= USUAL_MATCHED:
+        return ()
+    causes = {cause: _share_if(fit.views, change) for cause, change in MISTAKES.items()}
+    likely = max(causes, key=causes.__getitem__)
+    problem = f"{name}: frames do not fit the poses: {100 * share:.0f} % of the markings' edges match at best"
+    if causes[likely] > max(2.0 * share, LIKELY if share < FEWEST_MATCHED else USUAL_MATCHED):
+        raise LogError(f"{problem}; {100 * causes[likely]:.0f} % match if {likely}; correct that")
+    if share < FEWEST_MATCHED:
+        raise LogError(f"{problem}; {ADVICE}")
+    usual = f"{100 * USUAL_MATCHED:.0f} % or more is usual"
+    return (f"{100 * share:.0f} % of the markings' edges match ({usual}): poses or map are off by centimetres",)
+
+
+def _share_if(views: Views, change: Callable[[Views], Views]) -> float:
+    changed = change(views)
+    optics = changed.optics
+    start = neutral_state(changed, {name: optics.neutral(name) for name in optics.mounting})
+    return matched_share(fit_camera(changed, start, [name for name in FIRST if name in optics.mounting], FAR))
+
+
+def _turned_pictures(right: bool, down: bool) -> Callable[[Views], Views]:
+    """Pictures mirrored left to right, top to bottom, or both."""
+
+    def turn(views: Views) -> Views:
+        edges, optics = views.edges, views.optics
+        column = optics.columns - edges.column if right else edges.column
+        row = optics.rows - edges.row if down else edges.row
+        signs = np.array((-1.0 if right else 1.0, -1.0 if down else 1.0))
+        return replace(views, edges=Edges(edges.frame, edges.white, column, row, edges.normal * signs))
+
+    return turn
+
+
+def _posed(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Views], Views]:
+    """Poses written another way."""
+    return lambda views: replace(views, tracks=replace(views.tracks, poses=change(views.tracks.poses)))
+
+
+MISTAKES: Mapping[str, Callable[[Views], Views]] = MappingProxyType(
+    {
+        "the pictures are mirrored": _turned_pictures(True, False),
+        "the pictures are upside down": _turned_pictures(True, True),
+        "heading is clockwise": _posed(lambda poses: poses * (1.0, 1.0, -1.0)),
+        "headings are in degrees": _posed(lambda poses: poses * (1.0, 1.0, np.radians(1.0))),
+        "x and y are swapped": _posed(lambda poses: poses[:, (1, 0, 2)]),
+        "each frame belongs to the next row": _posed(lambda poses: np.roll(poses, -1, axis=0)),
+        "each frame belongs to the row before": _posed(lambda poses: np.roll(poses, 1, axis=0)),
+    }
+)
+"""Usual mistakes in logs, and what undoes each."""
+
+
+ALWAYS: Mapping[str, str] = MappingProxyType(
+    {"camera_yaw": "heading_offset", "camera_forward": "marker_offset", LATENCY: "clock offset"}
+)
+"""Effects of the tracker that frames cannot tell from one of the camera."""
+
+
+def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
+    """Geometric effects that these frames could not have shown at their smallest usual size.
+
+    Args:
+        full: The fit with every effect.
+        model: Effects of the model, beside which another one would have to show.
+    """
+    hidden = [] if full.views.tracks.moving else list(MOVING)
+    kept = [name for name in full.names if effect_of(name) in model]
+    for name in full.names:
+        if name not in kept and 2.0 * _sd_beside(full, kept, name) > _smallest(full, name):
+            hidden.append(name)
+    return effects_of(tuple(hidden))
+
+
+def _sd_beside(full: CameraFit, kept: Sequence[str], name: str) -> float:
+    """Standard deviation of a parameter if it is free beside those kept."""
+    chosen = [full.names.index(one) for one in (*kept, name)]
+    matrix = full.information[np.ix_(chosen, chosen)]
+    return float(np.sqrt(np.linalg.pinv(matrix, rcond=1e-12)[-1, -1])) if matrix[-1, -1] > 0.0 else float("inf")
+
+
+def _smallest(full: CameraFit, name: str) -> float:
+    """How far the nearest probe lies from the neutral value."""
+    parameter = full.views.optics.robot.catalogue.parameters[name]
+    neutral = full.views.optics.neutral(name)
+    return min((abs(probe - neutral) for probe in parameter.probes if probe != neutral), default=parameter.high)
+
+
+def next_views(hidden: Sequence[str], *, repeated: bool) -> tuple[str, ...]:
+    """What to take to see what was hidden.
+
+    Args:
+        hidden: Effects that could not be seen.
+        repeated: Whether some frames were taken standing still at one place.
+    """
+    views = []
+    if {LATENCY, READOUT, "blur"} & set(hidden):
+        views.append("frames while driving bends at 0.3 m/s and more, for what shows in motion alone")
+    if {"camera_height", "camera_forward", "field_of_view", "pixel_aspect", "lens_centre"} & set(hidden):
+        views.append("frames with markings nearer than 0.4 m and others far ahead, on straights and in bends")
+    if {"camera_yaw", "camera_roll"} & set(hidden):
+        views.append("frames from both lanes, driven both ways round")
+    if "image_noise" in hidden and not repeated:
+        views.append("ten frames standing still at one place, for the noise")
+    return tuple(views)

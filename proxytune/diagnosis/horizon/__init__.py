@@ -1,1 +1,0 @@
-"""Prediction over windows: errors, floor, repeats, and parameters polished on them."""

@@ -1,1 +1,0 @@
-"""A log as a diagnosis takes it: drives, their clocks, and which of them are kept aside."""

@@ -1,0 +1,457 @@
+"""Whether commands and poses share one clock, and drives put right where they do not.
+
+Motion before its command is proof of two clocks; so is motion so late that no delay accounts for it, a drive that
+answers at another time than the others, and a drive that changes its time to answer in the middle. A constant offset
+that leaves a latency which a delay may have is no proof: delay and offset are one number.
+
+Drives cut at long rests: an hour of standing says nothing of motion, and costs as much as an hour of driving.
+Long drives made short enough to fit in seconds: increments are joined, and blocks are shortened.
+Which drives are fitted and which are kept to test on, and the blocks that are left out in turn.
+"""
+
+import math
+import operator
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, gather, number_of
+from proxytune.diagnosis.motion.latency import (
+    LATENCY_BLOCK_S,
+    LEAST_APART_S,
+    STEP_S,
+    SURE,
+    Blocks,
+    Jump,
+    Latency,
+    Reaction,
+    Speeds,
+    blocks_within,
+    deviants,
+    likeliest_latency,
+    measured_speeds,
+    reaction,
+    reaction_at,
+    squares_by_latency,
+    stretches,
+    sum_in_blocks,
+)
+from proxytune.driving import Robot
+from proxytune.effects import PARAMETERS
+from proxytune.errors import LogError
+from proxytune.logs import Log, LogEpisode, Measured
+
+FURTHEST_S = 10.0
+"""Clocks are looked for up to so far apart."""
+
+EARLIEST_S = 0.02
+"""Motion must come so long before its command to be proof."""
+
+ASSUMED_DELAY_S = 0.05
+"""The delay that is left to a robot whose nominal delay nobody states, once an offset is taken out."""
+
+RARE = 0.25
+"""Clocks of no more than this share of the drives jump, or are others."""
+
+PROOF_BLOCK_S = 5.0
+"""Two latencies are compared over such blocks."""
+
+
+class Offset(NamedTuple):
+    """How much later poses are stamped than commands, with a 95 % interval [s]."""
+
+    value: float
+    interval: tuple[float, float]
+
+
+NONE = Offset(0.0, (0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Clocks:
+    """What a log says of the clocks of its commands and poses.
+
+    Attributes:
+        latency: From command to motion, beyond the motors' lag, drives of another clock apart [s].
+        offset: How much later poses are stamped, if the latency is proof of two clocks: what the latency has besides
+            the assumed delay; 0 where it is none.
+        assumed_delay_s: The delay that the robot is left with where an offset is taken out [s].
+        drives: Drives with another clock than the rest: how much later their poses are stamped than those [s].
+        jumps: Clocks that jump within a drive, of which the longest stretch is kept.
+        later_s: How much later the poses of each drive are put (E,) [s].
+        kept_s: From when to when each drive is used (E, 2) [s after its beginning].
+        declared_s: How much later poses are stamped, as log.toml declares; that was taken out beforehand [s], or None.
+    """
+
+    latency: Offset
+    offset: Offset
+    assumed_delay_s: float
+    drives: dict[str, Offset]
+    jumps: tuple[Jump, ...]
+    later_s: Floats
+    kept_s: Floats
+    declared_s: float | None = None
+
+    @property
+    def left_s(self) -> float:
+        """The latency that is left once the offset is taken out [s]."""
+        return self.latency.value - self.offset.value
+
+    @property
+    def differ(self) -> bool:
+        """Whether any clock differs from another."""
+        return bool(self.offset.value or self.drives or self.jumps)
+
+
+def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
+    """Measure the latency of every drive of a log.
+
+    Args:
+        log: The log.
+        robot: What drove.
+        like: Clocks of another log of the same robot: where the latency differs from what is left of that one, the
+            clocks do too.
+
+    Raises:
+        LogError: If there is nothing to compare in the log.
+    """
+    drives = gather(log, robot, log.episodes)
+    speeds = measured_speeds(drives)
+    if not len(speeds.first):
+        return replace(_one_clock(len(log.episodes)), declared_s=log.clock_offset_s)
+    squares, latencies, apart = _squares(log, drives, speeds)
+    kept, jumps = stretches(log, squares, latencies)
+    varied = not _is_rare(len({jump.drive for jump in jumps}), len(log.episodes))
+    if varied:
+        kept, jumps = [(0.0, np.inf)] * len(log.episodes), ()
+    own = [squares.squares[blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
+    common, others = deviants(own, latencies)
+    others = {} if varied or not _is_rare(len(others), len(log.episodes)) else others
+    latency = likeliest_latency(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
+    assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
+    unlike = like is not None and abs(latency.value - assumed) > max(LEAST_APART_S, SURE * latency.deviation)
+    taken = log.fit_clock_offset or unlike or (apart and _is_impossible(latency))
+    later = np.full(len(own), assumed - latency.value if taken else 0.0)
+    for e, one in others.items():
+        later[e] -= one.value - common
+    return Clocks(
+        latency=_offset(latency, 0.0),
+        offset=_offset(latency, assumed) if taken else NONE,
+        assumed_delay_s=assumed,
+        drives={log.episodes[e].name: _offset(one, common) for e, one in others.items()},
+        jumps=jumps,
+        later_s=later,
+        kept_s=np.array(kept, dtype=float),
+        declared_s=log.clock_offset_s,
+    )
+
+
+def _is_rare(count: int, drives: int) -> bool:
+    """Whether so few drives are odd that it may be their clocks.
+
+    A robot whose lag is another in every manoeuvre, as one that ramps its duties, has many.
+    """
+    return count <= max(1.0, RARE * drives)
+
+
+def _one_clock(episodes: int) -> Clocks:
+    """The clocks of drives too short to tell: taken as one."""
+    kept = np.tile((0.0, np.inf), (episodes, 1))
+    return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), np.zeros(episodes), kept)
+
+
+def _squares(log: Log, drives: Drives, speeds: Speeds) -> tuple[Blocks, Floats, bool]:
+    """What the best reaction leaves of blocks, the latencies that is given at, and whether its own is impossible."""
+    best, apart = _reaction(drives, speeds)
+    latencies = best.latency_s + _grid(_reach(drives))
+    ends = np.array([len(e.times) for e in log.episodes]) * round(drives.tick_hz / log.rate_hz)
+    squares = squares_by_latency(drives, speeds, best, latencies, ends)
+    return Blocks(*sum_in_blocks(LATENCY_BLOCK_S, drives, speeds, squares)), latencies, apart
+
+
+def _grid(reach_s: float) -> Floats:
+    count = int(reach_s / STEP_S)
+    return np.arange(-count, count + 1) * STEP_S
+
+
+def _reach(drives: Drives) -> float:
+    """How far apart clocks are looked for: no further than drives are long."""
+    return float(np.clip(drives.last.max() / drives.tick_hz / 3.0, 0.5, FURTHEST_S))
+
+
+def _offset(latency: Latency, besides: float) -> Offset:
+    middle, half = latency.value - besides, min(1.96 * latency.deviation, FURTHEST_S)
+    return Offset(middle, (middle - half, middle + half))
+
+
+def _is_impossible(latency: Latency) -> bool:
+    """Whether no delay accounts for this latency."""
+    half = 1.96 * latency.deviation
+    early = latency.value + half < 0.0 and latency.value < -EARLIEST_S
+    return early or latency.value - half > PARAMETERS["delay"].high
+
+
+def _reaction(drives: Drives, speeds: Speeds) -> tuple[Reaction, bool]:
+    """The best reaction; with a latency that no delay has only if that is clearly better, and whether it is."""
+    most = PARAMETERS["delay"].high
+    free = reaction(drives, speeds, _reach(drives))
+    if 0.0 <= free.latency_s <= most:
+        return free, False
+    usual = min((reaction_at(drives, speeds, end) for end in (0.0, most)), key=lambda one: one.squares.sum())
+    _, _, better = sum_in_blocks(PROOF_BLOCK_S, drives, speeds, usual.squares - free.squares)
+    sure = better.sum() > SURE * np.sqrt(len(better)) * better.std()
+    return (free, True) if sure else (usual, False)
+
+
+def put_in_step(drives: Drives, clocks: Clocks, episodes: Sequence[int]) -> Drives:
+    """Put drives on one clock: poses later, jumping stretches left out.
+
+    Poses move by whole ticks, and commands by the fraction of a tick that is left.
+
+    Args:
+        drives: The drives.
+        clocks: Those of their log.
+        episodes: Which of the log's episodes they are (E,).
+    """
+    later = clocks.later_s[list(episodes)] * drives.tick_hz
+    ticks = np.ceil(later - 1e-9).astype(int)
+    begin, end = (clocks.kept_s[list(episodes)] * drives.tick_hz).T
+    own = drives.episode
+    inside = (drives.first >= begin[own]) & (drives.last <= end[own]) & (drives.first + ticks[own] >= 0)
+    if not later.any():
+        return drives if inside.all() else drives.only(inside)
+    longer = max(0, int(ticks.max()))
+    fraction = (ticks - later)[:, None, None]
+    duties = _lengthen(drives.duties, longer)
+    before = np.concatenate((drives.rest[:, None], duties[:, :-1]), axis=1)
+    at = np.arange(duties.shape[1])
+    known = np.arange(drives.headings.shape[1])
+    moved = replace(
+        drives,
+        duties=(1.0 - fraction) * duties + fraction * before,
+        issued=np.pad(drives.issued, ((0, 0), (0, longer))),
+        headings=np.stack([np.interp(at - k, known, row) for k, row in zip(ticks, drives.headings, strict=True)]),
+        first=drives.first + ticks[own],
+        last=drives.last + ticks[own],
+        wheels=None if drives.wheels is None else _lengthen(drives.wheels, longer),
+    )
+    return moved.only(inside)
+
+
+def _lengthen(signal: Floats, ticks: int) -> Floats:
+    return np.concatenate((signal, np.repeat(signal[:, -1:], ticks, axis=1)), axis=1)
+
+
+LONGEST_S = 20.0
+"""Rests are cut out if they last longer."""
+
+BEFORE_S, AFTER_S = 1.0, 3.0
+"""So much of a rest is kept before the next command and after the last one: the robot comes to a stop in it."""
+
+REST = 1e-3
+"""A command below this share of the largest is none."""
+
+
+def cut_out_long_rests(log: Log) -> Log:
+    """Cut a log at its long rests into drives of their own; the same log where there are none."""
+    if log.command == "none":
+        return log
+    pieces = tuple(piece for episode in log.episodes for piece in _pieces(episode, log.rate_hz))
+    whole = len(pieces) == len(log.episodes) and all(map(operator.is_, pieces, log.episodes))
+    return log if whole else replace(log, episodes=pieces)
+
+
+def _pieces(episode: LogEpisode, rate_hz: float) -> tuple[LogEpisode, ...]:
+    size = np.abs(episode.held).max(axis=1)
+    moving = np.flatnonzero(size > REST * size.max())
+    if not len(moving):
+        return (episode,)
+    most, rows = LONGEST_S * rate_hz, len(episode.times)
+    ends = np.flatnonzero(np.diff(moving) > most)
+    begins = [int(row - BEFORE_S * rate_hz) for row in moving[[0, *(ends + 1)]]]
+    stops = [int(row + AFTER_S * rate_hz) + 1 for row in moving[[*ends, -1]]]
+    begins[0] = begins[0] if moving[0] > most else 0
+    stops[-1] = stops[-1] if rows - 1 - moving[-1] > most else rows
+    if (begins, stops) == ([0], [rows]):
+        return (episode,)
+    return tuple(_piece(episode, begin, stop) for begin, stop in zip(begins, stops, strict=True))
+
+
+def _piece(episode: LogEpisode, begin: int, stop: int) -> LogEpisode:
+    """Rows of an episode, with the commands that are in force in them."""
+    times = episode.times[begin:stop]
+    issued, commands = episode.issued, episode.commands[begin:stop]
+    if issued is not None:
+        first = max(0, int(np.searchsorted(issued, times[0] + 1e-9, side="right")) - 1)
+        chosen = slice(first, int(np.searchsorted(issued, times[-1], side="right")))
+        issued, commands = issued[chosen], episode.commands[chosen]
+    wheels: Floats | None = None if episode.wheels is None else episode.wheels[begin:stop]
+    name = f"{episode.name} from {times[0]:.0f} s"
+    poses, measured = episode.poses[begin:stop], _cut(episode.measured, begin, stop)
+    return LogEpisode(name, times, commands, poses, wheels, issued, measured)
+
+
+def _cut(measured: Measured | None, begin: int, stop: int) -> Measured | None:
+    """The poses at times of their own whose nearest rows are kept."""
+    if measured is None:
+        return None
+    own = (measured.rows >= begin) & (measured.rows < stop)
+    return Measured(measured.times[own], measured.poses[own], measured.rows[own] - begin)
+
+
+MOST = 6000
+"""No more increments are fitted: beyond, they hardly sharpen what is found, and cost in proportion."""
+
+STRETCH_S = 6.0
+"""Blocks are shortened no further than this, so that windows of prediction fit into them; else blocks are left out."""
+
+FEWEST_BLOCKS = 16
+
+JOINED_S = 0.1
+"""Increments are joined up to this length; motors are slower."""
+
+
+def thin(drives: Drives) -> Drives:
+    """Thin drives to about MOST increments: join them, then keep a stretch of each block, then fewer blocks."""
+    count = len(drives.episode)
+    if count <= MOST:
+        return drives
+    usual = float(np.median(drives.last - drives.first)) / drives.tick_hz
+    shorter = join_increments(drives, min(-(-count // MOST), max(1, round(JOINED_S / usual))))
+    least = round(STRETCH_S * drives.tick_hz / float(np.median(shorter.last - shorter.first)))
+    return shorter.only(_choose_stretches(shorter.block, MOST / len(shorter.episode), least))
+
+
+def join_increments(drives: Drives, times: int) -> Drives:
+    """Join every `times` increments in a row, within unbroken runs of poses and blocks."""
+    if times == 1:
+        return drives
+    run = np.cumsum(~drives.linked | np.concatenate(([True], drives.block[1:] != drives.block[:-1])))
+    place = np.arange(len(run)) - np.searchsorted(run, run)
+    begins = np.flatnonzero(place % times == 0)
+    ends = np.concatenate((begins[1:], [len(run)])) - 1
+    whole = drives.only(np.isin(np.arange(len(run)), begins))
+    poses = np.stack((drives.poses[begins, 0], drives.poses[ends, 1]), axis=1)
+    travel = np.add.reduceat(drives.travel, begins)
+    after = None if drives.after is None else np.stack((drives.after[begins, 0], drives.after[ends, 1]), axis=1)
+    return replace(whole, last=drives.last[ends], poses=poses, travel=travel, linked=drives.linked[begins], after=after)
+
+
+def _choose_stretches(block: Whole, share: float, least: int) -> NDArray[np.bool_]:
+    """This share of each block in one piece, somewhere within it, of no fewer than `least` increments (N,)."""
+    number = number_of(block)
+    size = np.bincount(number)
+    kept = np.minimum(size, np.maximum(np.ceil(min(1.0, share) * size).astype(int), least))
+    # Multiples of the golden ratio spread stretches evenly, in step with nothing that drives repeat.
+    spread = np.arange(len(size)) * 0.6180339887 % 1.0
+    begin = (spread * (size - kept)).astype(int)
+    chosen = spread < max(MOST / kept.sum(), FEWEST_BLOCKS / len(size))
+    place = np.arange(len(block)) - np.searchsorted(number, number)
+    return np.asarray(chosen[number] & (place >= begin[number]) & (place < (begin + kept)[number]))
+
+
+FEWEST_EPISODES = 6
+"""With fewer, each episode is split by time: the first half is fitted, the second tested."""
+
+LEAST_MOTION_S = 20.0
+"""Less measured motion than this is not enough to fit, and as much again to test."""
+
+MOST_S = 900.0
+"""No more seconds are fitted where there are drives to choose from: every replay takes all of them."""
+
+MOST_TESTED_S = 1800.0
+"""No more seconds are tested on in the same way: the bullet plant drives them all, twice."""
+
+BLOCKS = 16
+"""Each part has at least about so many blocks, if they last BLOCK_S."""
+
+TEST_BLOCK_S = 4.0
+"""Blocks are no shorter, unless episodes are."""
+
+
+class Parts(NamedTuple):
+    """The drives to fit and the drives to test on."""
+
+    fitted: Drives
+    tested: Drives
+
+
+def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = ()) -> Parts:
+    """Keep every third episode to test on, or the second half of each where there are few, or another log.
+
+    Args:
+        log: What to fit, and to test on.
+        robot: What drove.
+        test: Another log to test on.
+        clocks: Those of `log` and of `test`, to put their drives on one; none where they are.
+
+    Raises:
+        LogError: If there is too little to fit or to test on.
+    """
+    every = range(len(log.episodes))
+    if test is not None:
+        parts = Parts(
+            _gather_on_one_clock(log, robot, every, clocks[:1]),
+            _gather_on_one_clock(test, robot, range(len(test.episodes)), clocks[1:]),
+        )
+    elif len(log.episodes) >= FEWEST_EPISODES:
+        fitted = _choose_some(log, [i for i in every if i % 3 != 2], MOST_S)
+        tested = _choose_some(log, every[2::3], MOST_TESTED_S)
+        parts = Parts(
+            _gather_on_one_clock(log, robot, fitted, clocks), _gather_on_one_clock(log, robot, tested, clocks)
+        )
+    else:
+        parts = _halve(_gather_on_one_clock(log, robot, every, clocks))
+    for name, drives in zip(("fit", "test on"), parts, strict=True):
+        if drives.seconds < LEAST_MOTION_S:
+            raise LogError(
+                f"{log.name}: only {drives.seconds:.1f} s of measured motion to {name}, at least {LEAST_MOTION_S:.0f} s are "
+                "needed for each; record more episodes"
+            )
+    return Parts(thin(cut_into_blocks(parts.fitted)), cut_into_blocks(parts.tested))
+
+
+def _choose_some(log: Log, chosen: Sequence[int], most_s: float) -> list[int]:
+    """Choose some of these drives, spread evenly, of about so many seconds; the rest is not needed."""
+    seconds = sum(float(log.episodes[i].times[-1] - log.episodes[i].times[0]) for i in chosen)
+    wanted = max(FEWEST_EPISODES, math.ceil(len(chosen) * min(1.0, most_s / max(seconds, 1.0))))
+    count = min(len(chosen), wanted)
+    return [chosen[number * len(chosen) // count] for number in range(count)]
+
+
+def all_drives(log: Log, robot: Robot, clocks: Clocks) -> Drives:
+    """All of a log's drives, on one clock, each as one block."""
+    return _gather_on_one_clock(log, robot, range(len(log.episodes)), (clocks,))
+
+
+def _gather_on_one_clock(log: Log, robot: Robot, chosen: Sequence[int], clocks: Sequence[Clocks]) -> Drives:
+    """Gather some of a log's drives, on one clock."""
+    drives = gather(log, robot, [log.episodes[i] for i in chosen])
+    return put_in_step(drives, clocks[0], chosen) if clocks else drives
+
+
+def _halve(drives: Drives) -> Parts:
+    early = np.zeros(len(drives.episode), dtype=bool)
+    for episode in np.unique(drives.episode):
+        own = drives.episode == episode
+        gone = np.cumsum((drives.last - drives.first) * own)
+        early |= own & (gone <= gone[-1] / 2.0)
+    return Parts(drives.only(early), drives.only(~early))
+
+
+def cut_into_blocks(drives: Drives) -> Drives:
+    """Cut the episodes of drives into blocks until there are enough of them."""
+    wanted = max(TEST_BLOCK_S, drives.seconds / BLOCKS)
+    block = np.zeros(len(drives.episode), dtype=int)
+    total = 0
+    for episode in np.unique(drives.episode):
+        own = np.flatnonzero(drives.episode == episode)
+        lasts = drives.last[own] - drives.first[own]
+        pieces = max(1, math.floor(lasts.sum() / drives.tick_hz / wanted))
+        block[own] = total + (np.cumsum(lasts) - lasts) * pieces // lasts.sum()
+        total += pieces
+    _, block = np.unique(block, return_inverse=True)
+    return replace(drives, block=block, linked=drives.linked & np.concatenate(([False], block[1:] == block[:-1])))

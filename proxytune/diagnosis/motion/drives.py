@@ -1,0 +1,465 @@
+"""Measured drives as arrays: commands on a fine grid of ticks, motion between measured poses.
+
+Cosine and sine of many angles.
+The latest results of a function, kept by all that determines them.
+Commands of a log as fractions of full speed, each held from its own time.
+Poses that were measured between samples, and paths at those instants.
+The robot that drove a log: one of robots/, or what the log says of its own.
+"""
+
+import math
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
+from proxytune.effects import SHIPPED, Catalogue
+from proxytune.errors import LogError
+from proxytune.logs import GEOMETRY, Log, LogEpisode
+from proxytune.settings import nearest
+
+
+def cosine_and_sine(angle: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The cosine and the sine of angles (…,) [rad].
+
+    Both come from the tangent of half the angle: of that numpy has a fast form on many processors, of them none.
+    """
+    tangent = np.tan(0.5 * angle)
+    square = tangent * tangent
+    share = 1.0 / (1.0 + square)
+    return (1.0 - square) * share, 2.0 * tangent * share
+
+
+Result = TypeVar("Result")
+
+MOST = 6
+"""So many results are kept: those of long drives are large, and what is asked for again is asked for soon."""
+
+
+class Recent(Generic[Result]):
+    """The latest few results: what is asked for again is not worked out again."""
+
+    def __init__(self) -> None:
+        self._known: dict[Hashable, Result] = {}
+
+    def get(self, key: Hashable, make: Callable[[], Result]) -> Result:
+        """The result of a key, made if it is not kept; the one asked for longest ago is forgotten."""
+        result = self._known.pop(key) if key in self._known else make()
+        self._known[key] = result
+        if len(self._known) > MOST:
+            del self._known[next(iter(self._known))]
+        return result
+
+
+Floats = NDArray[Any]
+
+
+def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
+    """A log's commands (…, 2) as fractions of full wheel speed, left and right.
+
+    Raises:
+        LogError: If the log has no commands, or they ask for more than full speed.
+    """
+    figures = robot.figures
+    if log.command == "duty":
+        return commands
+    if log.command == "none":
+        raise LogError(f"{log.name}: has no commands; a log needs duties, twists or wheel speeds to learn from")
+    if log.command == "twist":
+        turn = commands[..., 1] * figures["effective_baseline"] / 2.0
+        speeds = np.stack((commands[..., 0] - turn, commands[..., 0] + turn), axis=-1)
+    else:
+        speeds = commands * figures["wheel_radius"]
+    duties = speeds / figures["full_speed"]
+    fastest = float(np.abs(duties).max())
+    if fastest > 1.0 + 1e-9:
+        raise LogError(
+            f"{log.name}: asks a wheel for {fastest * figures['full_speed']:.2f} m/s, more than the robot's full speed "
+            f"{figures['full_speed']:g} m/s; state a higher full_speed_m_s in log.toml"
+        )
+    return np.asarray(duties)
+
+
+class Commands(NamedTuple):
+    """An episode's commands.
+
+    Attributes:
+        times: When each was issued (M,) [s after the first sample]; earlier ones are below 0.
+        duties: As fractions of full speed (M, 2).
+        rest: What was in force before the first sample (2,).
+        ticks_each: Ticks that each lasts, where they go with the samples; else 0.
+    """
+
+    times: Floats
+    duties: Floats
+    rest: Floats
+    ticks_each: int
+
+    def over_ticks(self, length: int, tick_hz: float) -> Floats:
+        """The mean of the command in force over each tick (length, 2); each is held from its own time."""
+        if self.ticks_each:
+            held = np.repeat(self.duties, self.ticks_each, axis=0)
+            return np.concatenate((held, np.repeat(held[-1:], length - len(held), axis=0)))
+        ends = np.array((min(0.0, self.times[0]) - 1.0, *self.times, max(length / tick_hz, self.times[-1]) + 1.0))
+        held = np.concatenate((self.rest[None], self.duties))
+        total = np.concatenate((np.zeros((1, 2)), np.cumsum(held * np.diff(ends)[:, None], axis=0)))
+        edges = np.arange(length + 1) / tick_hz
+        gone = np.stack([np.interp(edges, ends, channel) for channel in total.T], axis=1)
+        return np.asarray(np.diff(gone, axis=0) * tick_hz)
+
+    def ticks(self, length: int, tick_hz: float) -> NDArray[np.bool_]:
+        """The ticks within which one is issued (length,)."""
+        at = np.floor(self.times * tick_hz + 1e-6).astype(int)
+        found = np.zeros(length, dtype=bool)
+        found[at[(at >= 0) & (at < length)]] = True
+        return found
+
+
+def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Commands:
+    """An episode's commands; `ticks` are a sample's.
+
+    Raises:
+        LogError: If it has none, or they ask for more than full speed.
+    """
+    duties, rest = duties_of(log, robot, episode.commands), _rest(episode, robot)
+    if episode.issued is None:
+        return Commands(np.arange(len(duties)) / log.rate_hz, duties, rest, ticks)
+    times = episode.issued - episode.times[0]
+    before = np.flatnonzero(times < -1e-9)
+    return Commands(times, duties, duties[before[-1]] if len(before) and episode.wheels is None else rest, 0)
+
+
+def commands_a_second(log: Log, episodes: Sequence[LogEpisode]) -> float:
+    """How often commands are issued: with the samples, or at the usual interval between their own times."""
+    between = [np.diff(e.issued) for e in episodes if e.issued is not None and len(e.issued) > 1]
+    return 1.0 / float(np.median(np.concatenate(between))) if between else log.rate_hz
+
+
+def _rest(episode: LogEpisode, robot: Robot) -> Floats:
+    """What the wheels did before the first row: turned as measured, or stood."""
+    if episode.wheels is None or not np.isfinite(episode.wheels[0]).all():
+        return np.zeros(2)
+    return np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
+
+
+Whole = NDArray[Any]
+
+
+def path_between(walked: Floats, path: Whole, tick: Floats) -> Floats:
+    """Paths (P, T + 1, 3) at ticks that need not be whole (M,), straight between them."""
+    low = np.clip(np.floor(tick).astype(int), 0, walked.shape[1] - 2)
+    share = (tick - low)[..., None]
+    return np.asarray((1.0 - share) * walked[path, low] + share * walked[path, low + 1])
+
+
+def as_measured(episode: LogEpisode) -> tuple[Floats, Floats]:
+    """The poses of an episode's samples as they were measured (rows, 3), and how long after them (rows,) [s]."""
+    poses, after = episode.poses, np.zeros(len(episode.times))
+    if episode.measured is not None:
+        times, own, rows = episode.measured
+        poses = np.full_like(episode.poses, np.nan)
+        poses[rows], after[rows] = own, times - episode.times[rows]
+    return poses, after
+
+
+def ends_of(episodes: Sequence[LogEpisode], samples: Sequence[Whole]) -> tuple[Floats, Floats]:
+    """Poses between which increments lie (N, 2, 3), as measured, and how long after their samples (N, 2) [s].
+
+    Args:
+        episodes: The drives (E,).
+        samples: The samples of each that have a pose of their own.
+    """
+    measured = [as_measured(episode) for episode in episodes]
+    poses, after = (
+        np.concatenate([np.stack((e[part][s[:-1]], e[part][s[1:]]), 1) for e, s in zip(measured, samples, strict=True)])
+        for part in (0, 1)
+    )
+    return poses, after
+
+
+TICK_HZ = 60.0
+"""Effects are simulated at least this often."""
+
+HELD_S = 0.2
+"""A pose that repeats exactly for up to so long is an older one shown again."""
+
+GAP_S = 1.0
+"""Over longer gaps in the measured poses no motion is compared."""
+
+
+@dataclass(frozen=True)
+class Drives:
+    """A batch of E episodes with N measured increments of the pose.
+
+    Attributes:
+        robot: Whose drives they are.
+        tick_hz: Ticks per second.
+        rate_hz: Commands per second.
+        duties: Commands as fractions of full speed (E, T, 2), each the mean over its tick.
+        issued: Whether a command is issued within each tick (E, T).
+        rest: Duties before the first row (E, 2).
+        headings: Measured heading at the start of each tick, interpolated (E, T).
+        episode: Episode of each increment (N,).
+        first: Tick at which it begins (N,).
+        last: Tick at which it ends (N,).
+        poses: Measured poses at its beginning and end (N, 2, 3).
+        linked: Whether it begins with the sample that ended the one before (N,).
+        block: Which of the blocks, the units that are left out in turn, it belongs to (N,).
+        travel: How far the robot moved meanwhile, noise averaged out (N, 2): [m], [rad].
+        wheels: Measured wheel speeds at each tick as fractions of full speed (E, T, 2), or None.
+        after: How long after the ticks `first` and `last` its poses were measured, or before (N, 2) [ticks]; None
+            where poses lie on ticks.
+    """
+
+    robot: Robot
+    tick_hz: float
+    rate_hz: float
+    duties: Floats
+    issued: NDArray[np.bool_]
+    rest: Floats
+    headings: Floats
+    episode: Whole
+    first: Whole
+    last: Whole
+    poses: Floats
+    linked: NDArray[np.bool_]
+    block: Whole
+    travel: Floats
+    wheels: Floats | None
+    after: Floats | None = None
+
+    @cached_property
+    def measured(self) -> Floats:
+        """Each increment in the body frame of its first pose (N, 3): forward, left [m], turn [rad]."""
+        return relative(self.poses[:, 0], self.poses[:, 1])
+
+    @cached_property
+    def replays(self) -> Recent[Floats]:
+        """The increments (N, 3) that models made of these drives lately."""
+        return Recent()
+
+    @cached_property
+    def places(self) -> Floats:
+        """Measured place at the start of each tick (E, T, 2) [m], interpolated."""
+        return self._interpolated(self.poses[:, 0, :2])
+
+    @cached_property
+    def angles(self) -> Floats:
+        """How far each wheel has turned in its episode by the measured motion (E, T, 2) [rad], interpolated."""
+        figures = self.robot.figures
+        turn = self.measured[:, 2] * figures["effective_baseline"] / 2.0
+        wheels = np.stack((self.measured[:, 0] - turn, self.measured[:, 0] + turn), axis=1) / figures["wheel_radius"]
+        before = np.cumsum(wheels, axis=0) - wheels
+        return self._interpolated(before - before[np.searchsorted(self.episode, self.episode)])
+
+    def _interpolated(self, values: Floats) -> Floats:
+        """Values at the beginnings of the increments (N, channels) at every tick (E, T, channels)."""
+        out = np.zeros((*self.duties.shape[:2], values.shape[1]))
+        for episode in np.unique(self.episode):
+            own = self.episode == episode
+            for channel, column in enumerate(values[own].T):
+                out[episode, :, channel] = np.interp(np.arange(out.shape[1]), self.first[own], column)
+        return out
+
+    @property
+    def seconds(self) -> float:
+        """How long the increments last together [s]."""
+        return float((self.last - self.first).sum() / self.tick_hz)
+
+    def along(self, walked: Floats, path: Whole, increment: Whole, begin: Whole | int = 0, *, end: bool) -> Floats:
+        """Where paths (P, T + 1, 3) are when the poses of increments were measured (M, 3).
+
+        Args:
+            walked: Paths by their ticks.
+            path: Which path each increment belongs to (M,).
+            increment: The increments (M,).
+            begin: The tick at which its path begins (M,).
+            end: Whether it is the pose at the increment's end.
+        """
+        tick = (self.last if end else self.first)[increment] - begin
+        if self.after is None:
+            return np.asarray(walked[path, tick])
+        return path_between(walked, path, tick + self.after[increment, int(end)])
+
+    def only(self, chosen: NDArray[np.bool_]) -> "Drives":
+        """The same drives with some of their increments."""
+        kept = np.flatnonzero(chosen)
+        follows = np.concatenate(([False], np.diff(kept) == 1))
+        _, block = np.unique(self.block[kept], return_inverse=True)
+        parts = {name: getattr(self, name)[kept] for name in ("episode", "first", "last", "poses", "travel")}
+        after = None if self.after is None else self.after[kept]
+        return replace(self, **parts, linked=self.linked[kept] & follows, block=block, after=after)
+
+    def some(self, episodes: Whole) -> "Drives":
+        """The same drives with some of their episodes (K,), in ascending order, numbered anew."""
+        rest = self.only(np.isin(self.episode, episodes))
+        parts = {name: getattr(self, name)[episodes] for name in ("duties", "issued", "rest", "headings")}
+        wheels = None if self.wheels is None else self.wheels[episodes]
+        return replace(rest, **parts, wheels=wheels, episode=np.searchsorted(episodes, rest.episode))
+
+
+def relative(origin: Floats, pose: Floats) -> Floats:
+    """Poses (…, 3) seen from the frame of others."""
+    difference = pose - origin
+    cosine, sine = cosine_and_sine(origin[..., 2])
+    forward = cosine * difference[..., 0] + sine * difference[..., 1]
+    left = cosine * difference[..., 1] - sine * difference[..., 0]
+    return np.stack((forward, left, difference[..., 2]), axis=-1)
+
+
+def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
+    """A batch of a log's episodes, each command held from its own time.
+
+    Raises:
+        LogError: If there is nothing to compare in them.
+    """
+    ticks = math.ceil(TICK_HZ / log.rate_hz)
+    length = max(len(episode.times) for episode in episodes) * ticks
+    tick_hz = log.rate_hz * ticks
+    given = [commands_of(log, robot, episode, ticks) for episode in episodes]
+    samples = [_samples(episode, log.rate_hz) for episode in episodes]
+    rows = np.concatenate([np.stack((s[:-1], s[1:]), axis=1) for s in samples])
+    number = np.repeat(np.arange(len(episodes)), [max(0, len(s) - 1) for s in samples])
+    if len(rows) == 0:
+        raise LogError(f"{log.name}: no two measured poses in a row; nothing can be learnt from it")
+    poses, after = ends_of(episodes, samples)
+    linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))
+    drives = Drives(
+        robot=robot,
+        tick_hz=tick_hz,
+        rate_hz=commands_a_second(log, episodes),
+        duties=np.stack([one.over_ticks(length, tick_hz) for one in given]),
+        issued=np.stack([one.ticks(length, tick_hz) for one in given]),
+        rest=np.stack([one.rest for one in given]),
+        headings=np.stack([_ticks_of_heading(e, ticks, length) for e in episodes]),
+        episode=number,
+        first=rows[:, 0] * ticks,
+        last=rows[:, 1] * ticks,
+        poses=poses,
+        linked=linked,
+        block=number,
+        travel=_travel(number, poses, rows, log.rate_hz),
+        wheels=_wheels(robot, episodes, ticks, length),
+        after=after * tick_hz if after.any() else None,
+    )
+    return drives.only(rows[:, 1] - rows[:, 0] <= GAP_S * log.rate_hz)
+
+
+def _ticks(rows: Floats, ticks: int, length: int) -> Floats:
+    """Rows held for some ticks each, the last one until the end."""
+    held = np.repeat(rows, ticks, axis=0)
+    return np.concatenate((held, np.repeat(held[-1:], length - len(held), axis=0)))
+
+
+def _wheels(robot: Robot, episodes: Sequence[LogEpisode], ticks: int, length: int) -> Floats | None:
+    unit = robot.figures["wheel_radius"] / robot.figures["full_speed"]
+    measured = [_ticks(e.wheels * unit, ticks, length) for e in episodes if e.wheels is not None]
+    whole = len(measured) == len(episodes) and all(np.isfinite(wheels).all() for wheels in measured)
+    return np.stack(measured) if whole else None
+
+
+def _ticks_of_heading(episode: LogEpisode, ticks: int, length: int) -> Floats:
+    known = np.flatnonzero(np.isfinite(episode.poses[:, 2]))
+    if len(known) == 0:
+        return np.zeros(length)
+    return np.asarray(np.interp(np.arange(length), known * ticks, episode.poses[known, 2]))
+
+
+def _samples(episode: LogEpisode, rate_hz: float) -> Whole:
+    """Rows with a measured pose of their own: repeats of the last one within HELD_S are not."""
+    known = np.flatnonzero(np.isfinite(episode.poses).all(axis=1))
+    if len(known) == 0:
+        return known
+    moved = np.any(np.diff(episode.poses[known], axis=0) != 0.0, axis=1)
+    fresh = np.concatenate(([True], moved))
+    last_fresh = np.maximum.accumulate(np.where(fresh, np.arange(len(known)), 0))
+    age = known - known[last_fresh]
+    hold = max(1, round(HELD_S * rate_hz))
+    return np.asarray(known[fresh | (age % hold == 0)])
+
+
+def _travel(number: Whole, poses: Floats, rows: Whole, rate_hz: float) -> Floats:
+    """How far each increment goes, from the chord over half a second round it."""
+    reach = max(1, round(0.25 * rate_hz / max(1.0, float(np.median(rows[:, 1] - rows[:, 0])))))
+    index = np.arange(len(rows))
+    ends = np.concatenate((np.flatnonzero(np.diff(number)), [len(rows) - 1]))
+    begins = np.concatenate(([0], ends[:-1] + 1))
+    low = np.maximum(index - reach, begins[number_of(number)])
+    high = np.minimum(index + reach, ends[number_of(number)])
+    chord = poses[high, 1] - poses[low, 0]
+    share = (rows[:, 1] - rows[:, 0]) / np.maximum(1, rows[high, 1] - rows[low, 0])
+    return np.stack((np.hypot(chord[:, 0], chord[:, 1]) * share, np.abs(chord[:, 2]) * share), axis=1)
+
+
+def sum_by(labels: Whole, values: Floats, count: int, weights: Floats | None = None) -> Floats:
+    """Sums of values (M, …), weighted (M,), over those with one label each (count, …); no label is below 0."""
+    own = labels >= 0
+    share = np.ones(own.sum()) if weights is None else weights[own]
+    rows = sparse.csr_array((share, (labels[own], np.flatnonzero(own))), shape=(count, len(labels)))
+    flat = values.reshape(len(values), -1)
+    return np.asarray(rows @ flat).reshape(count, *values.shape[1:])
+
+
+def number_of(labels: Whole) -> Whole:
+    """Labels that come in runs, as the number of their run."""
+    return np.concatenate(([0], np.cumsum(labels[1:] != labels[:-1])))
+
+
+NEEDED = {figure: key for key, figure in GEOMETRY.items() if figure != "full_speed"}
+"""Figures that a log must state of a robot without a folder, and their keys in log.toml."""
+
+
+def robot_of(log: Log, name: str | None = None, catalogue: Catalogue = SHIPPED) -> Robot:
+    """The robot of a log, or the named one in its stead, with the effects that it may have.
+
+    A robot without a folder needs wheel radius and baseline in log.toml; its full speed is stated there too, or taken
+    from the fastest command, or from how fast it drove.
+
+    Raises:
+        LogError: If the robot is unknown and the log does not state its geometry.
+        SettingsError: If the named robot is unknown.
+    """
+    names = robot_names(catalogue.folder)
+    if log.robot in names or name not in (None, log.robot):
+        return replace(read_robot(name or log.robot, catalogue.folder), catalogue=catalogue)
+    missing = [key for figure, key in NEEDED.items() if figure not in log.geometry]
+    if missing:
+        raise LogError(
+            f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, names)}) and log.toml does not "
+            f"state {' and '.join(missing)}; state them, or name a robot with --robot"
+        )
+    geometry = {**log.geometry}
+    geometry.setdefault("full_speed", _full_speed(log))
+    return replace(robot_from_geometry(log.robot, geometry, log.rate_hz), catalogue=catalogue)
+
+
+def _full_speed(log: Log) -> float:
+    """The wheel speed [m/s] that a duty of 1 stands for, rounded up to two digits."""
+    commands = np.concatenate([episode.commands for episode in log.episodes])
+    if log.command == "twist":
+        fastest = np.abs(commands[:, 0]) + np.abs(commands[:, 1]) * log.geometry["effective_baseline"] / 2.0
+    elif log.command == "wheel_speed":
+        fastest = np.abs(commands).max(axis=1) * log.geometry["wheel_radius"]
+    else:
+        fastest = _speed_per_duty(log)
+    digit = 10.0 ** (np.floor(np.log10(max(float(fastest.max(initial=0.0)), 1e-3))) - 1)
+    return float(np.ceil(float(fastest.max(initial=1e-3)) / digit - 1e-9) * digit)
+
+
+def _speed_per_duty(log: Log) -> Floats:
+    """Metres a second that the robot drove per unit of duty, over all drives together (1,)."""
+    every = max(1, round(log.rate_hz / 2.0))
+    way = duty = 0.0
+    for episode in log.episodes:
+        places = episode.poses[::every, :2]
+        known = np.flatnonzero(np.isfinite(places).all(axis=1))
+        if len(known) > 1:
+            between = slice(known[0] * every, known[-1] * every)
+            way += float(np.hypot(*np.diff(places[known], axis=0).T).sum())
+            duty += float(np.abs(episode.held[between].mean(axis=1)).sum()) / log.rate_hz
+    return np.array([way / duty if duty > 0.0 else 1e-3])

@@ -1,0 +1,298 @@
+"""Which of the named effects matter: what each is worth in error of prediction, whatever its evidence.
+
+On much data an effect of a millimetre has clear evidence. It is kept only if a model without it, all else fitted again,
+predicts worse. Effects are weighed on the fitted drives, each block predicted by what was fitted to others, so that the
+drives kept aside can tell what that came to.
+
+The effects that these drives could not have shown: their usual sizes leave too little trace.
+Are all drives of one robot, on one floor? Each wheel's gain, as every drive alone would have it.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from proxytune.diagnosis.motion.drives import Drives, Floats, sum_by
+from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Findings, Variant, without_effect
+from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, evaluate, fit, slopes
+from proxytune.diagnosis.motion.innovations import (
+    HUBER,
+    RANDOM_EFFECTS,
+    Coordinate,
+    clip_outliers,
+    drawn_paths,
+    increments,
+    paths,
+    span,
+    theta_at,
+)
+from proxytune.diagnosis.motion.multistep_fit import (
+    compare_errors,
+    fit_windows,
+    held_out_squares,
+    horizons,
+    noise_floor,
+    pose_noise,
+)
+from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_along, pose_errors, ratio, rmse
+from proxytune.diagnosis.motion.random_effects import responses
+from proxytune.diagnosis.motion.screening import Candidate, candidates, motion_effects, project_out
+from proxytune.diagnosis.rules import RULES
+
+FITTED_S = 2.0
+"""Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
+
+DRAWS = 10
+"""How often the drives are replayed with a random effect drawn."""
+
+LARGEST_SHARE = 0.95
+"""A random effect is said to make up no more of the error than this share, even if its draws stray further."""
+
+Worth = Mapping[float, Ratio]
+"""The error without an effect by the error with it, by horizon [s]."""
+
+
+class WeighedEffect(NamedTuple):
+    """An effect, and the error without it by the error with it."""
+
+    effect: AdoptedEffect
+    worth: Worth
+
+    @property
+    def material(self) -> bool:
+        """Whether predictions are shown to need it; draws add to the error at every horizon: one is not enough."""
+        shown = sum(one.value >= RULES.material_factor and one.above for one in self.worth.values())
+        return shown >= (1 if self.effect.free else min(2, len(self.worth)))
+
+    @property
+    def harmful(self) -> bool:
+        """Whether predictions are shown to be better without it."""
+        return any(one.value <= 1.0 / RULES.material_factor and one.below for one in self.worth.values())
+
+    @property
+    def largest(self) -> float:
+        """The largest of the ratios."""
+        return max(one.value for one in self.worth.values())
+
+
+def drop_immaterial(found: Findings, seed: int) -> Findings:
+    """Drop the effects that do not matter, the weakest first.
+
+    Args:
+        found: What the search came to.
+        seed: Of the draws of random effects.
+    """
+    drives = found.model.drives
+    variant, kept = Variant(found.model.theta, found.model.free), list(found.adopted)
+    dropped: list[DroppedEffect] = []
+    while kept and horizons(drives):
+        weighed = _weigh_effects(drives, variant, kept, seed)
+        weakest = min((one for one in weighed if not one.material), key=lambda one: one.largest, default=None)
+        if weakest is None:
+            break
+        dropped.append(DroppedEffect(weakest.effect, variant, weakest.harmful))
+        variant = without_effect(variant, weakest.effect, drives.rate_hz)
+        kept.remove(weakest.effect)
+    if not dropped:
+        return found
+    model = fit(drives, variant.theta, variant.free, found.model.noise)
+    return replace(found, model=model, adopted=tuple(kept), immaterial=tuple(dropped))
+
+
+def _weigh_effects(
+    drives: Drives, variant: Variant, effects: Sequence[AdoptedEffect], seed: int
+) -> list[WeighedEffect]:
+    """Weigh each effect of a model on the drives it was fitted to, with blocks left out in turn."""
+    length = _length(drives)
+    whole = held_out_squares(drives, variant.theta, variant.free, length)
+    found = []
+    for effect in effects:
+        if effect.free:
+            theta, free = without_effect(variant, effect, drives.rate_hz)
+            worth = compare_errors(drives, held_out_squares(drives, theta, free, length), whole)
+        else:
+            # Blocks left out add errors of the fit, which are no draws.
+            squares = {h: pose_errors(drives, variant.theta, cut(drives, h))[:, 0] ** 2 for h in whole}
+            worth = _worth_of_draws(drives, variant, effect, squares, seed)
+        found.append(WeighedEffect(effect, worth))
+    return found
+
+
+def worth(fitted: Drives, tested: Drives, variant: Variant, effect: AdoptedEffect, seed: int) -> Worth:
+    """The error without an effect by the error with it, on drives that nothing was fitted to.
+
+    Args:
+        fitted: Drives that the model with the effect, and the one without it, are fitted to.
+        tested: Drives that they predict.
+        variant: The model with it.
+        effect: The effect.
+        seed: Of the draws of random effects.
+    """
+    whole = _squares(fitted, tested, variant)
+    if effect.free:
+        return compare_errors(tested, _squares(fitted, tested, without_effect(variant, effect, fitted.rate_hz)), whole)
+    return _worth_of_draws(tested, variant, effect, whole, seed)
+
+
+def _squares(fitted: Drives, tested: Drives, variant: Variant) -> dict[float, Floats]:
+    windows = cut(fitted, _length(fitted))
+    theta = fit_windows(fitted, variant.theta, variant.free, windows)
+    return {h: pose_errors(tested, theta, cut(tested, h))[:, 0] ** 2 for h in horizons(tested)}
+
+
+def _length(drives: Drives) -> float:
+    """The length of the windows that are fitted to [s]."""
+    return max((h for h in horizons(drives) if h <= FITTED_S), default=min(horizons(drives), default=FITTED_S))
+
+
+def _worth_of_draws(
+    drives: Drives, variant: Variant, effect: AdoptedEffect, whole: Mapping[float, Floats], seed: int
+) -> dict[float, Ratio]:
+    """What a random effect is worth: it moves no mean, so what counts is how much of the error its draws make up.
+
+    With s the distance of drawn and expected replays and e the error, the error without the draws would be √(e² − s²).
+    It cannot be below what the noise of poses makes alone: draws that would leave less are not in the data.
+    """
+    found, noise = {}, pose_noise(drives, variant.theta)
+    for horizon, squares in whole.items():
+        windows = cut(drives, horizon)
+        blocks, floor = blocks_of(drives, windows), noise_floor(drives, windows, noise)[0]
+        share = ratio(_drawn_squares(drives, variant, windows, seed), squares, blocks)
+        error = rmse(squares, blocks)
+        ends = zip((share.value, *share.interval), (error.value, *error.interval), strict=True)
+        value, low, high = (_ratio_without_draws(min(one, _room(most, floor))) for one, most in ends)
+        found[horizon] = Ratio(value, (low, high))
+    return found
+
+
+def _room(error: float, floor: float) -> float:
+    """The share of an error that is not the noise of poses."""
+    return float(np.sqrt(max(0.0, 1.0 - (floor / error) ** 2))) if error > 0.0 else 0.0
+
+
+def _ratio_without_draws(share: float) -> float:
+    return float(1.0 / np.sqrt(1.0 - min(share, LARGEST_SHARE) ** 2))
+
+
+def _drawn_squares(drives: Drives, variant: Variant, windows: Windows, seed: int) -> Floats:
+    """Mean squared distance [m²] of drawn and expected replays at every compared pose (M,)."""
+    expected = motion_along(drives, paths(drives, variant.theta), windows)
+    total = np.zeros(len(expected))
+    for draw in range(DRAWS):
+        drawn = motion_along(drives, drawn_paths(drives, variant.theta, seed + draw), windows)
+        total += np.square(drawn - expected)[:, :2].sum(axis=1)
+    return total / DRAWS
+
+
+def invisible_effects(model: Fit, taken: set[str]) -> tuple[str, ...]:
+    """The motion effects that would have left too few nats to be seen at the middle of their probes."""
+    forms = candidates(model.drives.robot, model.theta, taken)
+    best: dict[str, float] = {}
+    plain = {form.effect for form in forms if not form.form}
+    for form in (form for form in forms if not form.form or form.effect not in plain):
+        best[form.effect] = max(best.get(form.effect, 0.0), _nats_of_trace(model, form))
+    strike = RULES.struck_share * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
+    best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}
+    return tuple(
+        name
+        for name in motion_effects(model.drives.robot.catalogue)
+        if name not in taken and best.get(name, 0.0) < RULES.visible_nats
+    )
+
+
+def _nats_of_trace(model: Fit, form: Candidate) -> float:
+    """Nats that the middle probe would have changed, free parameters having done what they can."""
+    if not form.probes:
+        return 0.0
+    direction = trace_of(model, form, form.probes[len(form.probes) // 2])
+    return 0.5 * float(direction @ direction)
+
+
+def trace_of(model: Fit, form: Candidate, values: tuple[float, ...]) -> Floats:
+    """What a form of an effect does to the innovations that the free parameters cannot (3N,)."""
+    moved = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
+    change = increments(model.drives, model.theta) - increments(model.drives, moved)
+    column = model.whiten.whiten(change)[:, None]
+    return project_out(model.slopes, column, np.ones(len(column)))[:, 0]
+
+
+GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
+
+
+AT_ONCE = 100_000
+"""About so many increments are looked at together: what is computed of each takes a kilobyte."""
+
+
+class Unlike(NamedTuple):
+    """Drives that fall in two groups.
+
+    Attributes:
+        wheel: "left" or "right", whichever tells them apart better.
+        gains: Mean gain of that wheel in either group.
+        groups: Numbers of the drives in either group.
+    """
+
+    wheel: str
+    gains: tuple[float, float]
+    groups: tuple[tuple[int, ...], tuple[int, ...]]
+
+
+def two_robots(drives: Drives, model: Fit) -> Unlike | None:
+    """The two groups that drives fall in by a wheel's gain, None where they are all alike.
+
+    Effects of one robot that a model lacks spread the drives' gains too, but do not leave a gap between two groups.
+    """
+    episodes = np.unique(drives.episode)
+    if len(episodes) < 2 * RULES.robot_drives:
+        return None
+    batches = np.array_split(episodes, math.ceil(len(drives.episode) / AT_ONCE))
+    gains, deviations = np.concatenate([_own_gains(drives.some(batch), model) for batch in batches], axis=1)
+    found = [_groups(episodes, gains[:, side], deviations[:, side]) for side in range(2)]
+    clearest, side = max(((clear, side) for side, (clear, _) in enumerate(found)), key=lambda pair: pair[0])
+    if clearest < 1.0:
+        return None
+    groups = found[side][1]
+    means = [float(gains[np.isin(episodes, group), side].mean()) for group in groups]
+    return Unlike(("left", "right")[side], (means[0], means[1]), groups)
+
+
+def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
+    """Each drive's own gains and their deviations (E, 2): one Newton step from the gains of all."""
+    neutral = {name: model.theta.get(name, 1.0) for (name,) in GAINS}
+    whole, count = evaluate(drives, {**model.theta, **neutral}, (), model.noise), len(drives.duties)
+    columns = slopes(drives, whole.theta, GAINS, whole.whiten)
+    label = np.repeat(drives.episode, 3)
+    z = whole.innovations
+    pull = sum_by(label, columns * clip_outliers(z)[:, None], count)
+    inner = columns * (np.abs(z) < HUBER)[:, None]
+    curve = sum_by(label, columns[:, :, None] * inner[:, None, :], count) + KEPT_SOLVABLE * np.eye(2)
+    loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, count) / np.bincount(label))
+    inverse = np.linalg.inv(curve)
+    step = -np.einsum("eij,ej->ei", inverse, pull)
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in GAINS]).T
+    here = np.array([whole.theta[name] for (name,) in GAINS])
+    variances = np.diagonal(inverse, axis1=1, axis2=2) * loud[:, None]
+    return here + step * (high - low), np.sqrt(variances) * (high - low)
+
+
+def _groups(
+    episodes: Floats, gains: Floats, deviations: Floats
+) -> tuple[float, tuple[tuple[int, ...], tuple[int, ...]]]:
+    """How clearly drives fall in two groups at the widest gap between sorted gains, 1 where just so; and the groups."""
+    sure = np.flatnonzero(deviations < RULES.robot_gain_apart)
+    order = sure[np.argsort(gains[sure])]
+    least = max(RULES.robot_drives, math.ceil(RULES.robot_share * len(order)))
+    places = np.arange(least, len(order) - least + 1)
+    if not len(places):
+        return 0.0, ((), ())
+    sorted_gains = gains[order]
+    at = int(places[np.argmax(sorted_gains[places] - sorted_gains[places - 1])])
+    gap = float(sorted_gains[at] - sorted_gains[at - 1])
+    within = max(float(sorted_gains[:at].std(ddof=1)), float(sorted_gains[at:].std(ddof=1)))
+    unsure = max(within, float(np.median(deviations[order])))
+    clear = gap / max(RULES.robot_gain_apart, RULES.robot_gap * unsure)
+    one, other = (tuple(sorted(int(e) for e in episodes[part])) for part in (order[:at], order[at:]))
+    return clear, (one, other)

@@ -1,0 +1,319 @@
+"""Fitting a model's free parameters, drive noise and pose noise to the innovations, together.
+
+How sure the fitted parameters are.
+Whether a log can bear the question at all: is there motion, in the units and axes of the commands?
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from proxytune.diagnosis.motion.drives import Drives, Floats, sum_by
+from proxytune.diagnosis.motion.innovations import (
+    FIRST_GUESS,
+    HUBER,
+    Coordinate,
+    Noise,
+    Whitener,
+    clip_outliers,
+    fit_noise,
+    huber,
+    increments,
+    is_stepwise,
+    smooth_coordinates,
+    span,
+    theta_at,
+    whitener,
+)
+from proxytune.errors import LogError
+from proxytune.space import Theta
+
+ROUNDS = 3
+"""Parameters and noise are fitted in turn so often."""
+
+STEP = 1e-3
+"""Finite differences step by this fraction of a coordinate's range."""
+
+KEPT_SOLVABLE = 1e-6
+"""Added to the curvature of the loss, so that a coordinate without a slope does no harm."""
+
+SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(0.99, 1.01, 11))
+"""Where a scan looks in each round, as multiples of the value it starts from."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to drives.
+
+    Attributes:
+        drives: What it was fitted to.
+        theta: All its values besides the robot's nominal ones, fitted or fixed.
+        free: The coordinates that were fitted.
+        noise: Drive and pose noise.
+        whiten: The whitener of that noise.
+        innovations: What the model leaves over, white if it is right (3N,).
+        slopes: Their change per unit of each coordinate, as a fraction of its range (3N, coordinates).
+    """
+
+    drives: Drives
+    theta: Mapping[str, float]
+    free: tuple[Coordinate, ...]
+    noise: Noise
+    whiten: Whitener
+    innovations: Floats
+    slopes: Floats
+
+
+def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise = FIRST_GUESS) -> Fit:
+    """Fit free coordinates from where θ has them, in rounds of parameters and noise.
+
+    Within a round the filter's gains are frozen: otherwise flat gains would pass for evidence.
+    """
+    sloped = smooth_coordinates(free, drives.robot)
+    rough = tuple(coordinate for coordinate in free if coordinate not in sloped)
+    for number in range(ROUNDS):
+        whiten = whitener(drives, noise)
+        theta = _scan(drives, theta, rough, whiten, SCANS[min(number, len(SCANS) - 1)])
+        theta = _fit_theta(drives, theta, sloped, whiten)
+        noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
+    return evaluate(drives, theta, free, noise)
+
+
+def evaluate(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise) -> Fit:
+    """Evaluate a model with its noise on these drives: innovations and slopes; nothing is fitted."""
+    whiten = whitener(drives, noise)
+    left = whiten.whiten(drives.measured - increments(drives, theta))
+    return Fit(drives, theta, free, noise, whiten, left, slopes(drives, theta, free, whiten))
+
+
+def replace_noise(fitted: Fit, noise: Noise) -> Fit:
+    """Evaluate the same model with another noise."""
+    return evaluate(fitted.drives, fitted.theta, fitted.free, noise)
+
+
+def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:
+    if not free:
+        return theta
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T
+
+    def left(fractions: Floats) -> Floats:
+        moved = theta_at(theta, free, low + fractions * (high - low))
+        return whiten.whiten(drives.measured - increments(drives, moved))
+
+    def slope(fractions: Floats) -> Floats:
+        return slopes(drives, theta_at(theta, free, low + fractions * (high - low)), free, whiten)
+
+    start = (np.array([theta[coordinate[0]] for coordinate in free]) - low) / (high - low)
+    found = least_squares(
+        left, np.clip(start, 1e-6, 1.0 - 1e-6), slope, (0.0, 1.0), loss="huber", f_scale=HUBER, ftol=1e-7, max_nfev=30
+    )
+    return theta_at(theta, free, low + np.clip(found.x, 0.0, 1.0) * (high - low))
+
+
+def _scan(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats) -> Theta:
+    """Scan for the best value of each coordinate in which the motion changes by steps, all others held.
+
+    Round numbers near by are looked at first: people set thresholds and steps to them, and a duty that lies just on one
+    goes the other way at a value a hair beside it.
+    """
+    for coordinate in rough:
+        low, high = span(coordinate, drives.robot)
+        here = theta[coordinate[0]]
+        values = np.clip(np.concatenate((_round_numbers(here), [here], here * multiples)), low, high)
+        losses = [loss_of(drives, theta_at(theta, (coordinate,), np.array([value])), whiten) for value in values]
+        theta = theta_at(theta, (coordinate,), values[[int(np.argmin(losses))]])
+    return theta
+
+
+def _round_numbers(value: float) -> list[float]:
+    """The value with one, two and three significant figures."""
+    return [float(f"{value:.{figures}g}") for figures in (1, 2, 3)]
+
+
+def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
+    """The loss of a model under frozen gains [nats]."""
+    return float(huber(whiten.whiten(drives.measured - increments(drives, theta))).sum())
+
+
+def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Floats:
+    """Change of the innovations per coordinate, as a fraction of its range (3N, coordinates).
+
+    It is 0 along coordinates that change the motion by steps: the slope there says nothing of the next step.
+    """
+    if not free:
+        return np.empty((3 * len(drives.episode), 0))
+    here = increments(drives, theta)
+    columns = []
+    for coordinate in free:
+        if is_stepwise(coordinate, drives.robot):
+            columns.append(np.zeros_like(here))
+            continue
+        low, high = span(coordinate, drives.robot)
+        step = STEP if theta[coordinate[0]] + STEP * (high - low) <= high else -STEP
+        there = theta_at(theta, (coordinate,), np.array([theta[coordinate[0]] + step * (high - low)]))
+        columns.append((here - increments(drives, there)) / step)
+    return whiten.whiten(np.stack(columns, axis=-1))
+
+
+def sum_by_block(drives: Drives, values: Floats) -> Floats:
+    """Sums over the innovations of each block, (3N, …) to (blocks, …)."""
+    return sum_by(np.repeat(drives.block, 3), values, int(drives.block.max()) + 1)
+
+
+def held_out_log_likelihood(fitted: Fit) -> Floats:
+    """Each block's log-likelihood under the model fitted to all others (blocks,), in nats.
+
+    Leaving a block out moves the parameters by one Newton step.
+    """
+    sums = slopes_by_block(fitted, fitted.slopes)
+    shifted = held_out_innovations(fitted, fitted.slopes, sums, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
+    loss = huber(shifted).reshape(-1, 3).sum(axis=1) + fitted.whiten.log_determinant
+    return sum_by(fitted.drives.block, -loss, int(fitted.drives.block.max()) + 1)
+
+
+def held_out_innovations(fitted: Fit, columns: Floats, sums: tuple[Floats, Floats], penalty: Floats) -> Floats:
+    """The innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it.
+
+    Args:
+        fitted: What was fitted without the columns.
+        columns: Change of the innovations per unit of each weight.
+        sums: The blocks' slopes along the columns.
+        penalty: Curvature that pulls the weights to 0.
+    """
+    pull, curve = sums
+    rest = curve.sum(axis=0) - curve + penalty
+    moved = -np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
+    own = np.repeat(moved[fitted.drives.block], 3, axis=0)
+    return np.asarray(fitted.innovations + np.einsum("nc,nc->n", columns, own))
+
+
+def slopes_by_block(fitted: Fit, columns: Floats) -> tuple[Floats, Floats]:
+    """Gradient (blocks, columns) and curvature (blocks, columns, columns) of each block's loss along the columns."""
+    z, label = fitted.innovations, np.repeat(fitted.drives.block, 3)
+    inner = columns * (np.abs(z) < HUBER)[:, None]
+    pull = sum_by_block(fitted.drives, columns * clip_outliers(z)[:, None])
+    curve = [columns[own].T @ inner[own] for own in (label == block for block in range(len(pull)))]
+    return pull, np.stack(curve)
+
+
+LOOKS = (np.geomspace(0.6, 1.6, 31), np.geomspace(0.97, 1.03, 31))
+"""Where a coordinate that changes the motion by steps is looked at, as multiples of its value."""
+
+LEAST = 0.003
+"""Half of such an interval is no less than this share of the value."""
+
+
+def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
+    """95 % intervals of the fitted parameters, from what blocks say differently."""
+    smooth = _smooth_intervals(fitted)
+    rough = (coordinate for coordinate in fitted.free if is_stepwise(coordinate, fitted.drives.robot))
+    for coordinate in rough:
+        ends = _stepwise_interval(fitted, coordinate)
+        smooth |= dict.fromkeys(coordinate, ends)
+    return smooth
+
+
+def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
+    """From the best values without each block in turn (jackknife)."""
+    low, high = span(coordinate, fitted.drives.robot)
+    here = fitted.theta[coordinate[0]]
+    values = np.unique(np.clip(here * np.concatenate(([1.0], *LOOKS)), low, high))
+    losses = np.stack([_losses(fitted, coordinate, value) for value in values], axis=1)
+    best = values[(losses.sum(axis=0) - losses).argmin(axis=1)]
+    count = len(best)
+    if count < 2:
+        return low, high
+    spread = np.sqrt((count - 1) / count * np.square(best - best.mean()).sum())
+    half = max(float(student.ppf(0.975, count - 1) * spread), LEAST * here)
+    return max(low, here - half), min(high, here + half)
+
+
+def _losses(fitted: Fit, coordinate: Coordinate, value: float) -> Floats:
+    """Each block's loss at a value (blocks,) [nats]."""
+    drives = fitted.drives
+    theta = theta_at(fitted.theta, (coordinate,), np.array([value]))
+    left = fitted.whiten.whiten(drives.measured - increments(drives, theta))
+    return sum_by_block(drives, huber(left))
+
+
+def _smooth_intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
+    """From the spread between blocks (sandwich)."""
+    pull, curve = slopes_by_block(fitted, fitted.slopes)
+    blocks, count = pull.shape
+    inverse = np.linalg.inv(curve.sum(axis=0) + KEPT_SOLVABLE * np.eye(count))
+    spread = inverse @ (pull.T @ pull) @ inverse * blocks / max(1, blocks - count)
+    found = {}
+    for coordinate, variance in zip(fitted.free, np.diag(spread), strict=True):
+        if is_stepwise(coordinate, fitted.drives.robot):
+            continue
+        low, high = span(coordinate, fitted.drives.robot)
+        half = 1.96 * float(np.sqrt(variance)) * (high - low)
+        for name in coordinate:
+            value = fitted.theta[name]
+            found[name] = (max(low, value - half), min(high, value + half))
+    return found
+
+
+LEAST_TRAVEL_M = 0.05
+LEAST_TURN_RAD = 0.2
+"""A robot that got no further than both from where it was most of the time has shown nothing but noise."""
+
+MOST_TIMES = 6.0
+"""A robot that drove so many times as far as it was told, or as much less, is in other units."""
+
+MOST_ASKEW_DEG = 60.0
+"""A robot that drives further than this from its heading has another zero of the heading."""
+
+
+def check_motion(name: str, drives: Drives) -> None:
+    """Refuse a log in which the robot stands or is never told to move.
+
+    Raises:
+        LogError: Saying which.
+    """
+    if np.abs(drives.duties).max() < 1e-6:
+        raise LogError(f"{name}: every command is zero; nothing can be learnt from a robot that is never told to move")
+    way, turn = _reach(drives)
+    if way < LEAST_TRAVEL_M and turn < LEAST_TURN_RAD:
+        raise LogError(
+            f"{name}: the robot got {way:.3f} m far and turned {turn:.2f} rad; nothing can be learnt from a robot that "
+            "stands still: check the poses, or drive"
+        )
+
+
+def _reach(drives: Drives) -> tuple[float, float]:
+    """How far the robot got from its middle pose in any episode, outliers apart: [m], [rad]."""
+    furthest = np.zeros(2)
+    for episode in np.unique(drives.episode):
+        poses = drives.poses[drives.episode == episode, 1]
+        off = np.abs(poses - np.median(poses, axis=0))
+        furthest = np.maximum(furthest, np.quantile((np.hypot(off[:, 0], off[:, 1]), off[:, 2]), 0.9, axis=1))
+    return float(furthest[0]), float(furthest[1])
+
+
+def check_units(name: str, drives: Drives, theta: Theta) -> None:
+    """Refuse poses in other units or axes than the commands can have led to.
+
+    Raises:
+        LogError: Saying which.
+    """
+    asked = increments(drives, theta)
+    way, driven = float(np.abs(asked[:, 0]).sum()), float(drives.travel[:, 0].sum())
+    if way > LEAST_TRAVEL_M and not 1.0 / MOST_TIMES < driven / way < MOST_TIMES:
+        raise LogError(
+            f"{name}: the poses say that the robot drove {driven:.3g} m where its commands say {way:.3g} m; check the "
+            "units (m, rad) and the robot's figures"
+        )
+    moved = drives.measured
+    course = float(np.degrees(np.arctan2(asked[:, 0] @ moved[:, 1], asked[:, 0] @ moved[:, 0])))
+    if abs(course) > MOST_ASKEW_DEG:
+        raise LogError(
+            f"{name}: the robot drives {course:.0f}° from where its heading points; check the heading's zero, and "
+            "which way x and y go"
+        )
+    turn, turned = asked[:, 2], moved[:, 2]
+    if turn @ turned < -0.5 * np.sqrt((turn @ turn) * (turned @ turned)):
+        raise LogError(f"{name}: the robot turns the other way than its commands say; check the signs, left and right")

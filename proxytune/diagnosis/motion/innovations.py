@@ -1,0 +1,488 @@
+"""From increments to white innovations: the filter of the pose error, as one banded Cholesky factor.
+
+Every measured pose carries noise, and every metre driven adds some. An increment's error is its own drive noise plus
+the pose noise of its two ends, which it shares with its neighbours. So the errors' covariance is block-tridiagonal, and
+the whitened innovations of the Kalman filter that re-anchors the pose are L⁻¹e, L its Cholesky factor.
+
+The planar plant from the origin on, as a diagnosis replays it thousands of times.
+Replaying recorded commands through a model: the planar plant over whole batches of drives.
+Coordinates of a fit: one or several parameters of θ that share a value, within their range.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cholesky_banded
+from scipy.linalg.lapack import dtbtrs
+from scipy.optimize import minimize
+
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative
+from proxytune.diagnosis.rules import RULES
+from proxytune.driving import Drivetrain, Robot, drivetrain
+from proxytune.effects import (
+    CATALOGUE,
+    PARAMETERS,
+    Chain,
+    Draws,
+    Learnt,
+    Setting,
+    Stage,
+    effect_of,
+    effects_from,
+    stage_chain,
+)
+from proxytune.space import Theta
+
+BAND = 6
+"""Rows of a lower banded matrix with two blocks of three side by side."""
+
+TURN_WEIGHT = 0.1
+"""A radian turned adds as much noise as this many metres driven."""
+
+JITTER = np.array((1e-5, 1e-5, 1e-5)) ** 2
+"""Smallest variance of an increment [m², m², rad²]: keeps noise-free logs solvable."""
+
+THINNED = 2400
+RUN = 12
+"""Noise is fitted to about so many increments, in runs of so many: more hardly sharpen five values, and cost most."""
+
+SMALLEST, LARGEST = 1e-6, 3.0
+"""Noise lies between these, each value in its own unit."""
+
+STEP = 1e-4
+"""Finite differences step by this in the logarithm of a value of the noise."""
+
+HUBER = 3.0
+"""Innovations beyond so many standard deviations count linearly."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """How far measured motion strays from a model that is right.
+
+    Attributes:
+        drive: Standard deviation after one metre: forward [m], sideways [m], heading [rad].
+        pose: Standard deviation of a measured pose: position [m], heading [rad].
+    """
+
+    drive: tuple[float, float, float]
+    pose: tuple[float, float]
+
+
+FIRST_GUESS = Noise((0.02, 0.01, 0.1), (0.003, 0.01))
+
+
+@dataclass(frozen=True)
+class Whitener:
+    """The Cholesky factor of the errors' covariance, lower banded (6, 3N)."""
+
+    factor: Floats
+
+    @property
+    def log_determinant(self) -> Floats:
+        """What each increment adds to log|S|/2 (N,)."""
+        return np.asarray(np.log(self.factor[0]).reshape(-1, 3).sum(axis=1))
+
+    def whiten(self, errors: Floats) -> Floats:
+        """Errors (N, 3) or (N, 3, columns) as innovations, (3N,) or (3N, columns)."""
+        flat = errors.reshape(self.factor.shape[1], *errors.shape[2:])
+        solved, trouble = dtbtrs(self.factor, flat if flat.ndim == 2 else flat[:, None], uplo="L")
+        if trouble:
+            raise LinAlgError("the covariance of the errors is singular")
+        return np.asarray(solved if flat.ndim == 2 else solved[:, 0])
+
+    def colour(self, innovations: Floats) -> Floats:
+        """Innovations (3N,) back to errors (N, 3)."""
+        coloured = np.zeros(len(innovations))
+        for below, row in enumerate(self.factor):
+            size = len(innovations) - below
+            coloured[below:] += row[:size] * innovations[:size]
+        return coloured.reshape(-1, 3)
+
+
+def whitener(drives: Drives, noise: Noise) -> Whitener:
+    """The whitener of these drives under this noise."""
+    return _factor(_covariance(drives, np.square((*noise.drive, *noise.pose))))
+
+
+def _factor(covariance: Floats) -> Whitener:
+    """The whitener of errors with this covariance, in lower banded form (6 · 3N)."""
+    band = covariance.reshape(BAND, -1)
+    band.reshape(BAND, -1, 3)[0] += JITTER
+    return Whitener(cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False))
+
+
+def _parts(drives: Drives) -> Floats:
+    """What a unit of each variance of a noise adds to the errors' covariance (5, 6 · 3N), in lower banded form."""
+    return np.stack([_covariance(drives, unit) for unit in np.eye(5)])
+
+
+def _covariance(drives: Drives, variances: Floats) -> Floats:
+    """The errors' covariance in lower banded form (6 · 3N), linear in the variances of drive and pose noise."""
+    own, shared = _blocks(drives, variances)
+    band = np.zeros((BAND, len(own), 3))
+    for column in range(3):
+        for row in range(column, 3):
+            band[row - column, :, column] = own[:, row, column]
+        for row in range(3):
+            band[3 + row - column, :-1, column] = shared[1:, row, column]
+    return band.reshape(-1)
+
+
+def _blocks(drives: Drives, variances: Floats) -> tuple[Floats, Floats]:
+    """Each increment's own covariance, and that with the increment before it, (N, 3, 3) each."""
+    place, turn = variances[3:]
+    measured = drives.measured
+    lever = np.stack((measured[:, 1], -measured[:, 0]), axis=1)
+    way = drives.travel[:, 0] + TURN_WEIGHT * drives.travel[:, 1]
+    own = np.zeros((len(lever), 3, 3))
+    own[:, :2, :2] = turn * lever[:, :, None] * lever[:, None, :]
+    own[:, :2, 2] = own[:, 2, :2] = -turn * lever
+    drive = variances[:3] * way[:, None] + 2.0 * np.array((place, place, turn))
+    own[:, range(3), range(3)] += drive
+    shared = np.zeros_like(own)
+    back = np.roll(measured[:, 2], 1)
+    cosine, sine = np.cos(back), np.sin(back)
+    shared[:, :2, :2] = -place * np.stack((cosine, sine, -sine, cosine), axis=1).reshape(-1, 2, 2)
+    shared[:, :2, 2] = turn * lever
+    shared[:, 2, 2] = -turn
+    return own, shared * drives.linked[:, None, None]
+
+
+def huber(innovations: Floats) -> Floats:
+    """The loss of each innovation: half its square, linear beyond HUBER."""
+    size = np.abs(innovations)
+    inner = np.minimum(size, HUBER)
+    return np.asarray(inner * (size - 0.5 * inner))
+
+
+def clip_outliers(innovations: Floats) -> Floats:
+    """The slope of the loss: innovations, with outliers cut to HUBER."""
+    return np.clip(innovations, -HUBER, HUBER)
+
+
+def log_likelihood(errors: Floats, whiten: Whitener) -> float:
+    """The log-likelihood of errors (N, 3), up to a constant."""
+    return -float(huber(whiten.whiten(errors)).sum() + np.log(whiten.factor[0]).sum())
+
+
+def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
+    """The noise under which errors (N, 3) are likeliest, looked for from `start` and from FIRST_GUESS.
+
+    A start from a model that misses much can end where all noise is too large. Of long drives a part is taken, the same
+    for every model.
+    """
+    kept = _choose_part(len(errors))
+    if not kept.all():
+        drives, errors = drives.only(kept), errors[kept]
+    found = [_fit_noise(drives, errors, noise) for noise in dict.fromkeys((start, FIRST_GUESS))]
+    return min(found, key=lambda pair: pair[0])[1]
+
+
+def _choose_part(count: int) -> NDArray[np.bool_]:
+    """Runs of increments, spread evenly but in step with nothing that drives repeat."""
+    # Multiples of the golden ratio are spread evenly whatever their number.
+    number = np.arange(count) // RUN
+    return np.asarray(number * 0.6180339887 % 1.0 < THINNED / max(count, 1))
+
+
+def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noise]:
+    scale = np.concatenate((start.drive, start.pose))
+    lowest, highest = np.log(SMALLEST / scale), np.log(LARGEST / scale)
+    parts = _parts(drives)
+
+    def surprise(logs: Floats) -> float:
+        return -log_likelihood(errors, _factor(np.square(scale * np.exp(logs)) @ parts)) / len(errors)
+
+    def with_slope(logs: Floats) -> tuple[float, Floats]:
+        here, steps = surprise(logs), np.where(logs + STEP <= highest, STEP, -STEP)
+        return here, np.array([surprise(moved) - here for moved in logs + np.diag(steps)]) / steps
+
+    bounds = list(zip(lowest, highest, strict=True))
+    found = minimize(
+        with_slope, np.zeros(5), jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-9, "maxiter": 60}
+    )
+    values = (scale * np.exp(found.x)).tolist()
+    return float(found.fun), Noise(tuple(values[:3]), tuple(values[3:]))
+
+
+def walk(twists: Floats, tick_s: float) -> Floats:
+    """The poses before the first tick and after each, from the origin on.
+
+    They are those of the planar plant but for rounding. Episodes are driven by the plant itself: they stay what they
+    were to the last bit.
+
+    Args:
+        twists: Twists (…, time, 3), each held for a tick.
+        tick_s: Length of a tick [s].
+
+    Returns:
+        Poses (…, time + 1, 3), headings unwrapped.
+    """
+    poses = np.zeros((*twists.shape[:-2], twists.shape[-2] + 1, 3))
+    turns = twists[..., 2] * tick_s
+    headings = turns.cumsum(axis=-1)
+    turns[turns == 0.0] = np.finfo(float).eps
+    # Tangents of half the angles, for numpy has a fast tangent: cos α = (1 − t²)/(1 + t²), sin α = 2t/(1 + t²).
+    middle, quarter = np.tan(0.5 * headings - 0.25 * turns), np.tan(0.25 * turns)
+    square = middle * middle
+    chord = 4.0 * tick_s * quarter / ((1.0 + quarter * quarter) * (1.0 + square) * turns)
+    forward, cosine, sine = twists[..., 0] * chord, 1.0 - square, 2.0 * middle
+    x, y = forward * cosine, forward * sine
+    if twists[..., 1].any():
+        sideways = twists[..., 1] * chord
+        x, y = x - sideways * sine, y + sideways * cosine
+    for channel, way in enumerate((x, y)):
+        way.cumsum(axis=-1, out=poses[..., 1:, channel])
+    poses[..., 1:, 2] = headings
+    return poses
+
+
+RANDOM_EFFECTS: Mapping[str, Draws] = {
+    name: effect.trace.draws for name, effect in CATALOGUE.items() if effect.trace and effect.trace.draws
+}
+"""Effects that draw, each of one parameter; to first order they make commands late by their mean lateness."""
+
+
+def lateness(theta: Theta, rate_hz: float) -> float:
+    """How late random effects make commands on average [s], at this many commands per second."""
+    drawn = ((draws, theta.get(name, 0.0)) for name, draws in RANDOM_EFFECTS.items())
+    return sum((draws.lateness(value, rate_hz).mean_s for draws, value in drawn if value > 0.0), 0.0)
+
+
+def expected_theta(theta: Theta, rate_hz: float) -> dict[str, float]:
+    """θ without random effects, their mean lateness added to the delay."""
+    late = lateness(theta, rate_hz)
+    calm = {name: value for name, value in theta.items() if name not in RANDOM_EFFECTS}
+    if late > 0.0:
+        calm["delay"] = min(PARAMETERS["delay"].high, calm.get("delay", 0.0) + late)
+    return calm
+
+
+def paths(drives: Drives, theta: Theta, duties: Floats | None = None) -> Floats:
+    """The measured poses that a model expects from the origin (E, T + 1, 3), each episode in one go.
+
+    Args:
+        drives: The commands.
+        theta: Values of effects besides the robot's nominal ones.
+        duties: Other commands instead (E, T, 2).
+
+    Raises:
+        SettingsError: If a value is out of its parameter's bounds.
+    """
+    train, measurement = _model(drives, theta)
+    return _walk_and_track(drives, _twists(drives, train, duties), measurement)
+
+
+def twists_of(drives: Drives, theta: Theta) -> Floats:
+    """The motion that a model asks of the plant, tick by tick (E, T, 3): [m/s], [m/s], [rad/s]."""
+    return _twists(drives, _model(drives, theta)[0])
+
+
+def _twists(drives: Drives, train: Drivetrain, duties: Floats | None = None) -> Floats:
+    given = drives.duties if duties is None else duties
+    return np.asarray(train.apply(given, train.begin(_setting(drives)))[0])
+
+
+def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
+    """Poses after each tick (E, T, 3) from the origin on, as a model's tracker sees them (E, T + 1, 3)."""
+    walked = np.concatenate((np.zeros((len(poses), 1, 3)), poses), axis=1)
+    return _track(drives, walked, _model(drives, theta)[1])
+
+
+def increments(drives: Drives, theta: Theta) -> Floats:
+    """The motion between the measured poses (N, 3): forward, left [m], turn [rad], in the body frame; read only."""
+    return drives.replays.get(tuple(theta.items()), lambda: _increments(drives, theta))
+
+
+def _increments(drives: Drives, theta: Theta) -> Floats:
+    made = increments_along(drives, paths(drives, theta))
+    made.setflags(write=False)
+    return made
+
+
+def increments_along(drives: Drives, walked: Floats) -> Floats:
+    """The increments of paths (E, T + 1, 3) between the measured poses."""
+    every = np.arange(len(drives.episode))
+    begins, ends = (drives.along(walked, drives.episode, every, end=end) for end in (False, True))
+    return relative(begins, ends)
+
+
+def increments_of_twists(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+    """The increments that these twists of every tick (E, T, 3) make, as a model's tracker sees them."""
+    return increments_along(drives, _walk_and_track(drives, twists, _model(drives, theta)[1]))
+
+
+def disturbed_increments(drives: Drives, theta: Theta, extra: Floats) -> Floats:
+    """The increments when something adds to the twist of every tick (E, T, 3)."""
+    return increments_of_twists(drives, theta, twists_of(drives, theta) + extra)
+
+
+def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
+    """Measured poses from windows' beginnings on, each from the origin (W, length + 1, 3).
+
+    A window starts from the measured pose, and from measured wheel speeds where there are any. The commands before it
+    count; nothing measured after it does.
+
+    Args:
+        drives: The commands.
+        theta: Values of effects besides the robot's nominal ones.
+        begin: The increments at whose beginnings the windows start (W,).
+        length: Ticks to go on for; commands after an episode's end are those at its end.
+    """
+    train, measurement = _model(drives, theta)
+    return _walk_and_track(drives, _window_twists(drives, train, begin, length), measurement)
+
+
+def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
+    """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s]."""
+    return _window_twists(drives, _model(drives, theta)[0], begin, length)
+
+
+def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int) -> Floats:
+    whole, wheels = _window_wheels(drives, train, begin, length)
+    if not train.motion.effects:
+        return train.ideal(wheels)
+    asked, driven = train.ideal(whole), replace(_setting(drives), rest=np.zeros((len(whole), 3)))
+    before = np.zeros_like(asked)
+    before[:, 1:] = train.motion.apply(asked, train.motion.begin(driven))[0][:, :-1]
+    ahead = _window_setting(drives, begin, before)
+    past = train.motion.begin_amid(ahead, driven, asked, drives.episode[begin], drives.first[begin])
+    return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
+
+
+def _window_wheels(drives: Drives, train: Drivetrain, begin: Whole, length: int) -> tuple[Floats, Floats]:
+    """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are."""
+    setting = _setting(drives)
+    memory = train.begin(setting)
+    arrived = np.clip(train.command.apply(drives.duties, memory.command)[0], -1.0, 1.0)
+    episode, start = drives.episode[begin], drives.first[begin]
+    ticks = np.minimum(start[:, None] + np.arange(length), arrived.shape[1] - 1)
+    whole = train.actuation.apply(arrived, memory.actuation)[0]
+    if drives.wheels is None:
+        return whole, whole[episode[:, None], ticks]
+    turning = replace(setting, rest=drives.wheels[episode, start])
+    return whole, train.actuation.apply(arrived[episode[:, None], ticks], train.actuation.begin(turning))[0]
+
+
+def window_features(
+    drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
+) -> list[tuple[Floats, Floats]]:
+    """What each weight of a learnt effect beside a model adds to its motion in such windows, curve by curve.
+
+    Returns:
+        Features (W, length, knots) and the twist that one unit of them makes (3,).
+    """
+    whole = twists_of(drives, theta)
+    past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
+    return learnt.features(window_twists(drives, theta, begin, length), past)
+
+
+def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:
+    """Measured poses, from the origin on, that twists lead to (W, length + 1, 3)."""
+    return _walk_and_track(drives, twists, _model(drives, theta)[1])
+
+
+def _window_setting(drives: Drives, begin: Whole, before: Floats) -> Setting:
+    """The setting of motion effects in windows: the motion before each, its place, and the angles of its wheels."""
+    episode, start = drives.episode[begin], drives.first[begin]
+    return replace(
+        _setting(drives),
+        rest=before[episode, start],
+        headings=drives.poses[begin, 0, 2:],
+        places=drives.poses[begin, :1, :2],
+        angles=drives.angles[episode, start][:, None],
+    )
+
+
+def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
+    """The wheel speeds of a model (E, T, 2), as fractions of full speed."""
+    return _wheel_speeds(drives, _model(drives, theta)[0], _setting(drives))
+
+
+def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
+    """The wheel speeds (E, T, 2) with random effects as one seed draws them, instead of as expected."""
+    robot = drives.robot
+    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue))
+    return _wheel_speeds(drives, train, replace(_setting(drives), seed=seed))
+
+
+def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
+    """The paths (E, T + 1, 3) with random effects as one seed draws them, instead of as expected."""
+    robot = drives.robot
+    effects = effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue)
+    train = drivetrain(robot, effects)
+    twists, _ = train.apply(drives.duties, train.begin(replace(_setting(drives), seed=seed)))
+    return _walk_and_track(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
+
+
+def _wheel_speeds(drives: Drives, train: Drivetrain, setting: Setting) -> Floats:
+    memory = train.begin(setting)
+    arrived, _ = train.command.apply(drives.duties, memory.command)
+    return np.asarray(train.actuation.apply(np.clip(arrived, -1.0, 1.0), memory.actuation)[0])
+
+
+def arrived_commands(drives: Drives, theta: Theta) -> Floats:
+    """The commands that reach the motors (E, T, 2)."""
+    train, _ = _model(drives, theta)
+    return np.asarray(train.command.apply(drives.duties, train.begin(_setting(drives)).command)[0])
+
+
+def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
+    robot = drives.robot
+    effects = effects_from(expected_theta({**robot.theta, **theta}, drives.rate_hz), robot.figures, robot.catalogue)
+    return drivetrain(robot, effects), stage_chain(effects, Stage.MEASUREMENT)
+
+
+def _setting(drives: Drives) -> Setting:
+    nominal: Mapping[str, float] = {**drives.robot.figures, "control_rate": drives.rate_hz}
+    setting = Setting(drives.tick_hz, drives.rest, nominal)
+    return replace(setting, headings=drives.headings, places=drives.places, angles=drives.angles)
+
+
+def _walk_and_track(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
+    return _track(drives, walk(twists, 1.0 / drives.tick_hz), measurement)
+
+
+def _track(drives: Drives, walked: Floats, measurement: Chain) -> Floats:
+    if not measurement.effects:
+        return walked
+    rest = replace(_setting(drives), rest=walked[:, 0])
+    return np.asarray(measurement.apply(walked, measurement.begin(rest))[0])
+
+
+Coordinate = tuple[str, ...]
+"""Parameters of θ that share one value."""
+
+
+def span(coordinate: Coordinate, robot: Robot) -> tuple[float, float]:
+    """Lowest and highest value of a coordinate."""
+    parameter = robot.catalogue.parameters[coordinate[0]]
+    return parameter.low, parameter.high
+
+
+def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:
+    """θ with its free coordinates at these values."""
+    given = {name: float(value) for names, value in zip(free, values, strict=True) for name in names}
+    return {**theta, **given}
+
+
+def at_edge(name: str, value: float, robot: Robot) -> bool:
+    """Whether a value lies at an end of its parameter's range that is not neutral."""
+    parameter = robot.catalogue.parameters[name]
+    reach = RULES.edge_share * (parameter.high - parameter.low)
+    ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(robot.figures)]
+    return any(abs(value - end) <= reach for end in ends)
+
+
+def is_stepwise(coordinate: Coordinate, robot: Robot) -> bool:
+    """Whether a coordinate changes the motion by steps: no slope leads to its best value, so that is scanned for."""
+    trace = robot.catalogue.effect(effect_of(coordinate[0])).trace
+    return trace is not None and trace.stepwise
+
+
+def smooth_coordinates(free: Sequence[Coordinate], robot: Robot) -> tuple[Coordinate, ...]:
+    """The coordinates that change the motion smoothly, so that a slope leads to their best values."""
+    return tuple(coordinate for coordinate in free if not is_stepwise(coordinate, robot))

@@ -1,0 +1,418 @@
+"""How long after its command the motion comes: commands against measured speeds, motors of any slowness allowed.
+
+The measured speeds are compared with the commands, shifted in time and passed through a first-order lag of any time
+constant. A lag only ever makes motion later and rounder, a shift alone moves its onset: so the two are told apart, and
+what is left of the latency is the pure one. Delay and the offset between two clocks are both pure latency: one number.
+
+Stretches of drives with one clock: where a clock jumps within a drive, and which drives have another one.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+from scipy.signal import lfilter
+
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
+from proxytune.logs import Log
+
+SPAN_S = 0.2
+"""Speeds are means over so long: pose noise is averaged out, and 0.05 s of latency is still clear."""
+
+MOST_SPANS = 8000
+"""Of longer logs as many speeds are taken, evenly spread."""
+
+LONGEST_TIME_CONSTANT_S = 1.0
+TIME_CONSTANTS_S = (0.06, 0.25)
+"""The longest motor lag that is reckoned with, and those of a first look."""
+
+STEP_S = 0.05
+"""Latencies are tried in such steps; the best lies between them, at the vertex of a parabola."""
+
+ROUGH_STEP_S = 0.1
+THINNED = 2
+"""The step of the first look, which one span in so many is enough for."""
+
+AT_ONCE = 300_000
+"""About so many ticks go through the lag together: memory is not to grow with the number of drives."""
+
+
+class Speeds(NamedTuple):
+    """Measured forward speeds [m/s] and yaw rates [rad/s] over spans of time.
+
+    Attributes:
+        episode: Episode of each span (M,).
+        first: Tick at which it begins (M,).
+        last: Tick at which it ends (M,).
+        values: Forward speed and yaw rate (M, 2).
+    """
+
+    episode: Whole
+    first: Whole
+    last: Whole
+    values: Floats
+
+
+class Reaction(NamedTuple):
+    """The linear, first-order robot that follows its commands best.
+
+    Attributes:
+        latency_s: Time from command to motion beyond the motor's lag; negative where motion comes first [s].
+        time_constant_s: Of the motor [s].
+        gains: From commanded to measured forward speed and yaw rate (2, 2).
+        spread: What it leaves of either, standard deviation (2,).
+        squares: What it leaves of each span, in units of the whole log's (M,).
+    """
+
+    latency_s: float
+    time_constant_s: float
+    gains: Floats
+    spread: Floats
+    squares: Floats
+
+
+class Latency(NamedTuple):
+    """A pure latency [s] with its standard deviation."""
+
+    value: float
+    deviation: float
+
+
+Ends = tuple[tuple[Whole, Whole], tuple[Whole, Whole]]
+"""Episode and tick at which spans begin, and at which they end."""
+
+
+def measured_speeds(drives: Drives) -> Speeds:
+    """Speeds over spans of SPAN_S one after another, each within an unbroken run of poses."""
+    count = max(1, round(SPAN_S * drives.tick_hz / float(np.median(drives.last - drives.first))))
+    every = max(count, len(drives.first) // MOST_SPANS)
+    begin = np.arange(0, len(drives.first) - count + 1, every)
+    run = np.cumsum(~drives.linked)
+    begin = begin[run[begin] == run[begin + count - 1]]
+    end = begin + count - 1
+    gone = np.concatenate((np.zeros((1, 2)), np.cumsum(drives.measured[:, [0, 2]], axis=0)))
+    later = 0.0 if drives.after is None else drives.after[end, 1] - drives.after[begin, 0]
+    seconds = (drives.last[end] - drives.first[begin] + later) / drives.tick_hz
+    values = (gone[end + 1] - gone[begin]) / seconds[:, None]
+    return Speeds(drives.episode[begin], drives.first[begin], drives.last[end], values)
+
+
+def reaction(drives: Drives, speeds: Speeds, reach_s: float) -> Reaction:
+    """The best reaction with a latency of at most `reach_s` either way: a rough look at all, then a close one."""
+    commanded = _CommandedSpeeds(drives, reach_s + 1.0)
+    few = Speeds(*(part[::THINNED] for part in speeds))
+    latencies = np.arange(-reach_s, reach_s + 1e-9, ROUGH_STEP_S).tolist()
+    looks = [look for constant in TIME_CONSTANTS_S for look in commanded.reactions(few, latencies, constant)]
+    _, latency, constant = min((_misfit(look), look.latency_s, look.time_constant_s) for look in looks)
+
+    def left(point: Floats) -> float:
+        latency_s = float(np.clip(point[0], -reach_s, reach_s))
+        return _misfit(commanded.reaction(speeds, latency_s, _constant(point[1])))
+
+    root = float(np.sqrt(constant))
+    corners = np.array([(latency, root), (latency + 0.06, root), (latency, root + 0.15)])
+    found = minimize(
+        left,
+        corners[0],
+        method="Nelder-Mead",
+        options={"xatol": 2e-3, "fatol": 1e-5, "maxfev": 60, "initial_simplex": corners},
+    )
+    return commanded.reaction(speeds, float(np.clip(found.x[0], -reach_s, reach_s)), _constant(float(found.x[1])))
+
+
+def reaction_at(drives: Drives, speeds: Speeds, latency_s: float) -> Reaction:
+    """The best reaction with this latency."""
+    commanded = _CommandedSpeeds(drives, abs(latency_s))
+    top = float(np.sqrt(LONGEST_TIME_CONSTANT_S))
+    found = minimize_scalar(
+        lambda root: _misfit(commanded.reaction(speeds, latency_s, root**2)),
+        bounds=(0.0, top),
+        method="bounded",
+        options={"xatol": 5e-3},
+    )
+    return commanded.reaction(speeds, latency_s, float(found.x) ** 2)
+
+
+def _constant(root: float) -> float:
+    """A time constant from its root: near none, a lag matters by its square."""
+    return float(min(root**2, LONGEST_TIME_CONSTANT_S))
+
+
+class _CommandedSpeeds:
+    """The speeds that commands ask for, at any latency and motor lag."""
+
+    def __init__(self, drives: Drives, reach_s: float) -> None:
+        self.drives = drives
+        self.pad = int(np.ceil(reach_s * drives.tick_hz)) + 2
+
+    def speeds(self, speeds: Speeds, latencies_s: Sequence[float], constant_s: float) -> Floats:
+        """Mean speeds over the same spans (latencies, M, 2), so much later, of motors with this time constant."""
+        asked = np.empty((len(latencies_s), len(speeds.first), 2))
+        for own, ends, gone in self._batches(speeds, constant_s):
+            for number, latency_s in enumerate(latencies_s):
+                late = self.pad - latency_s * self.drives.tick_hz
+                shift, part = int(np.floor(late)), late - np.floor(late)
+                first, last = ((1.0 - part) * gone[e, t + shift] + part * gone[e, t + shift + 1] for e, t in ends)
+                asked[number, own] = (last - first) / (speeds.last - speeds.first)[own, None]
+        return asked
+
+    def _batches(self, speeds: Speeds, constant_s: float) -> Iterator[tuple[slice, Ends, Floats]]:
+        """Spans of a few episodes, where these begin and end, and how far their commands move the robot."""
+        duties = self.drives.duties
+        count = max(1, AT_ONCE // duties.shape[1])
+        for begin in range(0, len(duties), count):
+            own = slice(*np.searchsorted(speeds.episode, (begin, begin + count)))
+            if own.start < own.stop:
+                episode = speeds.episode[own] - begin
+                ends = (episode, speeds.first[own]), (episode, speeds.last[own])
+                yield own, ends, self._gone(slice(begin, begin + count), constant_s)
+
+    def _gone(self, episodes: slice, constant_s: float) -> Floats:
+        """How far the commands would have moved the robot by each tick: way [m], turn [rad], times ticks a second."""
+        given, figures = self.drives.duties[episodes], self.drives.robot.figures
+        before = np.repeat(self.drives.rest[episodes, None], self.pad, axis=1)
+        duties = np.concatenate((before, given, np.repeat(given[:, -1:], self.pad, axis=1)), axis=1)
+        kept = float(np.exp(-1.0 / (constant_s * self.drives.tick_hz))) if constant_s > 1e-4 else 0.0
+        wheels, _ = lfilter([1.0 - kept], [1.0, -kept], duties, axis=1, zi=kept * duties[:, :1])
+        yaw = (wheels[..., 1] - wheels[..., 0]) / figures["effective_baseline"]
+        twists = figures["full_speed"] * np.stack((wheels.mean(axis=-1), yaw), axis=-1)
+        return np.concatenate((np.zeros_like(twists[:, :1]), np.cumsum(twists, axis=1)), axis=1)
+
+    def reactions(self, speeds: Speeds, latencies_s: Sequence[float], constant_s: float) -> list[Reaction]:
+        """The reaction with the best gains at each latency."""
+        asked = zip(latencies_s, self.speeds(speeds, latencies_s, constant_s), strict=True)
+        return [_with_best_gains(speeds, one, latency_s, constant_s) for latency_s, one in asked]
+
+    def reaction(self, speeds: Speeds, latency_s: float, constant_s: float) -> Reaction:
+        """The reaction with the best gains at one latency."""
+        (found,) = self.reactions(speeds, (latency_s,), constant_s)
+        return found
+
+
+def _with_best_gains(speeds: Speeds, asked: Floats, latency_s: float, constant_s: float) -> Reaction:
+    gains = np.linalg.pinv(asked.T @ asked, hermitian=True) @ (asked.T @ speeds.values)
+    rest = speeds.values - asked @ gains
+    size = speeds.values.std(axis=0) + 1e-9
+    return Reaction(latency_s, constant_s, gains, rest.std(axis=0) + 1e-9, ((rest / size) ** 2).sum(axis=1))
+
+
+def _misfit(found: Reaction) -> float:
+    """What a reaction leaves of the speeds, as a share of their variances."""
+    return float(found.squares.mean())
+
+
+def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencies: Floats, ends: Whole) -> Floats:
+    """What this reaction leaves of each span at each latency (M, latencies), in its own variances.
+
+    Where the commands had ended, at tick `ends` (E,), nothing speaks for or against a latency.
+    """
+    commanded = _CommandedSpeeds(drives, float(np.abs(latencies).max()))
+    asked = commanded.speeds(speeds, [robot.latency_s, *latencies.tolist()], robot.time_constant_s)
+    usual = _squares(speeds, robot, asked[0])
+    left = np.empty((len(speeds.episode), len(latencies)))
+    for number, latency in enumerate(latencies):
+        known = speeds.last - latency * drives.tick_hz <= ends[speeds.episode]
+        left[:, number] = np.where(known, _squares(speeds, robot, asked[number + 1]), usual)
+    return left
+
+
+def _squares(speeds: Speeds, robot: Reaction, asked: Floats) -> Floats:
+    rest = (speeds.values - asked @ robot.gains) / robot.spread
+    return np.asarray((rest**2).sum(axis=1))
+
+
+def likeliest_latency(squares: Floats, latencies: Floats) -> Latency:
+    """The latency at which squares summed over blocks (blocks, latencies) are least.
+
+    Its deviation is that of the blocks' slopes there over the curvature; infinite where nothing tells it, as at either
+    end: a robot that is stuck is as if its commands came long after.
+    """
+    total = squares.sum(axis=0)
+    least = int(total.argmin())
+    middle = int(np.clip(least, 1, len(total) - 2))
+    curve = float(total[middle - 1] - 2.0 * total[middle] + total[middle + 1])
+    if curve <= 0.0 or least != middle:
+        return Latency(float(latencies[middle]), float("inf"))
+    slopes = (squares[:, middle + 1] - squares[:, middle - 1]) / 2.0
+    step = float(latencies[1] - latencies[0])
+    deviation = float(np.sqrt(((slopes - slopes.mean()) ** 2).sum())) / curve * step
+    return Latency(float(latencies[middle]) - float(np.clip(slopes.sum() / curve, -1.0, 1.0)) * step, deviation)
+
+
+def sum_in_blocks(seconds: float, drives: Drives, speeds: Speeds, values: Floats) -> tuple[Whole, Whole, Floats]:
+    """Sums of values of the spans (M, …) over blocks of time: episode and number in it (B,), sums (B, …)."""
+    number = (speeds.first / drives.tick_hz / seconds).astype(int)
+    most = int(number.max()) + 1
+    keys, label = np.unique(speeds.episode * most + number, return_inverse=True)
+    return keys // most, keys % most, sum_by(label, values, len(keys))
+
+
+LATENCY_BLOCK_S = 2.0
+"""Squares are summed over such blocks, whose scatter says how sure a latency is."""
+
+LEAST_APART_S = 0.04
+"""Clocks less far apart are one."""
+
+SIDE = 4
+"""A stretch between two jumps has at least so many blocks, and a drive of its own clock twice as many."""
+
+SURE, SURE_OF_A_JUMP = 5.0, 8.0
+"""Standard deviations; a jump is looked for at every time, so more of them."""
+
+SURE_BESIDE_OTHERS, SHARE_BESIDE_OTHERS = 5.5, 0.15
+"""The same where one side of the jump answers as the other drives do; NEAR_S apart, or two deviations, is the same."""
+
+NEAR_S = 0.02
+
+SHARE, SHARE_IF_FAR = 0.08, 0.7
+FAR_S = 1.0
+"""The least share of what is left over that another clock takes away, and that one further off than FAR_S does. Drives
+in which a robot sticks or has play answer later than others, but another latency explains little of that."""
+
+MOST_JUMPS = 4
+
+
+class Jump(NamedTuple):
+    """A clock that jumps within a drive.
+
+    Attributes:
+        drive: The drive's name.
+        time_s: When, to within BLOCK_S [s, as in the log].
+        by_s: How much later poses are stamped from then on [s].
+    """
+
+    drive: str
+    time_s: float
+    by_s: float
+
+
+class Blocks(NamedTuple):
+    """Squares left over at each latency, by blocks of time: episode (B,), number in it (B,), squares (B, L)."""
+
+    episode: Whole
+    number: Whole
+    squares: Floats
+
+
+def blocks_within(blocks: Blocks, episode: int, kept: tuple[float, float]) -> Whole:
+    """The blocks of an episode that lie in a stretch [s]."""
+    begin, end = blocks.number * LATENCY_BLOCK_S, (blocks.number + 1) * LATENCY_BLOCK_S
+    return np.flatnonzero((blocks.episode == episode) & (begin >= kept[0]) & (end <= kept[1]))
+
+
+def stretches(log: Log, blocks: Blocks, latencies: Floats) -> tuple[list[tuple[float, float]], tuple[Jump, ...]]:
+    """The longest stretch of each drive without a jump of its clock [s after its beginning], and all jumps."""
+    kept: list[tuple[float, float]] = []
+    jumps: list[Jump] = []
+    usual = _usual([blocks.squares[blocks.episode == e] for e in range(len(log.episodes))], latencies)
+    for e, episode in enumerate(log.episodes):
+        own = np.flatnonzero(blocks.episode == e)
+        found = _all_jumps(blocks.squares[own], latencies, usual)
+        edges = [0.0, *(float(blocks.number[own[at]] * LATENCY_BLOCK_S) for at, _ in found), np.inf]
+        margin = [0.0, *([LATENCY_BLOCK_S] * len(found)), 0.0]
+        end = float(episode.times[-1] - episode.times[0])
+        spans = [
+            (low + before, high - after)
+            for low, high, before, after in zip(edges, edges[1:], margin, margin[1:], strict=False)
+        ]
+        kept.append(max(spans, key=lambda span: min(span[1], end) - span[0]))
+        jumps += [Jump(episode.name, float(episode.times[0]) + edges[1 + k], by) for k, (_, by) in enumerate(found)]
+    return kept, tuple(jumps)
+
+
+def _all_jumps(squares: Floats, latencies: Floats, usual: float | None) -> list[tuple[int, float]]:
+    """The jumps of a drive; small ones alone where none is found among all.
+
+    What a robot does in its last seconds may look like something that it did long before.
+    """
+    found = _jumps(squares, latencies, MOST_JUMPS, usual)
+    if found or not len(squares):
+        return found
+    near = np.abs(latencies - latencies[int(squares.sum(axis=0).argmin())]) < FAR_S
+    return _jumps(squares[:, near], latencies[near], MOST_JUMPS, usual)
+
+
+def _jumps(squares: Floats, latencies: Floats, most: int, usual: float | None) -> list[tuple[int, float]]:
+    """Blocks at which the latency jumps, and by how much [s]: the clearest first, then in what lies on either side.
+
+    Args:
+        squares: Of one drive, by block and latency (B, L).
+        latencies: At which they are given (L,) [s].
+        most: How often it is looked for another.
+        usual: The latency of most drives [s]; None where there are no others.
+    """
+    if most == 0 or len(squares) < 2 * SIDE:
+        return []
+    before = np.cumsum(squares, axis=0)[SIDE - 1 : len(squares) - SIDE]
+    total = squares.sum(axis=0)
+    at = int((before.min(axis=1) + (total - before).min(axis=1)).argmin()) + SIDE
+    one, other = (likeliest_latency(part, latencies) for part in (squares[:at], squares[at:]))
+    by = other.value - one.value
+    share = min(_share(part, latencies, away.value) for part, away in ((squares[:at], other), (squares[at:], one)))
+    if not _is_jump(one, other, share, usual):
+        return []
+    earlier, later = (_jumps(part, latencies, most - 1, usual) for part in (squares[:at], squares[at:]))
+    return [*earlier, (at, by), *((at + more, step) for more, step in later)]
+
+
+def _is_jump(one: Latency, other: Latency, share: float, usual: float | None) -> bool:
+    """Whether the two sides of a block have clearly different latencies.
+
+    Args:
+        one: The latency before.
+        other: The latency after.
+        share: What each side's own latency takes away of what is left over at the other's, the lesser of the two.
+        usual: The latency of most drives [s], if there are others.
+    """
+    by = abs(other.value - one.value)
+    sure = by / float(np.hypot(one.deviation, other.deviation))
+    if by <= LEAST_APART_S or share < (SHARE if by < FAR_S else SHARE_IF_FAR):
+        return False
+    if sure > SURE_OF_A_JUMP:
+        return True
+    if usual is None or sure <= SURE_BESIDE_OTHERS or share < SHARE_BESIDE_OTHERS:
+        return False
+    near, far = sorted((one, other), key=lambda side: abs(side.value - usual))
+    as_others = abs(near.value - usual) < max(NEAR_S, 2.0 * near.deviation)
+    return as_others and abs(far.value - usual) > max(LEAST_APART_S, SURE_BESIDE_OTHERS * far.deviation)
+
+
+def _share(squares: Floats, latencies: Floats, elsewhere: float) -> float:
+    """The share of what is left over at another latency that the best one takes away."""
+    total = squares.sum(axis=0)
+    return 1.0 - float(total.min() / total[int(np.abs(latencies - elsewhere).argmin())])
+
+
+def deviants(own: Sequence[Floats], latencies: Floats) -> tuple[float, dict[int, Latency]]:
+    """The latency that most drives have, and the drives that clearly have another."""
+    judged = _judged(own, latencies)
+    if len(judged) < 2:
+        return 0.0, {}
+    common = _median(list(judged.values()))
+    found = {}
+    for e, one in judged.items():
+        away = abs(one.value - common)
+        enough = _share(own[e], latencies, common) > (SHARE if away < FAR_S else SHARE_IF_FAR)
+        if enough and away > max(LEAST_APART_S, SURE * one.deviation):
+            found[e] = one
+    return common, found
+
+
+def _judged(own: Sequence[Floats], latencies: Floats) -> dict[int, Latency]:
+    """The latency of every drive that is long enough to have one."""
+    judged = {e: likeliest_latency(squares, latencies) for e, squares in enumerate(own) if len(squares) >= 2 * SIDE}
+    return {e: one for e, one in judged.items() if np.isfinite(one.deviation)}
+
+
+def _usual(own: Sequence[Floats], latencies: Floats) -> float | None:
+    """The latency that most drives have [s], if there are two at least."""
+    judged = list(_judged(own, latencies).values())
+    return _median(judged) if len(judged) > 1 else None
+
+
+def _median(latencies: Sequence[Latency]) -> float:
+    """The middle latency, sure ones counting more."""
+    ordered = sorted(latencies)
+    weight = np.cumsum([1.0 / (one.deviation**2 + (LEAST_APART_S / 4.0) ** 2) for one in ordered])
+    return ordered[int(np.searchsorted(weight, weight[-1] / 2.0))].value

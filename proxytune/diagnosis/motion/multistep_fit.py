@@ -1,0 +1,331 @@
+"""Parameters fitted to windows of prediction, instead of to single steps.
+
+Single steps tell most where the model is right. Where it lacks something, parameters that are best for one step can be
+poor over seconds: fitted to windows they make up for what they can.
+
+The least error that a model could have, measured without trusting any model: noise of poses, and what repeats.
+Confirming on the bullet plant what the planar plant found.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares, nnls
+from scipy.stats import chi2
+
+from proxytune.diagnosis.motion.drives import Drives, Floats, Recent, Whole
+from proxytune.diagnosis.motion.fitting import STEP, Fit, evaluate
+from proxytune.diagnosis.motion.innovations import (
+    Coordinate,
+    increments,
+    measured_paths,
+    smooth_coordinates,
+    span,
+    theta_at,
+    twists_of,
+)
+from proxytune.diagnosis.motion.prediction import (
+    Ratio,
+    Windows,
+    blocks_of,
+    cut,
+    measured_motion,
+    pose_errors,
+    pose_errors_along,
+    predicted_motion,
+    ratio,
+    select_windows,
+)
+from proxytune.diagnosis.rules import RULES
+from proxytune.driving import BulletPlant
+from proxytune.space import Theta
+
+HORIZONS_S = (1.0, 2.0, 5.0)
+"""Horizons at which errors are compared."""
+
+FITTED_S = (5.0, 2.0)
+"""Windows of these lengths are fitted to."""
+
+FOLDS = 4
+"""Blocks are dealt out to so many folds; each is predicted by what was fitted to the others."""
+
+ROBUST = 1.5
+"""Misses beyond so many times the median count linearly."""
+
+MOST_WINDOWS = 400
+MOST_TRIALS = 20
+"""A fit takes no more windows, and looks no more often: it stays within seconds on long logs."""
+
+
+class Polish(NamedTuple):
+    """The result of fitting parameters to windows.
+
+    Attributes:
+        horizon_s: Length of the windows [s].
+        ratios: Held-out error of the new values by that of the old ones, by horizon [s].
+        intervals: 95 % intervals of the new values, by name in θ; none of what was not fitted to windows.
+    """
+
+    horizon_s: float
+    ratios: Mapping[float, Ratio]
+    intervals: Mapping[str, tuple[float, float]]
+
+
+def horizons(drives: Drives) -> tuple[float, ...]:
+    """The horizons of which these drives have windows in enough blocks."""
+    return tuple(h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= RULES.fewest_blocks)
+
+
+def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
+    """Fit the free coordinates of θ to these windows: where the model misses their poses least.
+
+    Args:
+        drives: The measured drives.
+        theta: Where to start.
+        free: What is fitted, except where it changes the motion by steps: single steps tell that far more sharply.
+        windows: Windows over the drives; long logs are thinned to MOST_WINDOWS of them.
+    """
+    fitted = smooth_coordinates(free, drives.robot)
+    if not fitted or len(windows.begin) == 0:
+        return dict(theta)
+    problem = _problem(drives, theta, fitted, _thin(windows))
+    found = least_squares(
+        problem.left,
+        problem.start,
+        problem.slopes,
+        (0.0, 1.0),
+        loss="soft_l1",
+        f_scale=problem.scale,
+        ftol=1e-6,
+        max_nfev=MOST_TRIALS,
+    )
+    return problem.at(np.clip(found.x, 0.0, 1.0))
+
+
+class _Problem(NamedTuple):
+    """A least-squares problem in fractions of the coordinates' ranges."""
+
+    drives: Drives
+    theta: Theta
+    free: tuple[Coordinate, ...]
+    windows: Windows
+    measured: Floats
+    weights: Floats
+    misses: Recent[Floats]
+
+    @property
+    def start(self) -> Floats:
+        low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
+        here = np.array([self.theta[coordinate[0]] for coordinate in self.free])
+        return np.asarray(np.clip((here - low) / (high - low), 1e-6, 1.0 - 1e-6))
+
+    @property
+    def scale(self) -> float:
+        return max(1e-6, ROBUST * float(np.median(np.abs(self.left(self.start)))))
+
+    def at(self, fractions: Floats) -> dict[str, float]:
+        low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
+        return theta_at(self.theta, self.free, low + fractions * (high - low))
+
+    def left(self, fractions: Floats) -> Floats:
+        return self.misses.get(fractions.tobytes(), lambda: self._misses(self.at(fractions)))
+
+    def _misses(self, theta: Theta) -> Floats:
+        apart = predicted_motion(self.drives, theta, self.windows) - self.measured
+        misses = np.asarray((apart * self.weights).ravel())
+        misses.setflags(write=False)
+        return misses
+
+    def slopes(self, fractions: Floats) -> Floats:
+        here, columns = self.left(fractions), []
+        for number in range(len(fractions)):
+            step = STEP if fractions[number] + STEP <= 1.0 else -STEP
+            moved = fractions.copy()
+            moved[number] += step
+            columns.append((self.left(moved) - here) / step)
+        return np.stack(columns, axis=1)
+
+
+def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows) -> _Problem:
+    """The least-squares problem of these windows; a heading error counts as the way it makes over the median chord."""
+    measured = measured_motion(drives, windows)
+    chord = float(np.median(np.hypot(*measured[:, :2].T)))
+    return _Problem(drives, theta, free, windows, measured, np.array((1.0, 1.0, max(chord, 1e-3))), Recent())
+
+
+def _thin(windows: Windows) -> Windows:
+    every = -(-len(windows.begin) // MOST_WINDOWS)
+    return select_windows(windows, np.arange(len(windows.begin)) % every == 0)
+
+
+def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
+    """Squared distance [m²] at every compared pose, by horizon [s].
+
+    No pose is predicted by what was fitted to its own fold.
+
+    Args:
+        drives: The measured drives.
+        theta: Where fits start.
+        free: What is fitted.
+        fitted_s: Length of the windows that are fitted to [s].
+    """
+    fold = _folds(drives)
+    windows = cut(drives, fitted_s)
+    asked = {horizon: cut(drives, horizon) for horizon in horizons(drives)}
+    found = {horizon: np.zeros(len(one.increment)) for horizon, one in asked.items()}
+    for own in range(fold.max() + 1):
+        values = fit_windows(drives, theta, free, select_windows(windows, fold[windows.begin] != own))
+        for horizon, one in asked.items():
+            here = fold[one.begin] == own
+            if here.any():
+                found[horizon][here[one.window]] = pose_errors(drives, values, select_windows(one, here))[:, 0] ** 2
+    return found
+
+
+def _folds(drives: Drives) -> Whole:
+    """The fold of each increment (N,)."""
+    return np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
+
+
+def compare_errors(drives: Drives, one: Mapping[float, Floats], other: Mapping[float, Floats]) -> dict[float, Ratio]:
+    """The ratio of two errors over the same windows, by horizon [s]."""
+    return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h))) for h, squares in one.items()}
+
+
+def polish_fit(fitted: Fit) -> tuple[Fit, Polish | None]:
+    """Fit the parameters to windows, and keep that if held-out windows show that it helps and nowhere harms."""
+    drives = fitted.drives
+    plain = {h: pose_errors(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
+    best: tuple[float, float, dict[float, Ratio]] | None = None
+    for length in [s for s in FITTED_S if s in plain]:
+        ratios = compare_errors(drives, held_out_squares(drives, fitted.theta, fitted.free, length), plain)
+        values = [one.value for one in ratios.values()]
+        helps = min(values) < RULES.polish_helps and max(values) <= RULES.polish_harms
+        if helps and (best is None or sum(values) < best[0]):
+            best = (sum(values), length, ratios)
+    if best is None:
+        return fitted, None
+    windows = cut(drives, best[1])
+    theta = fit_windows(drives, fitted.theta, fitted.free, windows)
+    polish = Polish(best[1], best[2], _intervals(drives, theta, smooth_coordinates(fitted.free, drives.robot), windows))
+    return evaluate(drives, theta, fitted.free, fitted.noise), polish
+
+
+def _intervals(
+    drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows: Windows
+) -> dict[str, tuple[float, float]]:
+    """95 % intervals from the spread between blocks (sandwich)."""
+    problem = _problem(drives, theta, free, windows)
+    here = problem.start
+    left, slopes, scale = problem.left(here), problem.slopes(here), problem.scale
+    pull = slopes * (left / np.sqrt(1.0 + (left / scale) ** 2))[:, None]
+    curve = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
+    _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)
+    pulls = np.stack([np.bincount(block, column) for column in pull.T], axis=1)
+    inverse = np.linalg.pinv(curve, hermitian=True)
+    spread = inverse @ (pulls.T @ pulls) @ inverse * len(pulls) / max(1, len(pulls) - len(free))
+    found: dict[str, tuple[float, float]] = {}
+    for coordinate, variance in zip(free, np.diag(spread), strict=True):
+        low, high = span(coordinate, drives.robot)
+        half = 1.96 * float(np.sqrt(variance)) * (high - low)
+        found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
+    return found
+
+
+LAGS = (1, 2, 3, 4, 6)
+"""Third differences are taken over so many samples."""
+
+NOISE_WEIGHT, WALK_WEIGHT = 20.0, 6.0
+"""What third differences make of white noise and of a walk: 1² + 3² + 3² + 1², and of its steps 1² + 2² + 1²."""
+
+CUT = 9.0
+"""Squares beyond so many times the median are cut: motion that a model misses for a moment is not noise."""
+
+FEWEST = 20
+"""With fewer third differences a lag says nothing."""
+
+
+class PoseNoise(NamedTuple):
+    """White noise of measured poses, one standard deviation: of x and of y [m], of the heading [rad]."""
+
+    place: float
+    turn: float
+
+
+def pose_noise(drives: Drives, theta: Theta) -> PoseNoise:
+    """The noise of measured poses, from third differences of the path of what a model leaves over.
+
+    A model's slow errors, and those of a robot that drifts, vanish in third differences or grow with the lag; the noise
+    of a pose does neither.
+
+    Args:
+        drives: The measured drives.
+        theta: The model that is taken off; the better it is, the fewer of its errors pass for noise.
+    """
+    left = drives.measured - increments(drives, theta)
+    heading = drives.poses[:, 0, 2]
+    along = (left[:, 0] + 1j * left[:, 1]) * np.exp(1j * heading)
+    steps = np.stack((along.real, along.imag, left[:, 2]), axis=1)
+    differences = {lag: _third_differences(drives, steps, lag) for lag in LAGS}
+    enough = {lag: rows for lag, rows in differences.items() if len(rows) >= FEWEST}
+    return PoseNoise(_white(enough, slice(0, 2)), _white(enough, slice(2, 3)))
+
+
+def _third_differences(drives: Drives, steps: Floats, lag: int) -> Floats:
+    """Third differences of the path that these steps make, over runs of unbroken poses (rows, 3)."""
+    path = np.concatenate((np.zeros((1, 3)), np.cumsum(steps, axis=0)))
+    start = np.arange(len(steps) - 3 * lag + 1)
+    run = np.cumsum(~drives.linked)
+    start = start[run[start] == run[start + 3 * lag - 1]]
+    return np.asarray(path[start + 3 * lag] - 3.0 * path[start + 2 * lag] + 3.0 * path[start + lag] - path[start])
+
+
+def _white(differences: dict[int, Floats], columns: slice) -> float:
+    """The standard deviation of white noise in one coordinate: E|Δ³|² = 20 σ² + 6 q · lag, both fitted."""
+    if not differences:
+        return 0.0
+    means = np.array([_mean_square(rows[:, columns]) for rows in differences.values()])
+    terms = np.array([(NOISE_WEIGHT, WALK_WEIGHT * lag) for lag in differences])
+    weights = 1.0 / np.maximum(means, 1e-18)
+    (square, _), _ = nnls(terms * weights[:, None], means * weights)
+    return float(np.sqrt(square))
+
+
+def _mean_square(rows: Floats) -> float:
+    """Mean square of a coordinate; large ones are cut, and what the cut takes from Gaussian ones is given back."""
+    count = rows.shape[1]
+    squares = (rows**2).sum(axis=1)
+    limit = CUT * float(np.median(squares))
+    end = CUT * float(chi2.ppf(0.5, count))
+    kept = chi2.cdf(end, count + 2) + end / count * chi2.sf(end, count)
+    return float(np.minimum(squares, limit).mean() / kept / count)
+
+
+def noise_floor(drives: Drives, windows: Windows, noise: PoseNoise) -> tuple[float, float]:
+    """The error that the noise of poses alone makes over windows: RMSE of position [m] and heading [rad].
+
+    Both ends of a motion are measured, each with noise in x and y; the heading at its beginning turns all of it.
+    """
+    chords = np.square(measured_motion(drives, windows)[:, :2]).sum(axis=1).mean()
+    place = 4.0 * noise.place**2 + noise.turn**2 * chords
+    return float(np.sqrt(place)), float(np.sqrt(2.0) * noise.turn)
+
+
+def has_body(drives: Drives) -> bool:
+    """Whether the bullet plant has a body for this robot."""
+    return drives.robot.urdf is not None
+
+
+def bullet_pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """How far the bullet plant's pose is from the measured one (M, 2): distance [m], heading [rad].
+
+    Each episode is driven in one go from its first command; windows compare the motion since their beginning.
+    """
+    twists = twists_of(drives, theta)
+    poses = np.zeros((len(twists), twists.shape[1], 3))
+    for episode in np.unique(drives.episode):
+        last = int(drives.last[drives.episode == episode].max())
+        with BulletPlant(drives.robot, np.zeros(3), 1.0 / drives.tick_hz) as plant:
+            poses[episode, :last], _ = plant.move(twists[episode, :last])
+    return pose_errors_along(drives, measured_paths(drives, theta, poses), windows)

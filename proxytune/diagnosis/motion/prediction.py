@@ -1,0 +1,548 @@
+"""What a fitted model says of any log: poses predicted window by window.
+
+Windows of prediction: the errors of a model that starts each window from the measured pose.
+The errors of windows, and how each weight of a learnt effect would move them.
+Manoeuvres that were driven twice from the same commands: what differs between them no model can predict.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import t as student
+from scipy.stats import wilcoxon
+
+from proxytune.diagnosis.motion.drives import (
+    Drives,
+    Floats,
+    Whole,
+    as_measured,
+    cosine_and_sine,
+    gather,
+    path_between,
+    relative,
+    sum_by,
+)
+from proxytune.diagnosis.motion.innovations import tracked_paths, walk, window_features, window_paths, window_twists
+from proxytune.diagnosis.rules import RULES
+from proxytune.driving import Robot
+from proxytune.effects import Learnt, is_learnt
+from proxytune.errors import LogError
+from proxytune.logs import Log, LogEpisode
+from proxytune.space import Theta
+
+SHORTEST = 0.9
+"""Windows that cover less of the horizon are left out: poses seldom end exactly at it, but a stub is no window."""
+
+
+AT_ONCE = 300_000
+"""About so many ticks of episodes are replayed together: memory is not to grow with the number of drives."""
+
+
+class Windows(NamedTuple):
+    """Windows (W,) over measured increments, and the increments in them (M,).
+
+    Attributes:
+        begin: The increment at whose beginning each window starts (W,).
+        window: The window of each entry (M,).
+        increment: The increment whose end is compared (M,).
+    """
+
+    begin: Whole
+    window: Whole
+    increment: Whole
+
+
+def cut(drives: Drives, horizon_s: float) -> Windows:
+    """Cut drives into windows one after another, each within an unbroken run of poses."""
+    ticks = horizon_s * drives.tick_hz
+    run = np.cumsum(~drives.linked) - 1
+    start = drives.first[np.flatnonzero(~drives.linked)][run]
+    number = np.ceil((drives.last - start) / ticks - 1e-9).astype(int) - 1
+    _, label = np.unique(run * (number.max() + 1) + number, return_inverse=True)
+    begin = np.flatnonzero(np.concatenate(([True], label[1:] != label[:-1])))
+    covered = np.maximum.reduceat(drives.last, begin) - drives.first[begin]
+    long = covered >= SHORTEST * ticks - 1e-9
+    return select_windows(Windows(begin, label, np.arange(len(label))), long)
+
+
+def select_windows(windows: Windows, kept: NDArray[np.bool_]) -> Windows:
+    """Keep some of the windows (W,), renumbered."""
+    entries = kept[windows.window]
+    renumbered = np.cumsum(kept) - 1
+    return Windows(windows.begin[kept], renumbered[windows.window[entries]], windows.increment[entries])
+
+
+def blocks_of(drives: Drives, windows: Windows) -> Whole:
+    """The block that each compared pose belongs to (M,)."""
+    return np.asarray(drives.block[windows.begin][windows.window])
+
+
+def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """The model's motion since each window's beginning less the measured one (M, 3): [m], [m], [rad]."""
+    return predicted_motion(drives, theta, windows) - measured_motion(drives, windows)
+
+
+def predicted_motion(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """The model's motion since each window's beginning (M, 3): [m], [m], [rad]."""
+    return np.concatenate([_replayed(some, theta, own) for some, own in _batches(drives, windows)])
+
+
+def _replayed(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    return motion_in(drives, window_paths(drives, theta, windows.begin, length_of(drives, windows)), windows)
+
+
+def _batches(drives: Drives, windows: Windows) -> Iterator[tuple[Drives, Windows]]:
+    """Windows of a few episodes at a time, with the drives that they are cut from; of few drives all at once."""
+    episodes, ticks = drives.duties.shape[:2]
+    count = max(1, AT_ONCE // ticks)
+    if count >= episodes:
+        yield drives, windows
+        return
+    for first in range(0, episodes, count):
+        some = np.arange(first, min(first + count, episodes))
+        own = select_windows(windows, np.isin(drives.episode[windows.begin], some))
+        if len(own.begin):
+            before = int(np.searchsorted(drives.episode, first))
+            yield drives.some(some), Windows(own.begin - before, own.window, own.increment - before)
+
+
+def length_of(drives: Drives, windows: Windows) -> int:
+    """Ticks that the longest window takes."""
+    ticks = drives.last[windows.increment] - drives.first[windows.begin][windows.window]
+    return int(ticks.max()) + (drives.after is not None)
+
+
+def motion_in(drives: Drives, walked: Floats, windows: Windows) -> Floats:
+    """Motion along windows' own paths (W, length + 1, 3) since each window's beginning (M, 3)."""
+    begin = windows.begin[windows.window]
+    start = drives.first[begin]
+    return relative(
+        drives.along(walked, windows.window, begin, start, end=False),
+        drives.along(walked, windows.window, windows.increment, start, end=True),
+    )
+
+
+def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """How far the model's pose is from the measured one (M, 2): distance [m], heading [rad]."""
+    return _size(pose_differences(drives, theta, windows))
+
+
+def pose_errors_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
+    """The errors (M, 2) of paths that were driven in one go (E, T + 1, 3)."""
+    return _size(motion_along(drives, walked, windows) - measured_motion(drives, windows))
+
+
+def motion_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
+    """Motion along such paths since each window's beginning (M, 3)."""
+    begin = windows.begin[windows.window]
+    return relative(
+        drives.along(walked, drives.episode[begin], begin, end=False),
+        drives.along(walked, drives.episode[windows.increment], windows.increment, end=True),
+    )
+
+
+def measured_motion(drives: Drives, windows: Windows) -> Floats:
+    """Measured motion since each window's beginning (M, 3)."""
+    return relative(drives.poses[windows.begin[windows.window], 0], drives.poses[windows.increment, 1])
+
+
+def _size(difference: Floats) -> Floats:
+    return np.stack((np.hypot(difference[:, 0], difference[:, 1]), np.abs(difference[:, 2])), axis=1)
+
+
+class Rmse(NamedTuple):
+    """A root mean square with its 95 % interval."""
+
+    value: float
+    interval: tuple[float, float]
+
+
+class Ratio(NamedTuple):
+    """The ratio of two errors over the same windows.
+
+    Attributes:
+        value: The ratio of the two root mean squares.
+        interval: Its 95 % interval, from leaving blocks out in turn.
+        p_below: How likely chance makes so many blocks' ratios so far below 1 (Wilcoxon's signed ranks, one-sided).
+        p_above: The same above 1.
+    """
+
+    value: float
+    interval: tuple[float, float]
+    p_below: float = 1.0
+    p_above: float = 1.0
+
+    @property
+    def below(self) -> bool:
+        """Whether it is shown to be below 1, by its interval or, where few blocks weigh most, by signed ranks."""
+        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < RULES.ratio_p_value)
+
+    @property
+    def above(self) -> bool:
+        """Whether it is shown to be above 1."""
+        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < RULES.ratio_p_value)
+
+
+def rmse(squares: Floats, blocks: Whole) -> Rmse:
+    """The root mean square, with a t-interval on its logarithm from leaving blocks out in turn."""
+    return _root(float(np.log(squares.mean())), _half_width(_log_means_without_each(squares, blocks)))
+
+
+def ratio(after: Floats, before: Floats, blocks: Whole) -> Ratio:
+    """The ratio of two root mean squares over the same windows, with its interval."""
+    half = _half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
+    value, interval = _root(float(np.log(after.mean() / before.mean())), half)
+    return Ratio(value, interval, *_signed_ranks(after, before, blocks))
+
+
+def _signed_ranks(after: Floats, before: Floats, blocks: Whole) -> tuple[float, float]:
+    """How likely chance makes the blocks' ratios so far below 1, and so far above."""
+    _, label = np.unique(blocks, return_inverse=True)
+    sums = np.stack([np.bincount(label, squares) for squares in (after, before)])
+    logs = -np.diff(np.log(sums[:, (sums > 0.0).all(axis=0)]), axis=0)[0]
+    if len(logs) < 2 or not logs.any():
+        return 1.0, 1.0
+    return float(wilcoxon(logs, alternative="less").pvalue), float(wilcoxon(logs, alternative="greater").pvalue)
+
+
+def _root(log: float, half: float) -> Rmse:
+    """The root of a square whose logarithm is known to within half a width."""
+    value, low, high = (float(np.exp(end / 2.0)) for end in (log, log - half, log + half))
+    return Rmse(value, (low, high))
+
+
+def _log_means_without_each(squares: Floats, blocks: Whole) -> Floats:
+    """Logarithm of the mean without each block."""
+    _, label = np.unique(blocks, return_inverse=True)
+    sums, counts = np.bincount(label, squares), np.bincount(label)
+    if len(counts) < 2:
+        return np.log(sums / counts)
+    return np.asarray(np.log((sums.sum() - sums) / (counts.sum() - counts)))
+
+
+def _half_width(logs: Floats) -> float:
+    count = len(logs)
+    if count < 2:
+        return float("inf")
+    spread = np.sqrt((count - 1) / count * ((logs - logs.mean()) ** 2).sum())
+    return float(student.ppf(0.975, count - 1) * spread)
+
+
+def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFrame:
+    """Predicted poses, one row for every row of the log that a window covers.
+
+    In each window the model starts from the measured pose, and the measured wheel speeds where the log has them, and is
+    driven by the recorded commands, those before the window included. Windows follow one another; each begins at the
+    first measured pose after the one before it.
+
+    Returns:
+        Columns `episode, start_time, time, x, y, heading` [s], [s], [s], [m], [m], [rad].
+
+    Raises:
+        LogError: If the log has no commands, no poses, or no room for a window.
+    """
+    if not horizon_s * log.rate_hz >= 1.0:
+        raise LogError(f"{log.name}: a horizon of {horizon_s:g} s is shorter than a sample of {1.0 / log.rate_hz:g} s")
+    whole = gather(log, robot, log.episodes)
+    longest = max(len(episode.times) for episode in log.episodes)
+    reach = int(np.floor(min(horizon_s * log.rate_hz, longest) + 1e-9))
+    starts = [_starts(episode, reach) for episode in log.episodes]
+    if not any(len(rows) for rows in starts):
+        raise LogError(f"{log.name}: no measured pose to start a window from")
+    ticks = round(whole.tick_hz / log.rate_hz)
+    windows = _windows(whole, log.episodes, starts, ticks)
+    walked = window_paths(windows, theta, np.arange(len(windows.first)), reach * ticks)
+    poses = _place_at(windows.poses[:, 0], *_at_samples(walked, log.episodes, starts, ticks))
+    cuts = np.cumsum([len(rows) for rows in starts])[:-1]
+    parts = zip(log.episodes, starts, np.split(poses, cuts), strict=True)
+    return pd.concat([_rows(*part) for part in parts if len(part[1])], ignore_index=True)
+
+
+def _rows(episode: LogEpisode, starts: Whole, poses: Floats) -> pd.DataFrame:
+    """The predicted poses (W, rows, 3) of an episode's windows, as far as the episode goes, at its poses' own times."""
+    covered = starts[:, None] + np.arange(poses.shape[1])
+    inside = covered < len(episode.times)
+    known = np.minimum(covered, len(episode.times) - 1)
+    after = as_measured(episode)[1]
+    stamps = episode.times + after
+    if episode.measured is not None:
+        inside &= np.isin(known, episode.measured.rows)
+        stamps[episode.measured.rows] = episode.measured.times
+    start = np.broadcast_to(stamps[starts, None], covered.shape)
+    times = stamps[known]
+    columns = {"start_time": start, "time": times, "x": poses[..., 0], "y": poses[..., 1], "heading": poses[..., 2]}
+    return pd.DataFrame({"episode": episode.name} | {name: values[inside] for name, values in columns.items()})
+
+
+def _at_samples(
+    walked: Floats, episodes: Sequence[LogEpisode], starts: Sequence[Whole], ticks: int
+) -> tuple[Floats, Floats]:
+    """Windows' paths at their samples (W, rows, 3), and at their beginnings (W, 3), when those were measured."""
+    rows = np.arange((walked.shape[1] - 1) // ticks + 1)
+    after = [as_measured(e)[1] * ticks / float(np.diff(e.times[:2])[0]) for e in episodes]
+    late = np.concatenate(
+        [one[np.minimum(s[:, None] + rows, len(one) - 1)] for one, s in zip(after, starts, strict=True)]
+    )
+    window = np.arange(len(walked))
+    return path_between(walked, window[:, None], rows * ticks + late), path_between(walked, window, late[:, 0])
+
+
+def _starts(episode: LogEpisode, reach: int) -> Whole:
+    """Rows at which windows begin: measured ones, at least `reach` apart, not the last row."""
+    known = np.flatnonzero(np.isfinite(episode.poses[:-1]).all(axis=1))
+    starts: list[int] = []
+    at = 0
+    while (later := int(np.searchsorted(known, at))) < len(known):
+        starts.append(int(known[later]))
+        at = starts[-1] + reach
+    return np.array(starts, dtype=int)
+
+
+def _windows(whole: Drives, episodes: Sequence[LogEpisode], starts: Sequence[Whole], ticks: int) -> Drives:
+    """Drives whose increments are the windows' beginnings alone."""
+    poses = np.concatenate([as_measured(one)[0][rows] for one, rows in zip(episodes, starts, strict=True)])
+    first = np.concatenate(starts) * ticks
+    number = np.repeat(np.arange(len(episodes)), [len(rows) for rows in starts])
+    both = np.repeat(poses[:, None], 2, axis=1)
+    return replace(whole, episode=number, first=first, last=first, poses=both, block=np.zeros_like(first))
+
+
+def _place_at(start: Floats, walked: Floats, origin: Floats) -> Floats:
+    """Paths (W, rows, 3) put where they start (W, 3); their own beginnings are the origins (W, 3)."""
+    turn = start[:, None, 2] - origin[:, None, 2]
+    cosine, sine = np.cos(turn), np.sin(turn)
+    moved = walked[..., :2] - origin[:, None, :2]
+    x = start[:, None, 0] + cosine * moved[..., 0] - sine * moved[..., 1]
+    y = start[:, None, 1] + sine * moved[..., 0] + cosine * moved[..., 1]
+    return np.stack((x, y, walked[..., 2] + turn), axis=-1)
+
+
+class Agreement(NamedTuple):
+    """How far predicted poses are from those measured, over windows of the horizon.
+
+    Attributes:
+        place: RMSE of position [m], 0 where nothing can be compared.
+        turn: RMSE of heading [rad], 0 where nothing can be compared.
+        poses: How many poses were compared.
+        windows: In how many windows.
+    """
+
+    place: float
+    turn: float
+    poses: int
+    windows: int
+
+
+def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:
+    """How far predicted poses are from those measured after each window's start.
+
+    Windows in which measured poses reach no further than a stub of the horizon are left out.
+
+    Args:
+        table: What `predict` says of the log.
+        log: The log.
+        horizon_s: Length of the windows [s].
+    """
+    measured = pd.concat(
+        [
+            pd.DataFrame(poses, columns=["x", "y", "heading"]).assign(episode=e.name, time=times)
+            for e in log.episodes
+            for times, poses in [(e.times, e.poses) if e.measured is None else e.measured[:2]]
+        ]
+    )
+    both = table[table.time > table.start_time].merge(measured, on=["episode", "time"], suffixes=("", "_measured"))
+    both = both.dropna()
+    window = both.groupby(["episode", "start_time"])
+    both = both[window.time.transform("max") - both.start_time >= SHORTEST * horizon_s - 1e-9]
+    if both.empty:
+        return Agreement(0.0, 0.0, 0, 0)
+    place = (both.x - both.x_measured) ** 2 + (both.y - both.y_measured) ** 2
+    turn = both.heading - both.heading_measured
+    count = len(both[["episode", "start_time"]].drop_duplicates())
+    return Agreement(float(np.sqrt(place.mean())), float(np.sqrt((turn**2).mean())), len(both), count)
+
+
+FITTED_S = 2.0
+"""What is learnt is fitted to windows of this length [s]."""
+
+POSES = 8
+"""No more poses are compared in a window."""
+
+MOST_WINDOWS = 600
+"""No more windows are fitted, spread evenly over the drives."""
+
+
+class Slopes(NamedTuple):
+    """Windows' poses as they are compared, in metres.
+
+    Attributes:
+        left: Measured less predicted (M, 3): forward, left, and heading times the median way.
+        columns: Change of the prediction per weight (M, 3, weights), curve by curve.
+        block: The block of each pose (M,).
+    """
+
+    left: Floats
+    columns: Floats
+    block: Whole
+
+
+def choose_windows(drives: Drives) -> Windows:
+    """Choose the windows and poses that are fitted: few enough, and evenly spread."""
+    windows = cut(drives, FITTED_S)
+    step = int(np.ceil(len(windows.begin) / MOST_WINDOWS))
+    windows = select_windows(windows, np.arange(len(windows.begin)) % step == 0)
+    tick = drives.last[windows.increment] - drives.first[windows.begin][windows.window]
+    part = windows.window * POSES + np.minimum(POSES - 1, tick * POSES // (FITTED_S * drives.tick_hz)).astype(int)
+    last = np.concatenate((part[1:] != part[:-1], [True]))
+    return Windows(windows.begin, windows.window[last], windows.increment[last])
+
+
+def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
+    """Linearise windows in the weights of learnt curves, around a model that may have a learnt effect itself.
+
+    Args:
+        drives: What is fitted.
+        theta: The model.
+        offered: The curves whose weights may change.
+    """
+    windows = choose_windows(drives)
+    begin, window = windows.begin, windows.window
+    tick = drives.last[windows.increment] - drives.first[begin][window]
+    length = length_of(drives, windows)
+    named = {name: value for name, value in theta.items() if not is_learnt(name)}
+    twists = window_twists(drives, theta, begin, length)
+    walked = tracked_paths(drives, theta, twists)
+    predicted = motion_in(drives, walked, windows)
+    measured = relative(drives.poses[begin[window], 0], drives.poses[windows.increment, 1])
+    way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
+    features = window_features(drives, named, offered, begin, length)
+    lever = _lever(twists, walked, 1.0 / drives.tick_hz)
+    parts = [_pose_slopes(lever, basis, unit, (window, tick - 1)) for basis, unit in features]
+    turn = walked[window, 0, 2]
+    columns = _turn_frames(np.concatenate(parts, axis=-1), -turn)
+    scale = np.array((1.0, 1.0, way))
+    return Slopes((measured - predicted) * scale, columns * scale[:, None], drives.block[begin[window]])
+
+
+class _Lever(NamedTuple):
+    """What a twist added in one tick does to the places that come after, as complex numbers (W, length).
+
+    Attributes:
+        along: The way of forward motion at 1 m/s within the tick [m].
+        about: How far a turn at 1 rad/s within the tick moves places, less what the next says [m].
+        after: How far a turn by 1 rad moves the tracked place after the tick, seen from the origin [m].
+        tick_s: Length of a tick [s].
+    """
+
+    along: Floats
+    about: Floats
+    after: Floats
+    tick_s: float
+
+
+def _lever(twists: Floats, walked: Floats, tick_s: float) -> _Lever:
+    """The lever of twists (W, length, 3), along which the tracked places (W, length + 1, 3) are."""
+    poses = walk(twists, tick_s)
+    cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
+    axle = 0.5 * (poses[:, 1:] + poses[:, :-1])
+    about = (axle[..., 1] - 1j * axle[..., 0]) * tick_s
+    return _Lever((cosine + 1j * sine) * tick_s, about, 1j * walked[:, 1:, 0] - walked[:, 1:, 1], tick_s)
+
+
+def _pose_slopes(lever: _Lever, basis: Floats, unit: Floats, at: tuple[Whole, Whole]) -> Floats:
+    """Change of compared poses (M, 3, knots) per weight of a curve, to first order.
+
+    Args:
+        lever: That of the windows.
+        basis: What each weight adds in each tick (W, length, knots), in this unit.
+        unit: The unit, a twist (3,).
+        at: Window and tick after which each pose is compared, (M,) each.
+    """
+    place = (unit[0] + 1j * unit[1]) * lever.along + unit[2] * lever.about
+    turned = np.cumsum(basis, axis=1)[at] * (unit[2] * lever.tick_s)
+    moved = np.cumsum(place[..., None] * basis, axis=1)[at] + lever.after[at][:, None] * turned
+    return np.stack((moved.real, moved.imag, turned), axis=1)
+
+
+def _turn_frames(changes: Floats, angle: Floats) -> Floats:
+    """Changes of poses (M, 3, knots) seen from frames turned by minus an angle (M,)."""
+    cosine, sine = (part[:, None] for part in cosine_and_sine(angle))
+    x = cosine * changes[:, 0] - sine * changes[:, 1]
+    y = sine * changes[:, 0] + cosine * changes[:, 1]
+    return np.stack((x, y, changes[:, 2]), axis=1)
+
+
+FEWEST = 20
+"""Of fewer windows that were driven several times nothing is said."""
+
+ALIKE = 1e-6
+"""Commands that differ by less than this [duty] are the same."""
+
+
+class Repeated(NamedTuple):
+    """The scatter of drives from the same commands, beside the error of a model.
+
+    Attributes:
+        share: What they do not repeat, by the model's error over the same windows: at 1 it predicts all that repeats.
+        apart: What they do not repeat: RMSE of position [m].
+        part: The share of all windows that have repeats.
+    """
+
+    share: Ratio
+    apart: float
+    part: float
+
+
+def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
+    """Compare a model's error with what drives do not repeat; None where too little was driven twice.
+
+    Of windows driven n times the mean is taken off, and n/(n − 1) gives back
+    what that takes: for two drives, √(½ mean square of their difference).
+
+    Args:
+        drives: All drives of a log, each as one block, so that windows of repeats begin together.
+        theta: The model.
+        horizon_s: Length of the windows [s].
+    """
+    windows = cut(drives, horizon_s)
+    if len(windows.begin) < FEWEST:
+        return None
+    label, counts = _label_repeats(drives, windows)
+    kept = counts[label] > 1
+    if len(np.unique(windows.window[kept])) < FEWEST:
+        return None
+    apart = _scatter_of_repeats(measured_motion(drives, windows)[:, :2], label, counts)
+    missed = pose_errors(drives, theta, windows)[:, 0] ** 2
+    first = np.flatnonzero(np.diff(windows.window, prepend=-1))
+    share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])
+    return Repeated(share, float(np.sqrt(apart[kept].mean())), float(kept.mean()))
+
+
+def _label_repeats(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
+    """Label each compared pose by what it repeats (M,), and count how often each of those was driven.
+
+    A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero.
+    """
+    begin, end = drives.first[windows.begin][windows.window], drives.last[windows.increment]
+    past = _histories(drives)[drives.episode[windows.increment], end - 1]
+    alone = np.where(past == 0, np.arange(len(past)) + 1, 0)
+    _, label, counts = np.unique(np.stack((past, begin, end, alone)), axis=1, return_inverse=True, return_counts=True)
+    return label.ravel(), counts
+
+
+def _histories(drives: Drives) -> Whole:
+    """A number for all commands up to each tick (E, T): equal ones have the same, and no commands have 0."""
+    rounded = np.round(drives.duties / ALIKE).astype(np.int64)
+    weights = np.random.default_rng(1).integers(1, 2**62, size=rounded.shape[1:])
+    return np.asarray(np.cumsum((rounded * weights).sum(axis=-1), axis=1))
+
+
+def _scatter_of_repeats(moved: Floats, label: Whole, counts: Whole) -> Floats:
+    """Squared distance [m²] of each motion (M, 2) from the mean of its repeats, as if that were known without error."""
+    mean = sum_by(label, moved, len(counts)) / counts[:, None]
+    share = np.maximum(1, counts - 1)[label] / counts[label]
+    return np.asarray(np.square(moved - mean[label]).sum(axis=1) / share)

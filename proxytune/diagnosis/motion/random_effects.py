@@ -1,0 +1,272 @@
+"""Effects that strike at random: what they do to single commands, weighed as a mixture over all commands.
+
+A mean model cannot see them: a command that is lost now and then changes the motion after it, not on average.
+
+How large a random effect is: of that size, simulated drives speak for it as the measured ones do.
+
+The likelihood of single commands takes all others as they were sent. Where many are lost or late it finds too small a
+size, and much too narrow an interval; simulated drives have the same fault, and so give it back (indirect inference).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
+from proxytune.diagnosis.motion.fitting import Fit
+from proxytune.diagnosis.motion.innovations import (
+    HUBER,
+    RANDOM_EFFECTS,
+    clip_outliers,
+    drawn_paths,
+    increments,
+    increments_along,
+    lateness,
+    paths,
+)
+from proxytune.effects import Draws, Lateness
+
+MEMORY_S = 2.5
+"""A command moves nothing any more after so long."""
+
+GRID = 25
+"""Sizes that are tried at first, evenly in their logarithm."""
+
+SHIFTS = 99
+"""How often the null distribution is drawn."""
+
+
+class Responses(NamedTuple):
+    """What would have happened had a command been lost: one row per command that changed anything.
+
+    Attributes:
+        pull: Inner product of the change of the innovations with the innovations.
+        size: Inner product of the change with itself.
+        others: The pull had the innovations been others (columns, commands).
+    """
+
+    pull: Floats
+    size: Floats
+    others: Floats
+
+
+class RandomEffect(NamedTuple):
+    """A random effect weighed.
+
+    Attributes:
+        effect: Its name in the catalogue.
+        parameter: The name of its parameter in θ.
+        value: Its likeliest size.
+        interval: Where the size lies; all sizes that are looked for, until `size_random_effect` narrows them.
+        gain: Its gain in log-likelihood beyond what chance gives on average [nats].
+        p_value: How often chance gains as much.
+    """
+
+    effect: str
+    parameter: str
+    value: float
+    interval: tuple[float, float]
+    gain: float
+    p_value: float
+
+
+def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
+    """Every effect that draws, weighed on what the model leaves over."""
+    z = fitted.innovations.reshape(-1, 3)
+    shifts = _shifts(len(z), seed)
+    answered = responses(fitted, np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1))
+    if len(answered.size) == 0:
+        return ()
+    rate = fitted.drives.rate_hz
+    return tuple(_weigh(name, draws, rate, answered) for name, draws in RANDOM_EFFECTS.items())
+
+
+def _weigh(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
+    best, gain = likeliest_size(draws, rate_hz, answered.pull, answered.size)
+    chance = np.max([_ratio(draws, rate_hz, size, answered.others, answered.size) for size in _grid(draws)], axis=0)
+    p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
+    return RandomEffect(effect, effect, best, draws.sizes, gain - max(0.0, float(chance.mean())), p_value)
+
+
+def likeliest_size(draws: Draws, rate_hz: float, pull: Floats, energy: Floats) -> tuple[float, float]:
+    """The size of an effect that the responses of commands (commands,) speak for most, and what it gains [nats]."""
+    grid = _grid(draws)
+    here = int(np.argmax([_ratio(draws, rate_hz, size, pull, energy) for size in grid]))
+    ends = np.log((grid[max(0, here - 1)], grid[min(len(grid) - 1, here + 1)]))
+    found = minimize_scalar(
+        lambda log: -float(_ratio(draws, rate_hz, float(np.exp(log)), pull, energy)),
+        bounds=(float(ends[0]), float(ends[1])),
+        method="bounded",
+    )
+    return float(np.exp(found.x)), -float(found.fun)
+
+
+def _grid(draws: Draws) -> Floats:
+    return np.geomspace(*draws.sizes, GRID)
+
+
+def _ratio(draws: Draws, rate_hz: float, size: float, pull: Floats, energy: Floats) -> Floats:
+    """The log-likelihood ratio of an effect of this size, over all commands (…,)."""
+    late = draws.lateness(size, rate_hz)
+    return np.asarray(np.apply_along_axis(lambda row: _mixture(late, row, energy).sum(), -1, pull))
+
+
+def _mixture(late: Lateness, pull: Floats, energy: Floats) -> Floats:
+    """The log-likelihood ratio of each command's having been late by one of these times (commands,)."""
+    steps = np.stack((-late.commands, -0.5 * late.commands**2, late.log_weights), axis=1)
+    ratios = steps @ np.stack((pull, energy, np.ones_like(pull)))
+    most = ratios.max(axis=0)
+    return np.asarray(most + np.log(np.exp(ratios - most).sum(axis=0)))
+
+
+def responses(fitted: Fit, others: Floats) -> Responses:
+    """What the loss of each command would have changed.
+
+    Commands far apart are lost together, so that one replay tells of many.
+
+    Args:
+        fitted: The model, and what it leaves over.
+        others: Other innovations, for which the same is asked (3N, columns).
+    """
+    drives = fitted.drives
+    changed, phase = _changed_commands(drives)
+    values = np.concatenate((fitted.innovations[:, None], others), axis=1)
+    heard = _Innovations(values, values**2)
+    found = [_respond_to_phase(fitted, changed[phase == number], heard) for number in np.unique(phase)]
+    if not found:
+        return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
+    size, pulls = (np.concatenate(part) for part in zip(*found, strict=True))
+    kept = size > 1e-3
+    return Responses(pulls[kept, 0], size[kept], pulls[kept, 1:].T)
+
+
+def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
+    """Episode and tick of every command that differs from the one before it (C, 2), and its phase (C,).
+
+    Those of one phase are at least MEMORY_S apart: of commands closer together than usual the first counts.
+    """
+    before = np.concatenate((drives.rest[:, None], drives.duties[:, :-1]), axis=1)
+    found = np.argwhere(drives.issued & np.any(np.abs(drives.duties - before) > 1e-9, axis=-1))
+    number = np.floor(found[:, 1] * drives.rate_hz / drives.tick_hz + 1e-6).astype(int)
+    _, first = np.unique(found[:, 0] * (number.max(initial=0) + 1) + number, return_index=True)
+    return found[first], number[first] % math.ceil(MEMORY_S * drives.rate_hz)
+
+
+def _lose_commands(drives: Drives, lost: Whole) -> Floats:
+    """Duties without some commands: the one before stays in force until the next."""
+    duties = drives.duties.copy()
+    for episode, tick in lost:
+        later = np.flatnonzero(drives.issued[episode, tick + 1 :])
+        end = tick + 1 + int(later[0]) if len(later) else duties.shape[1]
+        duties[episode, tick:end] = drives.rest[episode] if tick == 0 else drives.duties[episode, tick - 1]
+    return duties
+
+
+class _Innovations(NamedTuple):
+    """The innovations of a model and others beside them (3N, columns), and their squares."""
+
+    values: Floats
+    squares: Floats
+
+
+def _respond_to_phase(fitted: Fit, lost: Whole, heard: _Innovations) -> tuple[Floats, Floats]:
+    """The size of the response to each command of one phase (commands,), and its pulls (commands, columns)."""
+    drives = fitted.drives
+    without = increments_along(drives, paths(drives, fitted.theta, _lose_commands(drives, lost)))
+    change = fitted.whiten.whiten(increments(drives, fitted.theta) - without)
+    label = np.repeat(_label(drives, lost), 3)
+    size = sum_by(label, change**2, len(lost))
+    pulls = sum_by(label, heard.values, len(lost), change)
+    return size, pulls / _loudness(label, change, heard, pulls / (size[:, None] + 1e-12))
+
+
+def _loudness(label: Whole, change: Floats, heard: _Innovations, share: Floats) -> Floats:
+    """Standard deviation of what the loss of a command does not explain, where it acts, at least 1 (commands, columns).
+
+    After a command all motion may be harder to predict: only what points its way speaks for its loss.
+    """
+    weight, count = np.abs(change), len(share)
+    total = sum_by(label, weight, count)[:, None] + 1e-12
+    along = sum_by(label, heard.values, count, weight * change)
+    cubes = sum_by(label, weight, count, change**2)[:, None]
+    energy = sum_by(label, heard.squares, count, weight) - 2.0 * share * along + share**2 * cubes
+    return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
+
+
+def _label(drives: Drives, lost: Whole) -> Whole:
+    """Which lost command each increment comes after, −1 where none (N,)."""
+    length = drives.duties.shape[1]
+    at = np.searchsorted(lost @ (length, 1), drives.episode * length + drives.last - 1, side="right") - 1
+    return np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
+
+
+def _shifts(length: int, seed: int) -> Whole:
+    return np.random.default_rng(seed).integers(length // 20 + 1, length - length // 20, size=SHIFTS)
+
+
+SMALLEST, LARGEST, SIZES = 0.6, 3.0, 8
+"""Simulated sizes lie between these multiples of the likeliest one."""
+
+DRAWS = 5
+"""Drives are simulated so often for each size."""
+
+QUIETEST = 0.1
+"""Noise has at least this share of the innovations' variance."""
+
+STEPS = 3
+"""Newton steps of the free parameters: a lost command is an outlier, which a robust fit hardly follows."""
+
+WIDE = 2.2
+"""Half an interval is so many standard deviations between simulated drives: 95 % for some thirty of them."""
+
+
+def size_random_effect(model: Fit, effect: RandomEffect, seed: int) -> RandomEffect:
+    """The effect with the size at which simulated drives say what the measured ones do, and its interval.
+
+    Args:
+        model: The model without the effect, whose delay has its mean lateness.
+        effect: The effect, as the likelihood of single commands has it.
+        seed: Of draws and noise.
+    """
+    draws, rate = RANDOM_EFFECTS[effect.effect], model.drives.rate_hz
+    sizes = np.geomspace(SMALLEST * effect.value, min(LARGEST * effect.value, draws.sizes[1]), SIZES)
+    simulated = [_simulate_innovations(model, effect, size, seed + n) for n in range(DRAWS) for size in sizes]
+    answered = responses(model, np.stack(simulated, axis=1))
+    likeliest = np.log([likeliest_size(draws, rate, pull, answered.size)[0] for pull in answered.others])
+    value, low, high = _invert(sizes, likeliest.reshape(DRAWS, SIZES), float(np.log(effect.value)))
+    return effect._replace(value=value, interval=(low, high))
+
+
+def _invert(sizes: Floats, likeliest: Floats, measured: float) -> Sequence[float]:
+    """The size of which drives say what is measured, and the least and greatest of which they still might."""
+    means = np.maximum.accumulate(likeliest.mean(axis=0)) + 1e-9 * np.arange(len(sizes))
+    spread = WIDE * float(np.sqrt(np.mean(np.var(likeliest, axis=0, ddof=1))))
+    return [
+        float(np.exp(np.interp(one, means, np.log(sizes)))) for one in (measured, measured - spread, measured + spread)
+    ]
+
+
+def _simulate_innovations(model: Fit, effect: RandomEffect, size: float, seed: int) -> Floats:
+    """What the model leaves over of drives with the effect and noise, as loud as that of the measured ones (3N,)."""
+    drives = model.drives
+    late = lateness({effect.parameter: size}, drives.rate_hz)
+    theta = {**model.theta, effect.parameter: size, "delay": max(0.0, model.theta["delay"] - late)}
+    drawn = increments_along(drives, drawn_paths(drives, theta, seed)) - increments(drives, model.theta)
+    struck = model.whiten.whiten(drawn)
+    noise = np.random.default_rng(seed).standard_normal(len(struck))
+    share = max(QUIETEST, 1.0 - float(np.mean(struck**2)) / float(np.mean(model.innovations**2)))
+    return _refit(model, struck + np.sqrt(share * np.mean(model.innovations**2)) * noise)
+
+
+def _refit(model: Fit, innovations: Floats) -> Floats:
+    """What is left of innovations (3N,) once the model's free parameters have been fitted to them."""
+    left = innovations
+    for _ in range(STEPS):
+        weighted = model.slopes * (np.abs(left) < HUBER)[:, None]
+        left = left - model.slopes @ (
+            np.linalg.pinv(weighted.T @ model.slopes) @ (model.slopes.T @ clip_outliers(left))
+        )
+    return left

@@ -1,0 +1,385 @@
+"""Which effects could explain what is left: one step from every probe value, and what chance would make of it.
+
+What might be missing: every motion effect of a catalogue, in the forms it can take.
+Probes close together, for effects that no slope leads to, steps and places; tried on a part of the drives.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product, repeat
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
+from proxytune.diagnosis.motion.fitting import Fit, evaluate, held_out_log_likelihood
+from proxytune.diagnosis.motion.innovations import (
+    HUBER,
+    RANDOM_EFFECTS,
+    Coordinate,
+    clip_outliers,
+    increments,
+    span,
+    theta_at,
+)
+from proxytune.driving import Robot
+from proxytune.effects import CATALOGUE, Catalogue, Effect, Form, theta_names
+from proxytune.space import Parameter, Theta
+
+MOTION_EFFECTS = tuple(name for name, effect in CATALOGUE.items() if effect.trace)
+"""The shipped effects that measured motion can show."""
+
+
+def motion_effects(catalogue: Catalogue) -> tuple[str, ...]:
+    """The effects of a catalogue that measured motion can show."""
+    outside = (name for name in catalogue.names if name not in CATALOGUE)
+    return (*MOTION_EFFECTS, *(name for name in outside if catalogue.effect(name).trace))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One form of an effect: what is free in it, what is fixed, and where a search starts.
+
+    Attributes:
+        effect: Its name in the catalogue.
+        form: What is special about this form: `left wheel`; empty where nothing is.
+        free: Its coordinates.
+        fixed: Its other parameters.
+        neutral: Where the model has its coordinates.
+        probes: Where a search starts, one value per coordinate.
+    """
+
+    effect: str
+    form: str
+    free: tuple[Coordinate, ...]
+    fixed: Mapping[str, float]
+    neutral: tuple[float, ...]
+    probes: tuple[tuple[float, ...], ...]
+
+    @property
+    def label(self) -> str:
+        """What people read: `dead_band (left wheel)`."""
+        return f"{self.effect} ({self.form})" if self.form else self.effect
+
+
+def candidates(robot: Robot, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
+    """Every form of every deterministic motion effect that is not taken.
+
+    Args:
+        robot: The robot, whose catalogue says what there is.
+        theta: Values of effects that the model has: a form starts from there.
+        taken: Names of effects that are declared or adopted.
+    """
+    kept = set(taken)
+    found: list[Candidate] = []
+    for name in motion_effects(robot.catalogue):
+        if name not in kept and name not in RANDOM_EFFECTS:
+            found += _forms(name, robot, theta)
+    return tuple(found)
+
+
+def _forms(effect: str, robot: Robot, theta: Theta) -> list[Candidate]:
+    kind = robot.catalogue.effect(effect)
+    known = {
+        parameter.name: theta.get(name, parameter.neutral_value(robot.figures))
+        for name, parameter in zip(theta_names(kind, effect), kind.parameters, strict=True)
+    }
+    present = known[kind.parameters[0].name] != kind.parameters[0].neutral
+    return [_candidate(effect, kind, form, known) for form in _forms_of(kind) if form.present in (None, present)]
+
+
+def _forms_of(kind: type[Effect]) -> tuple[Form, ...]:
+    """The forms that an effect may take: with every parameter free, unless it says otherwise."""
+    stated = kind.trace.forms if kind.trace else ()
+    return stated or (Form(tuple((parameter.name,) for parameter in kind.parameters)),)
+
+
+def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, float]) -> Candidate:
+    names = {parameter.name: name for parameter, name in zip(kind.parameters, theta_names(kind, effect), strict=True)}
+    parameters = {parameter.name: parameter for parameter in kind.parameters}
+    held = {name for coordinate in form.free for name in coordinate}
+    tried = [
+        _other_probes(parameters[first], known[first])
+        if first in form.moved or not form.moved
+        else repeat(known[first])
+        for first, *_ in form.free
+    ]
+    return Candidate(
+        effect=effect,
+        form=form.name,
+        free=tuple(tuple(names[name] for name in coordinate) for coordinate in form.free),
+        fixed={names[name]: form.fixed.get(name, value) for name, value in known.items() if name not in held},
+        neutral=tuple(known[first] for first, *_ in form.free),
+        probes=tuple(zip(*tried, strict=False)),
+    )
+
+
+def _other_probes(parameter: Parameter, here: float) -> tuple[float, ...]:
+    """The probes that differ from where the model is."""
+    return tuple(value for value in parameter.probes if not math.isclose(value, here, abs_tol=1e-9))
+
+
+SIZES = 240
+"""So many sizes of a step are tried: the loss over a step of the command is a spike 2 % wide."""
+
+SMALLEST_SHARE = 0.02
+"""The smallest of them, as a share of the largest."""
+
+PART_S, STRETCH_S, WARM_UP_S = 60.0, 8.0, 2.0
+"""They are tried on so much driving, in stretches of this length; the warm-up of each is not compared."""
+
+CELL_M = 0.3
+RADII_M = (0.4, 1.0)
+"""Places lie so far apart, and patches of these radii are tried round each."""
+
+MOST_PLACES = 40
+
+LARGEST_STEP = 1.5
+"""A step may go so many times as far as its probe."""
+
+Values = tuple[float, ...]
+
+
+def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
+    """The forms, those of stepwise effects and of effects of a place with the best of many more probes."""
+    dense = [form for form in forms if not form.form and _dense_along(form, base.drives.robot) is not None]
+    if not dense:
+        return list(forms)
+    part = cut_part(base.drives)
+    left = _residual_of(evaluate(part, base.theta, base.free, base.noise))
+    best = {form.effect: _best_probe(left, form) for form in dense}
+    return [replace(form, probes=(*form.probes, *best.get(form.effect, ()))) for form in forms]
+
+
+def _dense_along(form: Candidate, robot: Robot) -> str | None:
+    """What further probes of an effect lie along: its `steps`, or its `place`; None where it needs none."""
+    trace = robot.catalogue.effect(form.effect).trace
+    if trace is None:
+        return None
+    return "steps" if trace.stepwise else "place" if trace.placed else None
+
+
+class _Residual(NamedTuple):
+    """A model, its increments, which of its innovations count, and how its free parameters answer columns."""
+
+    model: Fit
+    predicted: Floats
+    weight: Floats
+    answer: Floats
+
+
+def _residual_of(model: Fit) -> _Residual:
+    weight = (np.abs(model.innovations) < HUBER).astype(float)
+    weighted = model.slopes * weight[:, None]
+    answer = np.linalg.pinv(model.slopes.T @ weighted, hermitian=True) @ weighted.T
+    return _Residual(model, increments(model.drives, model.theta), weight, answer)
+
+
+def _best_probe(left: _Residual, form: Candidate) -> tuple[Values, ...]:
+    """The probe that gains most, none where none gains anything."""
+    robot = left.model.drives.robot
+    steps = _dense_along(form, robot) == "steps"
+    offers = list(_sizes(form, robot) if steps else _places(left.model.drives, form))
+    gains = [_gain(left, form, values) for values in offers]
+    return (offers[int(np.argmax(gains))],) if gains and max(gains) > 0.0 else ()
+
+
+def _sizes(form: Candidate, robot: Robot) -> Iterable[Values]:
+    """Sizes of a step, its other coordinates where the model has them."""
+    high = span(form.free[0], robot)[1]
+    for size in np.geomspace(SMALLEST_SHARE * high, high, SIZES).tolist():
+        yield (size, *form.neutral[1:])
+
+
+def _places(drives: Drives, form: Candidate) -> Iterable[Values]:
+    """Patches round places that were driven through, their first coordinate at its middle probe."""
+    cells = np.round(drives.poses[:, 0, :2] / CELL_M)
+    found, often = np.unique(cells, axis=0, return_counts=True)
+    places = found[np.argsort(-often, kind="stable")[:MOST_PLACES]] * CELL_M
+    size = form.probes[len(form.probes) // 2][0]
+    for (x, y), radius in product(places.tolist(), RADII_M):
+        yield (size, x, y, radius)
+
+
+def _gain(left: _Residual, form: Candidate, values: Values) -> float:
+    """What one step towards a probe gains, the free parameters having done what they can [nats]."""
+    model = left.model
+    theta = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
+    column = model.whiten.whiten(left.predicted - increments(model.drives, theta))
+    column = column - model.slopes @ (left.answer @ column)
+    pull, size = float(column @ clip_outliers(model.innovations)), float(column**2 @ left.weight)
+    step = min(max(-pull / size, 0.0), LARGEST_STEP) if size > 1e-9 else 0.0
+    return -step * pull - 0.5 * step**2 * size
+
+
+def cut_part(drives: Drives) -> Drives:
+    """Cut stretches out of drives, evenly spread, each an episode that goes on from the commands before it."""
+    ticks, warm = round(STRETCH_S * drives.tick_hz), round(WARM_UP_S * drives.tick_hz)
+    every = max(ticks, round(ticks * drives.seconds / PART_S))
+    length = drives.duties.shape[1]
+    begin = np.arange(0, max(1, length - ticks + 1), every)
+    episode, start = (grid.ravel() for grid in np.meshgrid(np.arange(len(drives.duties)), begin, indexing="ij"))
+    number = drives.episode * len(begin) + np.minimum(drives.first // every, len(begin) - 1)
+    first, last = drives.first - start[number], drives.last - start[number]
+    inside = (first >= np.where(start[number] > 0, warm, 0)) & (last <= ticks)
+    kept, chosen = drives.only(inside), np.flatnonzero(inside)
+    at = start[:, None] + np.arange(ticks)
+    rows = episode[:, None], np.minimum(at, length - 1)
+    before = drives.duties[episode, np.maximum(start - 1, 0)]
+    return replace(
+        kept,
+        duties=drives.duties[rows],
+        rest=np.where(start[:, None] > 0, before, drives.rest[episode]),
+        headings=drives.headings[rows],
+        episode=number[chosen],
+        first=first[chosen],
+        last=last[chosen],
+        linked=kept.linked & np.concatenate(([False], np.diff(number[chosen]) == 0)),
+        wheels=None if drives.wheels is None else drives.wheels[rows],
+    )
+
+
+FLIPS = 499
+"""How often the null distribution is drawn."""
+
+FLIP_S = 1.0
+"""Innovations keep their sign together for so long: longer than their correlation."""
+
+FURTHEST = 2.0
+"""A step may go so many times as far as its probe."""
+
+
+class Lead(NamedTuple):
+    """A form of an effect worth fitting.
+
+    Attributes:
+        candidate: The form.
+        start: Values of its coordinates to start from.
+        probe: The probe that the step set out for.
+        gain: What one step gains in log-likelihood [nats].
+        held_out: What it gains on blocks that it was not fitted to [nats].
+        p_value: How often chance gains as much with any form of any effect.
+        column: The direction in the innovations that it explains, declared parameters projected out (3N,).
+    """
+
+    candidate: Candidate
+    start: tuple[float, ...]
+    probe: tuple[float, ...]
+    gain: float
+    held_out: float
+    p_value: float
+    column: Floats
+
+
+@dataclass(frozen=True)
+class _Probe:
+    """One probe of one form: where it sets out from, and the change of the innovations along each coordinate."""
+
+    candidate: Candidate
+    begin: tuple[float, ...]
+    values: tuple[float, ...]
+    columns: Floats
+
+
+def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[Lead]:
+    """The leads, best first, one for every form that changes anything in these drives."""
+    probes = [probe for form in with_dense_probes(base, forms) for probe in _probes(base, form)]
+    if not probes:
+        return []
+    weight = np.abs(base.innovations) < HUBER
+    projected = [project_out(base.slopes, probe.columns, weight) for probe in probes]
+    number = number_stretches(base.drives)
+    flips = _signs(int(number.max()) + 1, seed)
+    best: dict[str, tuple[float, Floats, _Probe, Floats]] = {}
+    chance = np.zeros(FLIPS)
+    for probe, columns in zip(probes, projected, strict=True):
+        pulls = _by_stretch(number, columns * clip_outliers(base.innovations)[:, None])
+        curve = columns.T @ (columns * weight[:, None])
+        gain, step = _step(pulls.sum(axis=0), curve)
+        chance = np.maximum(chance, _gains(flips @ pulls, curve))
+        old = best.get(probe.candidate.label)
+        if old is None or gain > old[0]:
+            best[probe.candidate.label] = (gain, step, probe, columns)
+    plain = float(held_out_log_likelihood(base).sum())
+    leads = [_lead(base, *found, chance, plain) for found in best.values()]
+    return sorted(leads, key=lambda lead: -lead.gain)
+
+
+def _lead(base: Fit, gain: float, step: Floats, probe: _Probe, columns: Floats, *null: Any) -> Lead:
+    chance, plain = null
+    stepped = replace(
+        base,
+        innovations=base.innovations + columns @ step,
+        slopes=np.concatenate((base.slopes, columns), axis=1) if step.any() else base.slopes,
+    )
+    p_value = float((1 + (chance >= gain).sum()) / (1 + FLIPS))
+    held_out = float(held_out_log_likelihood(stepped).sum()) - plain
+    return Lead(probe.candidate, _values_after(probe, step), probe.values, gain, held_out, p_value, columns @ step)
+
+
+def _probes(base: Fit, form: Candidate) -> list[_Probe]:
+    start = {**base.theta, **form.fixed}
+    here = increments(base.drives, base.theta)
+    found = []
+    for values in form.probes:
+        begin = _begin(form, values, base.drives.robot.catalogue.parameters)
+        moved = [theta_at(start, form.free, np.array((*begin[:j], v, *begin[j + 1 :]))) for j, v in enumerate(values)]
+        columns = np.stack([here - increments(base.drives, theta) for theta in moved], -1)
+        if np.abs(columns).max() > 1e-9:
+            found.append(_Probe(form, begin, values, base.whiten.whiten(columns)))
+    return found
+
+
+def _begin(form: Candidate, values: tuple[float, ...], parameters: Mapping[str, Parameter]) -> tuple[float, ...]:
+    """Where the model has a form's coordinates; what shapes an effect that is still to come may be at its probe."""
+    if values[0] == form.neutral[0]:
+        return form.neutral
+    pairs = zip(form.free, values, form.neutral, strict=True)
+    return tuple(value if parameters[first].shape else neutral for (first, *_), value, neutral in pairs)
+
+
+def project_out(slopes: Floats, columns: Floats, weight: Floats) -> Floats:
+    """Project out of columns everything that the free parameters can do."""
+    if slopes.shape[1] == 0:
+        return columns
+    weighted = slopes * weight[:, None]
+    inverse = np.linalg.pinv(slopes.T @ weighted, hermitian=True)
+    return np.asarray(columns - slopes @ (inverse @ (weighted.T @ columns)))
+
+
+def number_stretches(drives: Drives) -> Whole:
+    """Number the stretches of FLIP_S that the increments are in (N,)."""
+    second = np.floor(drives.first / drives.tick_hz / FLIP_S).astype(int)
+    _, number = np.unique(drives.episode * (second.max() + 1) + second, return_inverse=True)
+    return number
+
+
+def _by_stretch(number: Whole, values: Floats) -> Floats:
+    return sum_by(number, values.reshape(len(number), 3, -1).sum(axis=1), int(number.max()) + 1)
+
+
+def _signs(count: int, seed: int) -> Floats:
+    return np.random.default_rng(seed).choice((-1.0, 1.0), size=(FLIPS, count))
+
+
+def _step(pull: Floats, curve: Floats) -> tuple[float, Floats]:
+    """The gain of the best step along the columns, and the step: forwards only where one column moves anything."""
+    best = -np.linalg.pinv(curve, hermitian=True) @ pull
+    if np.count_nonzero(curve.diagonal()) == 1:
+        best = np.clip(best, 0.0, FURTHEST)
+    return float(-(pull @ best + 0.5 * best @ curve @ best)), best
+
+
+def _gains(pulls: Floats, curve: Floats) -> Floats:
+    """The same gain for many pulls (draws, columns)."""
+    best = -pulls @ np.linalg.pinv(curve, hermitian=True)
+    if np.count_nonzero(curve.diagonal()) == 1:
+        best = np.clip(best, 0.0, FURTHEST)
+    return np.asarray(-((pulls * best).sum(axis=1) + 0.5 * np.einsum("ni,ij,nj->n", best, curve, best)))
+
+
+def _values_after(probe: _Probe, step: Floats) -> tuple[float, ...]:
+    """The values at which a step ends; to a probe is one step."""
+    pairs = zip(probe.begin, probe.values, step, strict=True)
+    return tuple(float(begin + m * (value - begin)) for begin, value, m in pairs)

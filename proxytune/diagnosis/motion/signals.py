@@ -1,0 +1,333 @@
+"""What a residual may depend on: signals of the drives, and flexible motion as curves over each of them.
+
+The flexible judge: how much of what is left any curve over one signal can explain.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from proxytune.diagnosis.motion.drives import Drives, Floats
+from proxytune.diagnosis.motion.fitting import (
+    Fit,
+    held_out_innovations,
+    held_out_log_likelihood,
+    replace_noise,
+    slopes_by_block,
+)
+from proxytune.diagnosis.motion.innovations import (
+    arrived_commands,
+    fit_noise,
+    huber,
+    increments,
+    increments_of_twists,
+    twists_of,
+    wheel_speeds,
+)
+from proxytune.effects import CATALOGUE, Cue
+
+KNOTS = 6
+"""Corners of a curve over a signal."""
+
+PATCH_M = 0.3
+MOST_PATCHES = 14
+"""Over a position, corners lie this far apart [m], but there are no more than so many."""
+
+
+class _Signal(NamedTuple):
+    """A signal (E, T), its unit, and the motion that depends on it, per basis function (E, T, 3, columns)."""
+
+    name: Cue
+    signal: Floats
+    unit: str
+    twists: Floats
+
+
+@dataclass(frozen=True)
+class SignalGroup:
+    """Flexible motion that depends on one signal.
+
+    Attributes:
+        name: What people call the signal.
+        signal: The signal over time, for drawing (E, T).
+        unit: Its unit.
+        make: Makes the motion that depends on it: of long drives it is too large to be kept.
+    """
+
+    name: Cue
+    signal: Floats
+    unit: str
+    make: Callable[[], _Signal]
+
+    @property
+    def twists(self) -> Floats:
+        """Motion added to that of the model, per basis function (E, T, 3, columns): [m/s], [m/s], [rad/s]."""
+        return self.make().twists
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects that act through it."""
+        return tuple(name for name, effect in CATALOGUE.items() if effect.trace and self.name in effect.trace.cues)
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """What the basis functions are made of, all (E, T)."""
+
+    drives: Drives
+    left: Floats
+    right: Floats
+    forward: Floats
+    yaw: Floats
+    commands: Floats
+
+
+def signal_groups(fitted: Fit) -> Iterator[SignalGroup]:
+    """Every signal group of these drives, seen with the fitted model, as it is asked for."""
+    motion = _motion(fitted)
+    for maker in (
+        _command_level,
+        _wheel_difference,
+        _transients,
+        _after_reversal,
+        _time,
+        _use,
+        _turning,
+        _heading,
+        _position,
+        partial(_wheel_angle, side=0, name=Cue.LEFT_ANGLE),
+        partial(_wheel_angle, side=1, name=Cue.RIGHT_ANGLE),
+        _direction,
+    ):
+        made = maker(motion)
+        if np.abs(made.twists).max() > 1e-9:
+            yield SignalGroup(made.name, made.signal, made.unit, partial(maker, motion))
+
+
+def _motion(fitted: Fit) -> _Motion:
+    drives, figures = fitted.drives, fitted.drives.robot.figures
+    speeds = wheel_speeds(drives, fitted.theta) * figures["full_speed"]
+    left, right = speeds[..., 0], speeds[..., 1]
+    yaw = (right - left) / figures["effective_baseline"]
+    return _Motion(drives, left, right, (left + right) / 2.0, yaw, arrived_commands(drives, fitted.theta))
+
+
+def hats(signal: Floats, knots: int = KNOTS) -> Floats:
+    """Piecewise-linear functions of a signal (…, columns), corners at its quantiles; together they are 1."""
+    corners = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, knots)))
+    if len(corners) < 2:
+        return np.ones((*signal.shape, 1))
+    return np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))], axis=-1)
+
+
+def _twists(forward: Floats | None = None, sideways: Floats | None = None, yaw: Floats | None = None) -> Floats:
+    """Columns of forward, sideways and yaw motion side by side (E, T, 3, columns)."""
+    channels = [{channel: columns} for channel, columns in enumerate((forward, sideways, yaw)) if columns is not None]
+    return _side_by_side(channels)
+
+
+def _of_wheels(motion: _Motion, left: Floats | None, right: Floats | None) -> Floats:
+    """Motion that extra speeds of the wheels [m/s] make (E, T, 3, columns)."""
+    baseline = motion.drives.robot.figures["effective_baseline"]
+    wheels = [(columns, side) for columns, side in ((left, -1.0), (right, 1.0)) if columns is not None]
+    return _side_by_side([{0: columns / 2.0, 2: side * columns / baseline} for columns, side in wheels])
+
+
+def _side_by_side(parts: Sequence[Mapping[int, Floats]]) -> Floats:
+    """Columns (E, T, columns) of parts, by the channel they go to, as (E, T, 3, columns): each lies in one piece."""
+    sizes = [next(iter(part.values())).shape for part in parts]
+    whole = np.zeros((sum(size[-1] for size in sizes), *sizes[0][:-1], 3))
+    for part, end in zip(parts, np.cumsum([size[-1] for size in sizes]), strict=True):
+        for channel, columns in part.items():
+            whole[end - columns.shape[-1] : end, ..., channel] = np.moveaxis(columns, -1, 0)
+    return np.moveaxis(whole, 0, -1)
+
+
+def _command_level(motion: _Motion) -> _Signal:
+    full = motion.drives.robot.figures["full_speed"]
+    lagged = [side / full for side in (motion.left, motion.right)]
+    columns = [hats(side, 9) * full for side in lagged]
+    return _Signal(Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns))
+
+
+def _wheel_difference(motion: _Motion) -> _Signal:
+    signal = motion.commands[..., 1] - motion.commands[..., 0]
+    columns = hats(signal)
+    return _Signal(Cue.COMMAND_DIFFERENCE, signal, "duty", _twists(columns, yaw=columns))
+
+
+def _transients(motion: _Motion) -> _Signal:
+    rate = motion.drives.tick_hz
+    parts = []
+    for side in range(2):
+        command = motion.commands[..., side]
+        slow = [_smooth(command, seconds * rate) for seconds in (0.05, 0.15, 0.45, 1.2)]
+        parts.append(np.stack([command - slow[0]] + [a - b for a, b in pairwise(slow)], axis=-1))
+    full = motion.drives.robot.figures["full_speed"]
+    signal = parts[0].sum(axis=-1)
+    return _Signal(Cue.TRANSIENTS, signal, "duty", _of_wheels(motion, *(p * full for p in parts)))
+
+
+def _smooth(signal: Floats, ticks: float) -> Floats:
+    kept = np.exp(-1.0 / ticks)
+    return np.asarray(lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=kept * signal[:, :1])[0])
+
+
+def _after_reversal(motion: _Motion) -> _Signal:
+    columns = []
+    for speed in (motion.left, motion.right):
+        gone = _since_reversal(speed) / motion.drives.tick_hz
+        columns.append(np.stack([np.exp(-gone / reach) for reach in (0.005, 0.015, 0.04, 0.12)], -1) * speed[..., None])
+    signal = _since_reversal(motion.left) / motion.drives.tick_hz
+    return _Signal(Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns))
+
+
+def _since_reversal(speed: Floats) -> Floats:
+    """Distance since the wheel last changed direction, times ticks per second (E, T)."""
+    sign = np.sign(np.where(np.abs(speed) < 1e-3, 0.0, speed))
+    index = np.arange(speed.shape[1])
+    moving = np.maximum.accumulate(np.where(sign != 0, index, 0), axis=1)
+    held = np.take_along_axis(sign, moving, axis=1)
+    turned = np.concatenate((np.ones((len(speed), 1), bool), held[:, 1:] != held[:, :-1]), axis=1)
+    way = np.cumsum(np.abs(speed), axis=1)
+    start = np.maximum.accumulate(np.where(turned, index, 0), axis=1)
+    return np.asarray(way - np.take_along_axis(way, start, axis=1))
+
+
+def _time(motion: _Motion) -> _Signal:
+    signal = np.broadcast_to(np.arange(motion.left.shape[1]) / motion.drives.tick_hz, motion.left.shape)
+    columns = hats(signal)[..., 1:]
+    wheels = _of_wheels(motion, columns * motion.left[..., None], columns * motion.right[..., None])
+    return _Signal(Cue.TIME, signal, "s", wheels)
+
+
+def _use(motion: _Motion) -> _Signal:
+    use = np.cumsum(np.abs(motion.commands).mean(axis=-1), axis=1) / motion.drives.tick_hz
+    columns = hats(use)[..., 1:]
+    twists = _twists(columns * motion.forward[..., None], yaw=columns * motion.yaw[..., None])
+    return _Signal(Cue.USE, use, "s at full duty", twists)
+
+
+def _turning(motion: _Motion) -> _Signal:
+    columns = hats(motion.yaw)
+    bend = hats(motion.forward * motion.yaw)
+    sideways = np.concatenate((bend[..., :-1] - bend[..., 1:], columns), axis=-1)
+    twists = _twists(columns * motion.forward[..., None], sideways, columns)
+    return _Signal(Cue.TURN_RATE, motion.yaw, "rad/s", twists)
+
+
+def _heading(motion: _Motion) -> _Signal:
+    angle = motion.drives.headings
+    waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1)
+    moving = np.minimum(1.0, np.abs(motion.forward) / 0.02)[..., None]
+    twists = _twists(waves * moving, waves * motion.forward[..., None], waves * np.abs(motion.forward)[..., None])
+    return _Signal(Cue.HEADING, np.mod(angle, 2.0 * np.pi), "rad", twists)
+
+
+def _position(motion: _Motion) -> _Signal:
+    places = motion.drives.places
+    columns = np.concatenate([_patches(places[..., axis]) for axis in range(2)], axis=-1)
+    forward, yaw = columns * motion.forward[..., None], columns * motion.yaw[..., None]
+    twists = _twists(forward, yaw=np.concatenate((yaw, columns * np.abs(motion.forward)[..., None]), axis=-1))
+    return _Signal(Cue.POSITION, places[..., 0], "m", twists)
+
+
+def _patches(signal: Floats) -> Floats:
+    """Hats a patch apart over the whole range of a coordinate [m], the first left out (…, columns)."""
+    low, high = float(signal.min()), float(signal.max())
+    corners = np.linspace(low, high, int(np.clip(np.ceil((high - low) / PATCH_M), 1, MOST_PATCHES)) + 1)
+    return np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))[1:]], axis=-1)
+
+
+def _wheel_angle(motion: _Motion, side: int, name: Cue) -> _Signal:
+    angle = motion.drives.angles[..., side]
+    speed = (motion.left, motion.right)[side]
+    waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1) * speed[..., None]
+    own: Mapping[int, Floats] = {side: waves}
+    return _Signal(name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1)))
+
+
+def _direction(motion: _Motion) -> _Signal:
+    back = (motion.forward < 0.0)[..., None]
+    twists = _twists(
+        back * motion.forward[..., None], yaw=np.concatenate((back * motion.yaw[..., None], back), axis=-1)
+    )
+    return _Signal(Cue.DIRECTION, np.sign(motion.forward), "", twists)
+
+
+RIDGES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
+"""Pulls towards no curve at all that are tried, as fractions of what a basis function's weight is held by."""
+
+REFITTED = 3
+"""How many groups are fitted again."""
+
+
+class Curve(NamedTuple):
+    """What a signal group explains.
+
+    Attributes:
+        group: The group.
+        gain: Its gain in log-likelihood on blocks that it was not fitted to [nats].
+        weights: Weight of each of its basis functions.
+    """
+
+    group: SignalGroup
+    gain: float
+    weights: Floats
+
+
+def fit_curves(fitted: Fit) -> list[Curve]:
+    """Every signal group fitted to what the model leaves over, best first.
+
+    The best few are fitted again with the noise that they leave: a candidate's noise is fitted too.
+    """
+    plain = float(held_out_log_likelihood(fitted).sum())
+    found = [_fit_curve(fitted, group, _columns(fitted, group), plain) for group in signal_groups(fitted)]
+    found.sort(key=lambda curve: -curve.gain)
+    promising = [curve for curve in found[:REFITTED] if curve.gain > 0.0]
+    again = [_fit_with_own_noise(fitted, curve, plain) for curve in promising]
+    return sorted(again + found[len(promising) :], key=lambda curve: -curve.gain)
+
+
+def _fit_with_own_noise(fitted: Fit, curve: Curve, plain: float) -> Curve:
+    changes = _columns(fitted, curve.group)
+    left = fitted.drives.measured - increments(fitted.drives, fitted.theta) + changes @ curve.weights
+    quieter = replace_noise(fitted, fit_noise(fitted.drives, left, fitted.noise))
+    better = _fit_curve(quieter, curve.group, changes, plain)
+    return better if better.gain > curve.gain else curve
+
+
+def _fit_curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -> Curve:
+    columns = fitted.whiten.whiten(changes)
+    both = np.concatenate((fitted.slopes, columns), axis=1)
+    size = np.sqrt((both**2).sum(axis=0)) + 1e-12
+    unit = both / size
+    sums = slopes_by_block(fitted, unit)
+    flexible = np.arange(both.shape[1]) >= fitted.slopes.shape[1]
+    fits = [_ridge(fitted, unit, sums, flexible * ridge) for ridge in RIDGES]
+    gain, weights = max(fits, key=lambda found: found[0])
+    return Curve(group, gain - plain, (weights / size)[flexible])
+
+
+def _columns(fitted: Fit, group: SignalGroup) -> Floats:
+    """Change of the errors per weight of each basis function (N, 3, columns)."""
+    drives, theta = fitted.drives, fitted.theta
+    twists = twists_of(drives, theta)
+    here = increments_of_twists(drives, theta, twists)
+    added = group.twists
+    parts = (added[..., column] for column in range(added.shape[-1]))
+    return np.stack([here - increments_of_twists(drives, theta, twists + part) for part in parts], axis=-1)
+
+
+def _ridge(fitted: Fit, unit: Floats, sums: tuple[Floats, Floats], ridge: Floats) -> tuple[float, Floats]:
+    """The predictive log-likelihood with a ridge on each weight, and the weights."""
+    penalty = np.diag(ridge + 1e-9)
+    pull, curve = sums
+    weights = -np.linalg.solve(curve.sum(axis=0) + penalty, pull.sum(axis=0))
+    loss = huber(held_out_innovations(fitted, unit, sums, penalty)).sum() + fitted.whiten.log_determinant.sum()
+    return -float(loss), weights

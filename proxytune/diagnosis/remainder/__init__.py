@@ -1,1 +1,0 @@
-"""What no name explains, learnt as curves."""

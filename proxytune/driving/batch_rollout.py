@@ -1,0 +1,160 @@
+"""Robots of one domain instance that drive side by side, step by step: each as it does by itself, to the bit."""
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from proxytune.domain import Episode, Policy
+from proxytune.driving.agent import Command, Picture
+from proxytune.driving.cameras import View
+from proxytune.driving.episode import TICK_HZ, Course, Fleet, Instance, ask, check_command
+from proxytune.driving.expert import Pupil
+from proxytune.driving.plants import Drivetrain, Progress
+from proxytune.effects import CATALOGUE, Effect, Learnt, Setting, Signal
+from proxytune.errors import EpisodeError
+
+AT_ONCE = 16
+"""So many robots drive side by side: each has a world in memory."""
+
+_OURS = frozenset((*CATALOGUE.values(), Learnt))
+
+
+@dataclass(frozen=True)
+class Apart:
+    """A drivetrain for each robot by itself.
+
+    Attributes:
+        one: That of one robot.
+        seeds: Each robot's.
+    """
+
+    one: Drivetrain
+    seeds: tuple[int, ...]
+
+    def begin(self, setting: Setting) -> list[Progress]:
+        """Each robot's memory, from a setting of arrays (robots, …)."""
+        parts = zip(self.seeds, setting.rest, setting.headings, setting.places, strict=True)
+        return [
+            self.one.begin(replace(setting, seed=seed, rest=rest, headings=headings, places=places))
+            for seed, rest, headings, places in parts
+        ]
+
+    def apply(self, signal: Signal, memory: list[Progress]) -> tuple[Signal, list[Progress]]:
+        """The twists (robots, time, 3) that the next duties (robots, time, 2) lead to."""
+        twists, kept = zip(*(self.one.apply(*part) for part in zip(signal, memory, strict=True)), strict=True)
+        return np.stack(twists), list(kept)
+
+
+def side_by_side(drivetrain: Drivetrain, seeds: tuple[int, ...]) -> Drivetrain | Apart:
+    """A drivetrain over a leading axis of robots, each with a seed of its own."""
+    chains = (drivetrain.command, drivetrain.actuation, drivetrain.motion)
+    alike = all(_same_in_batches(effect) for chain in chains for effect in chain.effects)
+    return drivetrain if alike else Apart(drivetrain, seeds)
+
+
+def _same_in_batches(effect: Effect) -> bool:
+    """Whether it does to each robot of a batch, to the bit, what it does to a single one: ours do, unless they draw."""
+    return type(effect) in _OURS and (effect.trace is None or effect.trace.draws is None)
+
+
+def groups_of(episodes: Sequence[Episode]) -> Iterator[list[Episode]]:
+    """Episodes in their order, cut into groups of one θ that can be driven side by side."""
+    for _, same in itertools.groupby(episodes, key=lambda episode: episode.theta):
+        group = list(same)
+        yield from (group[first : first + AT_ONCE] for first in range(0, len(group), AT_ONCE))
+
+
+def drive_together(instance: Instance, fleet: Fleet, policy: Policy, courses: Sequence[Course]) -> list[Signal]:
+    """Let one policy drive several robots, each until the time is over, it crashes or its course ends.
+
+    Args:
+        instance: What bends commands, motion and pictures.
+        fleet: What moves, at the starts.
+        policy: Who drives; a picture that has not changed is answered as before.
+        courses: What each drives, all for the same time.
+
+    Returns:
+        Each robot's poses, (ticks + 1, 3) from its start on.
+
+    Raises:
+        EpisodeError: If the policy raises, or an answer is not two finite duties.
+    """
+    rollouts, control_hz = _Rollouts(instance, fleet, courses), instance.robot.figures["control_rate"]
+    for step in range(round(courses[0].seconds * control_hz)):
+        if rollouts.new_pictures:
+            rollouts.obey(answers(policy, rollouts.pictures, step / control_hz))
+        rollouts.step()
+        if not rollouts.under_way:
+            break
+    return [np.concatenate(driven) for driven in rollouts.poses]
+
+
+class _Rollouts:
+    """Episodes under way, as a Rollout is one.
+
+    Attributes:
+        under_way: The robots that have neither crashed nor left their courses.
+        new_pictures: Whether they have new pictures since the last step.
+        poses: Each robot's, step by step.
+    """
+
+    def __init__(self, instance: Instance, fleet: Fleet, courses: Sequence[Course]) -> None:
+        figures, self._fleet, self._courses = instance.robot.figures, fleet, courses
+        starts, seeds = np.stack([course.start for course in courses]), tuple(course.seed for course in courses)
+        self._hold = round(TICK_HZ / figures["control_rate"])
+        self._commands = np.zeros((len(courses), 2))
+        self._drivetrain = side_by_side(instance.drivetrain, seeds)
+        resting = Setting(TICK_HZ, np.zeros((len(courses), 2)), figures, 0, starts[:, 2:], starts[:, None, :2])
+        self._memory: Any = self._drivetrain.begin(resting)
+        settings = [Setting(TICK_HZ, one.start, figures, one.seed) for one in courses]
+        self._views = [View(instance.camera, instance.image, setting) for setting in settings]
+        self.under_way = list(range(len(courses)))
+        self.new_pictures = True
+        self.poses = [[start[None]] for start in starts]
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """The newest picture of each robot under way."""
+        return [self._views[robot].picture for robot in self.under_way]
+
+    def obey(self, commands: Sequence[Command] | Signal) -> None:
+        """Hold these commands, one for each robot under way, from now on."""
+        self._commands[self.under_way] = commands
+
+    def step(self) -> None:
+        """Go on for one control step."""
+        held = np.repeat(self._commands[:, None], self._hold, axis=1)
+        twists, self._memory = self._drivetrain.apply(held, self._memory)
+        poses, crashed = self._fleet.move(twists, self.under_way)
+        before, moved = self.pictures[0], list(zip(self.under_way, poses, crashed, strict=True))
+        for robot, driven, _ in moved:
+            self.poses[robot].append(driven)
+            self._views[robot].pass_by(driven)
+        self.new_pictures = self.pictures[0] is not before
+        self.under_way = [robot for robot, driven, hit in moved if not (hit or self._left(robot, driven[-1]))]
+
+    def _left(self, robot: int, pose: Signal) -> bool:
+        return self._courses[robot].ended(float(pose[0]), float(pose[1]))
+
+
+def answers(policy: Policy, pictures: Sequence[Picture], time_s: float) -> Sequence[Command] | Signal:
+    """A policy's commands for pictures, all at once where it can.
+
+    Raises:
+        EpisodeError: With the time [s], if it raises or answers with something that is not two finite duties for each.
+    """
+    act_many = getattr(policy, "act_many", None)
+    if act_many is None:
+        return [ask(Pupil(policy), picture, None, time_s)[0] for picture in pictures]
+    try:
+        commands = np.asarray(act_many(np.stack(pictures)), dtype=float)
+    except Exception as problem:
+        raise EpisodeError(f"raised {type(problem).__name__} at {time_s:.2f} s: {problem}") from problem
+    if commands.shape[:1] != (len(pictures),):
+        raise EpisodeError(f"answered {len(pictures)} pictures with shape {commands.shape} at {time_s:.2f} s")
+    for command in commands:
+        check_command(command, time_s)
+    return commands

@@ -1,0 +1,137 @@
+"""What a road consists of: straights and arcs, one after the other, counter-clockwise round the map.
+
+A map: the road's segments, its lanes and markings, and where robots are put down; in metres from its corner.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Straight:
+    """A straight stretch of the road's centre line.
+
+    Attributes:
+        length: Its length [m].
+    """
+
+    length: float
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A bend of the road's centre line.
+
+    Attributes:
+        radius: Of the centre line [m].
+        turn_deg: How far the road turns [deg], to the left positive, 90 at most.
+    """
+
+    radius: float
+    turn_deg: float
+
+
+Segment = Straight | Arc
+
+
+@dataclass(frozen=True)
+class Section:
+    """A straight with the bend that ends it; either may have no length.
+
+    Attributes:
+        straight: Length of the straight [m].
+        radius: Of the bend [m].
+        turn: Of the bend [rad], to the left positive.
+    """
+
+    straight: float
+    radius: float
+    turn: float
+
+
+def sections(segments: tuple[Segment, ...]) -> Iterator[Section]:
+    """The same road by sections; straights after the last arc are a section without a bend."""
+    lengths: list[float] = []
+    for segment in segments:
+        if isinstance(segment, Straight):
+            lengths.append(segment.length)
+        else:
+            yield Section(math.fsum(lengths), segment.radius, math.radians(segment.turn_deg))
+            lengths = []
+    if lengths:
+        yield Section(math.fsum(lengths), 0.0, 0.0)
+
+
+def repeats_of(lap: tuple[Section, ...]) -> int:
+    """How many times a lap repeats its first sections: 4 on a square loop, 1 where it never does."""
+    count = len(lap)
+    return next(n for n in range(count, 0, -1) if count % n == 0 and lap[: count // n] * n == lap)
+
+
+def tightened(segment: Segment, radius: float | None) -> tuple[Segment, ...]:
+    """A bend of a smaller radius [m] with the straights that lead to it and away; a straight is left as it is."""
+    if radius is None or isinstance(segment, Straight):
+        return (segment,)
+    lead = Straight((segment.radius - radius) * math.tan(math.radians(abs(segment.turn_deg)) / 2.0))
+    return lead, Arc(radius, segment.turn_deg), lead
+
+
+def length(segments: tuple[Segment, ...]) -> float:
+    """Length of the centre line [m]."""
+    return math.fsum(s.length if isinstance(s, Straight) else _arc_length(s) for s in segments)
+
+
+def _arc_length(arc: Arc) -> float:
+    return arc.radius * math.radians(abs(arc.turn_deg))
+
+
+@dataclass(frozen=True)
+class Paint:
+    """How a road is marked.
+
+    Attributes:
+        white_width: Width of the solid white edge lines [m].
+        yellow_width: Width of the dashed yellow centre line [m].
+        bend_radius: Radius of the yellow line in bends [m], which may be tighter than the road's; None where it is
+            not. The lanes as they are scored follow the road's own radius.
+        straight_dash: About how long a yellow dash on a straight is [m].
+        bend_dash: About how long one in a bend is [m].
+        tape_m: Standard deviation of where a line lies from where the map has it [m]; no episode depends on it.
+    """
+
+    white_width: float
+    yellow_width: float
+    bend_radius: float | None
+    straight_dash: float
+    bend_dash: float
+    tape_m: float = field(default=0.005, repr=False)
+
+
+@dataclass(frozen=True)
+class Road:
+    """A map with one closed road of two lanes, right-hand traffic, asphalt all over.
+
+    Attributes:
+        name: What `[domain] map` calls it.
+        description: What it is, in one line.
+        size: Of the map along x and y [m]; its bottom-left corner is the origin.
+        begin: Where the first segment begins: x [m], y [m], heading [deg].
+        segments: The road's centre line, counter-clockwise round what it encloses.
+        width: Between the outer edges of the white lines [m].
+        lane_offset: Distance of a lane's centre line from the road's [m].
+        lane_width: Width of a lane [m].
+        paint: How it is marked.
+        starts: Starting poses (x [m], y [m], heading [deg]).
+    """
+
+    name: str
+    description: str
+    size: tuple[float, float]
+    begin: tuple[float, float, float]
+    segments: tuple[Segment, ...]
+    width: float
+    lane_offset: float
+    lane_width: float
+    paint: Paint
+    starts: tuple[tuple[float, float, float], ...]

@@ -1,1 +1,0 @@
-"""The road: maps, lanes, and how they are drawn."""

@@ -1,0 +1,200 @@
+"""Where a road's markings lie: signed distances with their slopes, and which line of which stretch is nearest.
+
+The floor of a map as a picture seen from above, drawn from the map's road.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.arrays import Floats
+from proxytune.driving.lane import Layout, find_nearest, lay_out, unit, way_round
+from proxytune.driving.road import Paint, Road, Segment, Straight, length, tightened
+
+PIXELS_PER_METRE = 400
+"""2.5 mm a pixel: a twentieth of a white line, finer than what 64 × 48 pixels see at the robot's wheels."""
+
+MARGIN = 64
+"""Fewest pixels of OFF_MAP on every side; the picture's side is a whole multiple of it."""
+
+COLOURS = MappingProxyType(
+    {
+        "off_map": (21, 21, 21),
+        "asphalt": (59, 56, 50),
+        "white": (203, 200, 198),
+        "yellow": (195, 184, 60),
+    }
+)
+"""Red, green, blue, 0 to 255: means over the frames of gym-duckietown's photographed tiles."""
+
+STRIP = 8
+"""Rows that are drawn at once, to stay small in memory; divides MARGIN."""
+
+DASH_PER_GAP = 2.0
+"""Length of a yellow dash over the length of a gap."""
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """A floor seen from above.
+
+    Attributes:
+        pixels: Shape (side, side, 3), uint8; rows go up with y, columns with x.
+        pixels_per_metre: Resolution.
+        origin: Where the corner of the first pixel lies, both in x and in y [m].
+    """
+
+    pixels: NDArray[np.uint8]
+    pixels_per_metre: float
+    origin: float
+
+
+@functools.lru_cache
+def draw_floor(road: Road) -> Floor:
+    """Draw a map: asphalt with the road's white edge lines and dashed yellow centre line, OFF_MAP around it.
+
+    Every edge is anti-aliased over one pixel. The same figures give the same bytes. The picture of a map that is not
+    square is, with OFF_MAP beside the map.
+    """
+    longest = max(road.size)
+    side = MARGIN * math.ceil(longest * PIXELS_PER_METRE / MARGIN + 2.0)
+    origin = (longest - side / PIXELS_PER_METRE) / 2.0
+    places = origin + (np.arange(side) + 0.5) / PIXELS_PER_METRE
+    paint = functools.partial(_paint, road, painted(road))
+    strips = [paint(np.stack(np.meshgrid(places, rows), axis=-1)) for rows in places.reshape(-1, STRIP)]
+    return Floor(np.concatenate(strips), PIXELS_PER_METRE, origin)
+
+
+def painted(road: Road) -> list[tuple[Segment, ...]]:
+    """What is painted for each segment of the road, its bends as tight as the paint's."""
+    return [tightened(segment, road.paint.bend_radius) for segment in road.segments]
+
+
+def _paint(road: Road, stretches: list[tuple[Segment, ...]], positions: Floats) -> NDArray[np.uint8]:
+    """The colours (rows, columns, 3) of positions (rows, columns, 2) [m]."""
+    picture = np.tile(np.array(COLOURS["off_map"], dtype=float), (*positions.shape[:-1], 1))
+    for colour, distance in _shapes(road, stretches, positions).items():
+        cover = np.clip(0.5 - distance * PIXELS_PER_METRE, 0.0, 1.0)[..., None]
+        picture += cover * (np.array(COLOURS[colour]) - picture)
+    return np.asarray(np.rint(picture), dtype=np.uint8)
+
+
+def _shapes(road: Road, stretches: list[tuple[Segment, ...]], positions: Floats) -> dict[str, Floats]:
+    """Signed distance from what is painted in each colour, inside negative [m], the lowest layer first."""
+    layout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
+    near = find_nearest(layout, positions)
+    aside, half = np.abs(near.outside), np.array(road.size) / 2.0
+    along = way_round(layout, near.section, near.straight, near.turned, np.zeros(()))
+    middle = (road.width - road.paint.white_width) / 2.0
+    return {
+        "asphalt": (np.abs(positions - half) - half).max(axis=-1),
+        "white": np.abs(aside - middle) - road.paint.white_width / 2.0,
+        "yellow": np.maximum(aside - road.paint.yellow_width / 2.0, _dash_distance(road, stretches, along)),
+    }
+
+
+def _dash_distance(road: Road, stretches: list[tuple[Segment, ...]], along: Floats) -> Floats:
+    """Signed distance along the centre line from the nearest dash [m]."""
+    sizes = np.array([length(stretch) for stretch in stretches])
+    dashes = np.array(
+        [dashes_on(road.paint, segment, size) for segment, size in zip(road.segments, sizes, strict=True)]
+    )
+    ends = np.cumsum(sizes)
+    stretch = np.clip(np.searchsorted(ends, along, side="right"), 0, len(ends) - 1)
+    return _from_dash(along - (ends - sizes)[stretch], sizes[stretch], dashes[stretch])
+
+
+def dashes_on(paint: Paint, segment: Segment, size: float) -> int:
+    """How many dashes are painted on a segment whose centre line is painted so long [m]."""
+    dash = paint.straight_dash if isinstance(segment, Straight) else paint.bend_dash
+    return max(1, round((size / dash * DASH_PER_GAP - 1.0) / (DASH_PER_GAP + 1.0)))
+
+
+def _from_dash(along: Floats, size: Floats, dashes: NDArray[np.int_]) -> Floats:
+    """Signed distance from the nearest of the dashes that share a stretch's length evenly, a gap at either end."""
+    gap = size / (dashes * (DASH_PER_GAP + 1.0) + 1.0)
+    period = gap * (DASH_PER_GAP + 1.0)
+    first = gap + gap * DASH_PER_GAP / 2.0
+    nearest = np.clip(np.rint((along - first) / period), 0, dashes - 1)
+    return np.abs(along - first - nearest * period) - gap * DASH_PER_GAP / 2.0
+
+
+LINES = ("left white line", "right white line", "yellow line", "yellow dashes")
+"""The lines of a stretch, as a robot sees them that drives counter-clockwise round the map."""
+
+
+class Marks(NamedTuple):
+    """The nearest marking to each of n places.
+
+    Attributes:
+        distance: Signed distance from its edge, inside negative (n,) [m]; from a dash's end along the centre line, as
+            it is painted.
+        slope: Unit vector in which the distance grows (n, 2).
+        stretch: Which of the road's segments it is on (n,).
+        line: Which of LINES it is (n,); the ends of dashes are the last.
+        side: Whether the nearest edge moves away (1) or closer (−1) as the marking moves right, or on, seen by a robot
+            that drives counter-clockwise (n,).
+        share: How much of the stretch lies behind, from 0 to 1 (n,).
+    """
+
+    distance: Floats
+    slope: Floats
+    stretch: NDArray[np.intp]
+    line: NDArray[np.intp]
+    side: Floats
+    share: Floats
+
+
+class Markings:
+    """The markings of a road."""
+
+    def __init__(self, road: Road) -> None:
+        """Lay them out."""
+        stretches = painted(road)
+        self.road = road
+        self.stretches = len(stretches)
+        self._layout: Layout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
+        self._sizes = np.array([length(stretch) for stretch in stretches])
+        self._ends = np.cumsum(self._sizes)
+        pairs = zip(road.segments, self._sizes, strict=True)
+        dashes = np.array([dashes_on(road.paint, segment, float(size)) for segment, size in pairs])
+        self._dashes, self._gap = dashes, self._sizes / (dashes * (DASH_PER_GAP + 1.0) + 1.0)
+
+    def white(self, places: Floats) -> Marks:
+        """The nearest white line to places (n, 2) [m]."""
+        right, outward, _, stretch, share = self._along(places)
+        middle = (self.road.width - self.road.paint.white_width) / 2.0
+        way = np.where(right >= 0.0, 1.0, -1.0)
+        off = right - way * middle
+        beyond = np.where(off >= 0.0, 1.0, -1.0)
+        distance = np.abs(off) - self.road.paint.white_width / 2.0
+        return Marks(distance, beyond[:, None] * outward, stretch, (way > 0).astype(int), -beyond, share)
+
+    def yellow(self, places: Floats) -> Marks:
+        """The nearest yellow dash to places (n, 2) [m]."""
+        right, outward, along, stretch, share = self._along(places)
+        aside = np.abs(right) - self.road.paint.yellow_width / 2.0
+        gap = self._gap[stretch]
+        period, half = gap * (DASH_PER_GAP + 1.0), gap * DASH_PER_GAP / 2.0
+        within = along - (self._ends - self._sizes)[stretch] - gap - half
+        off = within - np.clip(np.rint(within / period), 0, self._dashes[stretch] - 1) * period
+        end = np.abs(off) - half > aside
+        onward = np.stack((-outward[:, 1], outward[:, 0]), axis=-1)
+        beyond = np.where(np.where(end, off, right) >= 0.0, 1.0, -1.0)
+        slope = beyond[:, None] * np.where(end[:, None], onward, outward)
+        distance = np.where(end, np.abs(off) - half, aside)
+        return Marks(distance, slope, stretch, np.where(end, 3, 2), -beyond, share)
+
+    def _along(self, places: Floats) -> tuple[Floats, Floats, Floats, NDArray[np.intp], Floats]:
+        """How far right of the centre line, the unit vector to the right, how far round, stretch and share of it."""
+        near = find_nearest(self._layout, places)
+        side = self._layout.side[near.section]
+        along = way_round(self._layout, near.section, near.straight, near.turned, np.zeros(()))
+        stretch = np.clip(np.searchsorted(self._ends, along, side="right"), 0, self.stretches - 1)
+        share = (along - (self._ends - self._sizes)[stretch]) / self._sizes[stretch]
+        return side * near.outside, side[:, None] * unit(near.normal), along, stretch, np.clip(share, 0.0, 1.0)

@@ -1,1 +1,0 @@
-"""Effects on how the body moves, and on how its pose is measured."""

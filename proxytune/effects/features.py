@@ -1,0 +1,352 @@
+"""What a learnt effect looks at: groups of causal features of the motion that is asked for.
+
+Functions of the motion that is asked for, of which learnt curves are made: each 0 where the robot stands.
+What a signal was like before: low-passes of it, and how far a wheel has rolled since it last turned.
+"""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from proxytune.effects.effect import Signal
+from proxytune.effects.motion import REST_SPEED
+
+Knot = float | tuple[float, float]
+Knots = tuple[Knot, ...]
+
+
+class Asked(NamedTuple):
+    """The motion asked for, held within what was seen, and its past, (…, time) where nothing else is said.
+
+    Attributes:
+        forward: Forward speed [m/s].
+        yaw: Yaw rate [rad/s].
+        wheels: Speeds of the left and the right wheel over the floor [m/s] (2, …, time).
+        seconds: Since the start [s].
+        use: Integral of the mean wheel speed's size, as a fraction of full speed, since the start [min].
+        heading: Heading [rad].
+        bands: Of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants).
+        loads: Low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants).
+        rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …, time).
+        started: Since each wheel last stood [s] (2, …, time).
+        rings: Damped swings, complex, that each change of a wheel's speed sets off [m/s] (2, …, time, frequencies).
+        played: Each wheel's speed through plays of some widths [m/s] (2, …, time, widths).
+    """
+
+    forward: Signal
+    yaw: Signal
+    wheels: Signal
+    seconds: Signal
+    use: Signal
+    heading: Signal
+    bands: Signal
+    loads: Signal
+    rolled: Signal
+    started: Signal
+    rings: Signal
+    played: Signal
+
+
+STANDS = 0.1
+"""A wheel is to stand where it is asked to go slower than this share of its speed of late."""
+
+
+def hats(signal: Signal, knots: Knots) -> Signal:
+    """Piecewise-linear functions (…, knots): each 1 at its knot, 0 at all others and at 0, level beyond the last."""
+    corners = np.sort(np.array([0.0, *knots], dtype=float))
+    rows = np.eye(len(corners))[corners != 0.0]
+    return np.stack([np.interp(signal, corners, row) for row in rows], axis=-1)
+
+
+def grid(asked: Asked, knots: Knots) -> Signal:
+    """Products of hats over speed and yaw rate (…, knots), 0 where both are 0."""
+    pairs = np.asarray(knots, dtype=float)
+    parts = []
+    for signal, values in zip((asked.forward, asked.yaw), pairs.T, strict=True):
+        corners = np.unique(np.append(values, 0.0))
+        rows = np.stack([np.interp(signal, corners, row) for row in np.eye(len(corners))], axis=-1)
+        parts.append(rows[..., np.searchsorted(corners, values)])
+    return np.asarray(parts[0] * parts[1])
+
+
+def sign(asked: Asked, wheel: int) -> Signal:
+    """Which way a wheel turns: from −1 to 1, 0 where it stands (…, time, 1)."""
+    return np.asarray(np.clip(asked.wheels[wheel][..., None] / REST_SPEED, -1.0, 1.0))
+
+
+def moving(asked: Asked) -> Signal:
+    """1 while the robot moves, 0 where it stands (…, time)."""
+    return np.minimum(1.0, np.abs(asked.forward) / REST_SPEED)
+
+
+def backwards(asked: Asked, knots: Knots) -> Signal:
+    """Whether the robot moves backwards, for a knot of −1."""
+    return hats(np.clip(asked.forward / REST_SPEED, -1.0, 1.0), knots)
+
+
+def level(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """A wheel's speed as it is, whatever the knots."""
+    return np.asarray(asked.wheels[wheel][..., None] * np.ones(len(knots)))
+
+
+def slowing(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """The bands of a wheel that is slower than it has been of late, 0 while it speeds up."""
+    bands = asked.bands[wheel]
+    slow = asked.wheels[wheel][..., None] - np.cumsum(bands, axis=-1)
+    return np.where(bands * slow < 0.0, bands, 0.0)
+
+
+def stopping(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """The bands of a wheel that is to stand and was moving of late."""
+    bands = asked.bands[wheel]
+    speed = asked.wheels[wheel][..., None]
+    return np.where(np.abs(speed) < STANDS * np.abs(speed - np.cumsum(bands, axis=-1)), bands, 0.0)
+
+
+def started(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """1 when a wheel starts to move, fading with time."""
+    return np.asarray(np.exp(-asked.started[wheel][..., None] / np.asarray(knots)))
+
+
+def played(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """By how much a wheel lags behind within its play, while it moves."""
+    speed = asked.wheels[wheel][..., None]
+    return np.asarray((asked.played[wheel] - speed) * np.abs(sign(asked, wheel)))
+
+
+def after_reversal(asked: Asked, knots: Knots, wheel: int) -> Signal:
+    """A wheel's speed, fading with the way since it last turned the other way."""
+    way = np.abs(asked.rolled[wheel])[..., None]
+    return np.asarray(asked.wheels[wheel][..., None] * np.exp(-way / np.asarray(knots)))
+
+
+def body_after_reversal(asked: Asked, knots: Knots) -> Signal:
+    """The forward speed, fading with the way since the robot last drove the other way."""
+    return np.asarray(asked.forward[..., None] * np.exp(-np.abs(asked.rolled[2])[..., None] / np.asarray(knots)))
+
+
+def waves(wave: Callable[[Signal], Signal]) -> Callable[[Asked, Knots], Signal]:
+    """Harmonics of the heading while the robot moves."""
+    return lambda a, k: wave(a.heading[..., None] * np.asarray(k)) * moving(a)[..., None]
+
+
+class Channel(NamedTuple):
+    """Where a group's curves go: to the body's `forward`, `sideways` or `yaw`, or to the `left` or `right` wheel."""
+
+    to: str
+    unit: str
+    basis: Callable[[Asked, Knots], Signal]
+
+
+class Group(NamedTuple):
+    """Curves over one signal.
+
+    Attributes:
+        title: What people call the signal.
+        unit: The unit of the knots.
+        channels: What the curves add, by name.
+        low: The lowest knot that makes sense, or None where knots may be negative.
+    """
+
+    title: str
+    unit: str
+    channels: Mapping[str, Channel]
+    low: float | None = None
+
+
+def _of_wheels(unit: str, basis: Callable[[Asked, Knots, int], Signal]) -> dict[str, Channel]:
+    """One channel a wheel."""
+    return {
+        "left": Channel("left", unit, lambda a, k: basis(a, k, 0)),
+        "right": Channel("right", unit, lambda a, k: basis(a, k, 1)),
+    }
+
+
+LEVEL = "level"
+"""The one group that is no curve: beside others it takes back what fitted gains and trim have taken of theirs."""
+
+HEADING = "heading"
+"""The one group that looks at where the robot points."""
+
+GROUPS: Mapping[str, Group] = MappingProxyType(
+    {
+        LEVEL: Group("level", "at all speeds", _of_wheels("of its speed", level), 1e-3),
+        "wheel_speed": Group("wheel speed", "m/s", _of_wheels("m/s", lambda a, k, wheel: hats(a.wheels[wheel], k))),
+        "turn_rate": Group(
+            "turn rate",
+            "rad/s",
+            {
+                "forward": Channel("forward", "of the speed", lambda a, k: hats(a.yaw, k) * a.forward[..., None]),
+                "sideways": Channel("sideways", "of the speed", lambda a, k: hats(a.yaw, k) * a.forward[..., None]),
+                "yaw": Channel("yaw", "rad/s", lambda a, k: hats(a.yaw, k)),
+            },
+        ),
+        "speed_and_turn": Group(
+            "speed and turn rate together",
+            "m/s, rad/s",
+            {
+                "forward": Channel("forward", "m/s", grid),
+                "sideways": Channel("sideways", "m/s", grid),
+                "yaw": Channel("yaw", "rad/s", grid),
+            },
+        ),
+        "transients": Group(
+            "changes of wheel speed",
+            "s",
+            {
+                **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
+                "left_slowing": Channel("left", "of the change", lambda a, k: slowing(a, k, 0)),
+                "right_slowing": Channel("right", "of the change", lambda a, k: slowing(a, k, 1)),
+                "left_stopping": Channel("left", "of the change", lambda a, k: stopping(a, k, 0)),
+                "right_stopping": Channel("right", "of the change", lambda a, k: stopping(a, k, 1)),
+            },
+            1e-3,
+        ),
+        "ringing": Group(
+            "swings after changes of wheel speed",
+            "Hz",
+            {
+                **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].real),
+                "left_later": Channel("left", "of the change", lambda a, k: a.rings[0].imag),
+                "right_later": Channel("right", "of the change", lambda a, k: a.rings[1].imag),
+            },
+            1e-3,
+        ),
+        "play": Group("way in which wheel speed changes", "m/s", _of_wheels("of the play", played), 1e-3),
+        "start": Group(
+            "time since it stood",
+            "s",
+            {
+                **_of_wheels("of its speed", lambda a, k, wheel: a.wheels[wheel][..., None] * started(a, k, wheel)),
+                "left_push": Channel("left", "m/s", lambda a, k: sign(a, 0) * started(a, k, 0)),
+                "right_push": Channel("right", "m/s", lambda a, k: sign(a, 1) * started(a, k, 1)),
+            },
+            1e-3,
+        ),
+        "reversal": Group(
+            "way since reversal",
+            "m",
+            {
+                **_of_wheels("of its speed", after_reversal),
+                "forward": Channel("forward", "of the speed", body_after_reversal),
+                "veer": Channel("yaw", "rad/m", body_after_reversal),
+            },
+            1e-3,
+        ),
+        "direction": Group(
+            "direction of travel",
+            "sign",
+            {
+                "forward": Channel("forward", "of the speed", lambda a, k: backwards(a, k) * a.forward[..., None]),
+                "yaw": Channel("yaw", "of the yaw rate", lambda a, k: backwards(a, k) * a.yaw[..., None]),
+                "veer": Channel("yaw", "rad/m", lambda a, k: backwards(a, k) * a.forward[..., None]),
+            },
+        ),
+        "time": Group(
+            "time in the episode",
+            "s",
+            _of_wheels("of its speed", lambda a, k, wheel: hats(a.seconds, k) * a.wheels[wheel][..., None]),
+            1e-3,
+        ),
+        "use": Group(
+            "cumulated use",
+            "min at full speed",
+            _of_wheels("of its speed", lambda a, k, wheel: hats(a.use, k) * a.wheels[wheel][..., None]),
+            1e-6,
+        ),
+        "load": Group(
+            "recent load",
+            "s",
+            _of_wheels("of its speed", lambda a, k, wheel: a.loads * a.wheels[wheel][..., None]),
+            1e-3,
+        ),
+        HEADING: Group(
+            "heading",
+            "turns a turn",
+            {
+                "forward_cos": Channel("forward", "m/s", waves(np.cos)),
+                "forward_sin": Channel("forward", "m/s", waves(np.sin)),
+                "sideways_cos": Channel("sideways", "m/s", waves(np.cos)),
+                "sideways_sin": Channel("sideways", "m/s", waves(np.sin)),
+                "veer_cos": Channel("yaw", "rad/m", lambda a, k: waves(np.cos)(a, k) * np.abs(a.forward)[..., None]),
+                "veer_sin": Channel("yaw", "rad/m", lambda a, k: waves(np.sin)(a, k) * np.abs(a.forward)[..., None]),
+                "yaw_cos": Channel("yaw", "of the yaw rate", lambda a, k: waves(np.cos)(a, k) * a.yaw[..., None]),
+                "yaw_sin": Channel("yaw", "of the yaw rate", lambda a, k: waves(np.sin)(a, k) * a.yaw[..., None]),
+            },
+            1.0,
+        ),
+    }
+)
+"""Every group that a learnt effect can have. Where the robot is and how its wheels are turned are no groups: a study's
+proxy starts elsewhere than the drives did, and its wheels at another angle."""
+
+
+DAMPING = 0.25
+"""Of the swings, as a share of critical damping."""
+
+
+def low_passes(signal: Signal, slow: Signal, constants: Knots, rate_hz: float) -> Signal:
+    """First-order low-passes of a signal (…, time), one for each time constant [s] (…, time, constants)."""
+    out = np.empty((*signal.shape, len(constants)))
+    for number, constant in enumerate(constants):
+        kept = float(np.exp(-1.0 / (np.asarray(constant) * rate_hz)))
+        start = kept * slow[..., number][..., None]
+        out[..., number], _ = lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=start)
+    return out
+
+
+def rings(change: Signal, before: Signal, frequencies_hz: Knots, rate_hz: float) -> Signal:
+    """Damped swings that changes of a signal (…, time) set off, complex (…, time, frequencies)."""
+    out = np.empty((*change.shape, len(frequencies_hz)), dtype=complex)
+    for number, frequency in enumerate(frequencies_hz):
+        turn = 2.0 * np.pi * np.asarray(frequency) / rate_hz
+        kept = complex(np.exp(turn * (-DAMPING + 1j * np.sqrt(1.0 - DAMPING**2))))
+        start = kept * before[..., number][..., None]
+        out[..., number], _ = lfilter([1.0], [1.0, -kept], change.astype(complex), axis=-1, zi=start)
+    return out
+
+
+def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
+    """What is dragged along by a signal (…, time) through plays of these half widths (…, time, widths)."""
+    out, now = np.empty((*signal.shape, len(halves))), before
+    half = np.asarray(halves)
+    for step in range(signal.shape[-1] if len(halves) else 0):
+        here = signal[..., step, None]
+        now = np.clip(now, here - half, here + half)
+        out[..., step, :] = now
+    return out
+
+
+def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float) -> Signal:
+    """How long ago a wheel last stood [s] (…, time), 0 while it does.
+
+    Args:
+        speed: Its speed (…, time).
+        before: How long ago that was before the first sample (…,).
+        rest_speed: It stands where it is slower than this, in the same unit.
+        rate_hz: Samples per second.
+    """
+    number = np.arange(1.0, speed.shape[-1] + 1.0)
+    stood = np.where(np.abs(speed) < rest_speed, number, -before[..., None] * rate_hz)
+    return np.asarray((number - np.maximum.accumulate(stood, axis=-1)) / rate_hz)
+
+
+def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
+    """How far a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
+
+    Args:
+        speed: Its speed [m/s] (…, time).
+        before: How far it had rolled so before the first sample (…,), 0 where it has not moved yet.
+        rate_hz: Samples per second.
+    """
+    sign = np.concatenate((np.sign(before)[..., None], np.sign(speed)), axis=-1)
+    place = np.arange(sign.shape[-1])
+    newest = np.maximum.accumulate(np.where(sign != 0.0, place, 0), axis=-1)
+    course = np.take_along_axis(sign, newest, axis=-1)
+    way = np.concatenate((np.abs(before)[..., None], np.abs(speed) / rate_hz), axis=-1).cumsum(axis=-1)
+    turned = course[..., 1:] != course[..., :-1]
+    since = np.maximum.accumulate(np.where(turned, way[..., :-1], 0.0), axis=-1)
+    return np.asarray(course[..., 1:] * (way[..., 1:] - since))

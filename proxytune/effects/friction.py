@@ -1,0 +1,298 @@
+"""Effects of friction and play: wheels that do not turn for small duties, and gears with slack.
+
+Wheels that are not round, or not mounted in their middle.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.effects.effect import (
+    Cue,
+    Form,
+    Known,
+    Means,
+    Panel,
+    Setting,
+    Signal,
+    Stage,
+    Trace,
+    WheelCurve,
+    beforehand,
+    values_along,
+)
+from proxytune.effects.motors import IMBALANCE, per_wheel, wheel_forms
+from proxytune.space import Parameter
+
+
+@dataclass(frozen=True)
+class DeadBand:
+    """A wheel does not turn for duties up to `width`, and by that much less for larger ones."""
+
+    width: float
+    imbalance: float
+    name: ClassVar[str] = "dead_band"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="width",
+            unit="duty",
+            low=0.0,
+            high=0.5,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="friction of small gear motors: 0.05 to 0.2 of full duty",
+        ),
+        IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("width")
+    )
+
+    def begin(self, setting: Setting) -> Signal:
+        """The width on each wheel (2,)."""
+        return per_wheel(self.width, self.imbalance)
+
+    def apply(self, signal: Signal, memory: Signal) -> tuple[Signal, Signal]:
+        """sign(u) · max(0, |u| − width)."""
+        return signal - np.clip(signal, -memory, memory), memory
+
+
+class Grip(NamedTuple):
+    """At which duties each wheel breaks away, stops and turns the other way at once (2,), and whether wheels move."""
+
+    breakaway: Signal
+    stop: Signal
+    turn: Signal
+    sample: Signal
+    moving: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Stiction:
+    """A resting wheel needs a duty of `breakaway` to start; a moving one goes on down to `release` times that.
+
+    A wheel whose duty changes sign comes to rest on the way, unless that duty is large enough: from what keeps a wheel
+    going, at a `reversal` of 0, to what breaks it away, at 1.
+    """
+
+    breakaway: float
+    imbalance: float
+    release: float
+    reversal: float
+    name: ClassVar[str] = "stiction"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="breakaway",
+            unit="duty",
+            low=0.0,
+            high=0.6,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.12, 0.2, 0.3, 0.45),
+            source="small gear motors start at 0.1 to 0.3 of full duty",
+        ),
+        IMBALANCE,
+        Parameter(
+            name="release",
+            unit="",
+            low=0.0,
+            high=1.0,
+            neutral=0.5,
+            probes=(0.2, 0.35, 0.65, 0.8, 0.9, 1.0),
+            source="rolling friction by sticking friction: about half, nearly all where a driver cuts small duties",
+            shape=True,
+        ),
+        Parameter(
+            name="reversal",
+            unit="",
+            low=0.0,
+            high=1.0,
+            neutral=1.0,
+            probes=(0.0, 0.25, 0.5, 0.75),
+            source="1: friction catches a slow wheel as it passes rest; 0: a wheel with momentum runs through",
+            shape=True,
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND, Cue.REVERSAL),
+        shown=WheelCurve.STEADY,
+        forms=(
+            *wheel_forms("breakaway", "release"),
+            Form((("breakaway",), ("release",)), "runs through reversals", fixed={"reversal": 0.0}),
+        ),
+        stepwise=True,
+    )
+
+    def begin(self, setting: Setting) -> Grip:
+        """A wheel moves from the start if its resting duty keeps a moving wheel going."""
+        breakaway = per_wheel(self.breakaway, self.imbalance)
+        rest = np.asarray(setting.rest, dtype=float)[..., None, :]
+        stop = self.release * breakaway
+        return Grip(breakaway, stop, stop + self.reversal * (breakaway - stop), rest, np.abs(rest) >= stop)
+
+    def apply(self, signal: Signal, memory: Grip) -> tuple[Signal, Grip]:
+        """A Schmitt trigger on each wheel's duty."""
+        size = np.abs(signal)
+        before = np.concatenate((memory.sample, signal[..., :-1, :]), axis=-2)
+        starts = size >= memory.breakaway
+        stops = ~starts & ((size < memory.stop) | (signal * before < 0.0) & (size < memory.turn))
+        moving = _latest(starts, stops, memory.moving)
+        return np.where(moving, signal, 0.0), memory._replace(sample=signal[..., -1:, :], moving=moving[..., -1:, :])
+
+
+def _latest(on: NDArray[np.bool_], off: NDArray[np.bool_], first: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether the latest event was an `on`, sample by sample: a sample's number, doubled, leaves a bit for it."""
+    numbers = 2 * np.arange(1, on.shape[-2] + 1)[:, None]
+    events = np.where(on | off, numbers + on, 0)
+    events[..., :1, :] = np.where(events[..., :1, :] > 0, events[..., :1, :], first)
+    return np.asarray(np.maximum.accumulate(events, axis=-2) % 2 == 1)
+
+
+class Play(NamedTuple):
+    """Half the play of each wheel (2,), and how far each gear is ahead of the middle of it (…, 1, 2).
+
+    Both in samples at full speed.
+    """
+
+    half: Signal
+    ahead: Signal
+
+
+@dataclass(frozen=True)
+class Backlash:
+    """The gear turns through a gap before it takes the wheel along, whenever it reverses."""
+
+    gap: float
+    imbalance: float
+    name: ClassVar[str] = "backlash"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="gap",
+            unit="rad",
+            low=0.0,
+            high=1.5,
+            neutral=0.0,
+            probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.5),
+            source="plastic gearboxes: some degrees, worn ones some tens",
+        ),
+        IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.REVERSAL, Cue.TRANSIENTS), shown=WheelCurve.REVERSAL, forms=wheel_forms("gap")
+    )
+
+    def begin(self, setting: Setting) -> Play:
+        """In the middle of the play."""
+        full_speed = setting.nominal["full_speed"] / setting.nominal["wheel_radius"]
+        half = per_wheel(self.gap, self.imbalance) / 2.0 * (setting.rate_hz / full_speed)
+        return Play(half, np.zeros_like(np.asarray(setting.rest, dtype=float))[..., None, :])
+
+    def apply(self, signal: Signal, memory: Play) -> tuple[Signal, Play]:
+        """The wheel's angle stays while it is within the gear's angle ± half the gap."""
+        gear = memory.ahead + np.cumsum(signal, axis=-2)
+        ahead = gear - _taken_along(gear, memory.half)
+        gained = np.diff(ahead, axis=-2, prepend=memory.ahead)
+        return signal - gained, memory._replace(ahead=ahead[..., -1:, :])
+
+
+def _taken_along(gear: Signal, half: Signal) -> Signal:
+    """The wheel's angle as the gear's angle ± half the gap takes it along from 0 on (…, time, 2).
+
+    Clips of clips are clips: bounds are composed within √time blocks side by side, then the blocks follow each other.
+    """
+    blocks = _blocks(gear)
+    low, high = blocks - half, blocks + half
+    for inside in range(1, len(blocks)):
+        bounds = low[inside], high[inside]
+        low[inside], high[inside] = _within(low[inside - 1], *bounds), _within(high[inside - 1], *bounds)
+    starts = np.zeros_like(blocks[0])
+    for block in range(1, starts.shape[-2]):
+        starts[..., block, :] = _within(*(angle[..., block - 1, :] for angle in (starts, low[-1], high[-1])))
+    wheel = np.moveaxis(_within(starts, low, high), 0, -2)
+    return wheel.reshape(*gear.shape[:-2], -1, gear.shape[-1])[..., : gear.shape[-2], :]
+
+
+def _within(angle: Signal, low: Signal, high: Signal) -> Signal:
+    """The same as numpy's clip, in less time."""
+    return np.asarray(np.minimum(np.maximum(angle, low), high))
+
+
+def _blocks(angles: Signal) -> Signal:
+    """Angles (…, time, 2) cut into blocks side by side (time in block, …, block, 2), the last value held to fill up."""
+    size = math.isqrt(angles.shape[-2])
+    rest = np.repeat(angles[..., -1:, :], -angles.shape[-2] % size, axis=-2)
+    filled = np.concatenate((angles, rest), axis=-2)
+    cut = filled.reshape(*angles.shape[:-2], -1, size, angles.shape[-1])
+    return np.ascontiguousarray(np.moveaxis(cut, -2, 0))
+
+
+class Rolling(NamedTuple):
+    """The angle of each wheel as known beforehand, half the distance between them [m], and their radius [m]."""
+
+    angles: tuple[Known, Known]
+    half: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class WheelRipple:
+    """Each wheel rolls faster and slower once a turn: by the factor 1 + sine · sin(angle) + cosine · cos(angle).
+
+    Its amplitude is √(sine² + cosine²). Angles count from the start of the episode.
+    """
+
+    left_sine: float
+    left_cosine: float
+    right_sine: float
+    right_cosine: float
+    name: ClassVar[str] = "wheel_ripple"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = tuple(
+        Parameter(
+            name=f"{side}_{part}",
+            unit="",
+            low=-0.6,
+            high=0.6,
+            neutral=0.0,
+            probes=(-0.3, -0.1, -0.03, 0.03, 0.1, 0.3),
+            source="a hub some tenths of a millimetre to some millimetres off the middle of a small wheel",
+        )
+        for side in ("left", "right")
+        for part in ("sine", "cosine")
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.LEFT_ANGLE, Cue.RIGHT_ANGLE),
+        shown=Means(
+            Cue.LEFT_ANGLE,
+            tuple(
+                Panel(f"{side} angle", f"angle of the {side} wheel [rad]", side, share=True)
+                for side in ("left", "right")
+            ),
+        ),
+    )
+
+    def begin(self, setting: Setting) -> Rolling:
+        """With the angles that are known beforehand."""
+        angles = np.asarray(setting.angles, dtype=float)
+        left, right = (beforehand(angles[..., side], setting) for side in (0, 1))
+        return Rolling((left, right), setting.nominal["effective_baseline"] / 2.0, setting.nominal["wheel_radius"])
+
+    def apply(self, signal: Signal, memory: Rolling) -> tuple[Signal, Rolling]:
+        """Add what each wheel gains or loses, by its angle in the middle of each sample."""
+        forward, sideways, yaw = np.moveaxis(signal, -1, 0)
+        parts = ((self.left_sine, self.left_cosine), (self.right_sine, self.right_cosine))
+        extra, after = [], []
+        for side, (sine, cosine), known in zip((-1.0, 1.0), parts, memory.angles, strict=True):
+            speed = forward + side * memory.half * yaw
+            angles, later = values_along(speed / memory.radius, known)
+            middle = angles + speed / (2.0 * memory.radius * known.rate_hz)
+            extra.append(speed * (sine * np.sin(middle) + cosine * np.cos(middle)))
+            after.append(later)
+        turned = yaw + (extra[1] - extra[0]) / (2.0 * memory.half)
+        moved = np.stack((forward + (extra[0] + extra[1]) / 2.0, sideways, turned), axis=-1)
+        return moved, memory._replace(angles=(after[0], after[1]))

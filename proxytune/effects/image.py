@@ -1,0 +1,371 @@
+"""Effects of lens and sensor on how bright and how sharp a picture is: each picture by itself.
+
+Effects of the shutter: from which instants a picture is made. They are seen only in motion.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
+from scipy.special import ive
+
+from proxytune.effects.effect import Setting, Signal, Stage, Trace
+from proxytune.seeds import picture_generator
+from proxytune.space import Parameter
+
+
+def _size(setting: Setting) -> tuple[int, int]:
+    """Rows and columns of the pictures."""
+    return int(setting.nominal["camera_rows"]), int(setting.nominal["camera_columns"])
+
+
+class Softness(NamedTuple):
+    """Rows and columns of the pictures, and how a point spreads along either."""
+
+    rows: int
+    columns: int
+    weights: Signal
+
+
+@dataclass(frozen=True)
+class Defocus:
+    """The lens is out of focus: a point becomes a Gaussian spot, of the same width all over the picture.
+
+    Edges tell it by the width that they have when nothing moves; motion widens them by blur.
+    """
+
+    deviation: float
+    name: ClassVar[str] = "defocus"
+    stage: ClassVar[Stage] = Stage.IMAGE
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="deviation",
+            unit="",
+            low=0.0,
+            high=0.05,
+            neutral=0.0,
+            probes=(0.005, 0.01, 0.02, 0.04),
+            source="standard deviation as a share of the picture's height: 1 to 5 pixels of 480 on well-kept cameras",
+        ),
+    )
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, setting: Setting) -> Softness:
+        """The spot's width in pixels of this picture."""
+        rows, columns = _size(setting)
+        return Softness(rows, columns, _gaussian(self.deviation * rows))
+
+    def apply(self, signal: Signal, memory: Softness) -> tuple[Signal, Softness]:
+        """Spread every point; beyond its edges the picture goes on as it ends."""
+        soft = signal.reshape(*signal.shape[:-1], memory.rows, memory.columns, 3)
+        for axis in (-3, -2):
+            soft = correlate1d(soft, memory.weights, axis, output=np.float32, mode="nearest")
+        return soft.reshape(signal.shape), memory
+
+
+def _gaussian(deviation: float) -> Signal:
+    """The Gaussian on whole pixels (Lindeberg 1990): it has this standard deviation even if that is part of a pixel."""
+    reach = math.ceil(4.0 * deviation) + 2
+    weights = ive(np.abs(np.arange(-reach, reach + 1)), deviation**2)
+    return np.asarray(weights / weights.sum())
+
+
+@dataclass(frozen=True)
+class Vignetting:
+    """The picture is darker towards its corners: by the factor 1 − strength · (r/r_corner)² about its middle.
+
+    The floor tells it without knowledge of the paint, for the same paint is seen near the middle and near the corners.
+    """
+
+    strength: float
+    name: ClassVar[str] = "vignetting"
+    stage: ClassVar[Stage] = Stage.IMAGE
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="strength",
+            unit="",
+            low=0.0,
+            high=0.9,
+            neutral=0.0,
+            probes=(0.1, 0.2, 0.4, 0.7),
+            source="the cos⁴ law: 0.5 in corners 33° off the axis, 0.85 in those of a Duckiebot, 52° off",
+        ),
+    )
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, setting: Setting) -> Signal:
+        """The factor of every pixel and colour (channels,)."""
+        rows, columns = _size(setting)
+        down, right = np.mgrid[:rows, :columns] + 0.5 - np.reshape([rows / 2.0, columns / 2.0], (2, 1, 1))
+        share = 4.0 * (down**2 + right**2) / (rows**2 + columns**2)
+        return np.repeat(1.0 - self.strength * share, 3).astype(np.float32)
+
+    def apply(self, signal: Signal, memory: Signal) -> tuple[Signal, Signal]:
+        """Darken every pixel by its factor."""
+        return signal * memory, memory
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Brightness x of 255 becomes 255 · gain · (x/255)^gamma.
+
+    Pictures tell both only relative to the paint that the map declares: a brighter floor is the same as a greater gain.
+    What is found makes the proxy's pictures match; it is no statement about the camera.
+    """
+
+    gain: float
+    gamma: float
+    name: ClassVar[str] = "exposure"
+    stage: ClassVar[Stage] = Stage.IMAGE
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="gain",
+            unit="",
+            low=0.2,
+            high=4.0,
+            neutral=1.0,
+            probes=(0.5, 0.8, 1.25, 2.0),
+            source="about two stops to either side",
+        ),
+        Parameter(
+            name="gamma",
+            unit="",
+            low=0.3,
+            high=3.0,
+            neutral=1.0,
+            probes=(0.45, 0.75, 1.3, 2.2),
+            source="a sensor's linear pictures against encoded ones (sRGB): 2.2, or 1/2.2 the other way",
+        ),
+    )
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Brighten or darken; the picture is clipped only once it is complete."""
+        if self.gamma == 1.0:
+            return self.gain * signal, None
+        # In double precision: powers in single precision differ from processor to processor
+        bright = np.power(signal / 255.0, self.gamma, dtype=np.float64)
+        return (255.0 * self.gain * bright).astype(np.float32), None
+
+
+class Draw(NamedTuple):
+    """The number of the next picture, and the seed of the noise."""
+
+    next: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class ImageNoise:
+    """White noise on every pixel and colour, drawn anew for each picture.
+
+    It takes two pictures standing still to tell it from the floor's texture; one will do where the floor is plain.
+    """
+
+    deviation: float
+    name: ClassVar[str] = "image_noise"
+    stage: ClassVar[Stage] = Stage.IMAGE
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="deviation",
+            unit="grey levels",
+            low=0.0,
+            high=40.0,
+            neutral=0.0,
+            probes=(2.0, 5.0, 10.0, 20.0),
+            source="standard deviation, of 255: small sensors 1 to 5 by daylight, 10 to 30 in a dim room",
+        ),
+    )
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, setting: Setting) -> Draw:
+        """No picture drawn yet."""
+        return Draw(0, setting.seed)
+
+    def apply(self, signal: Signal, memory: Draw) -> tuple[Signal, Draw]:
+        """Add each picture's own noise; the same to all members of a batch."""
+        channels, end = signal.shape[-1], memory.next + signal.shape[-2]
+        generators = (picture_generator(memory.seed, number) for number in range(memory.next, end))
+        drawn = np.stack([one.standard_normal(channels, dtype=np.float32) for one in generators])
+        return signal + self.deviation * drawn, memory._replace(next=end)
+
+
+class Exposed(NamedTuple):
+    """The newest past pictures, and the weight of each picture in the window, the newest last."""
+
+    pictures: Signal
+    weights: Signal
+
+
+class Late(NamedTuple):
+    """The newest past pictures, and how old each of their equal parts, from above, is: whole samples and a fraction."""
+
+    pictures: Signal
+    whole: NDArray[np.int64]
+    fraction: Signal
+
+
+@dataclass(frozen=True)
+class Blur:
+    """A picture is the mean of what was before the lens during the last `blur` seconds.
+
+    Between two rendered pictures the scene is taken to change linearly, so the mean is continuous in `blur`.
+    Moving edges tell it by their width, which grows with their speed. It makes pictures older by half of itself: a
+    latency that is found without it is too long by as much.
+    """
+
+    blur: float
+    name: ClassVar[str] = "blur"
+    stage: ClassVar[Stage] = Stage.IMAGE
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="blur",
+            unit="s",
+            low=0.0,
+            high=0.2,
+            neutral=0.0,
+            probes=(0.0125, 0.025, 0.05, 0.1),
+            source="box of the paper 0 to 0.10 s",
+        ),
+    )
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, setting: Setting) -> Exposed:
+        """As if the robot had stood before the first picture for ever."""
+        weights = _window(self.blur * setting.rate_hz)
+        return Exposed(_still(setting, weights.size - 1), weights)
+
+    def apply(self, signal: Signal, memory: Exposed) -> tuple[Signal, Exposed]:
+        """Average over the window that ends with each picture."""
+        length, past = signal.shape[-2], memory.weights.size - 1
+        joined = np.concatenate((memory.pictures, signal), axis=-2)
+        band = np.zeros((length, length + past), dtype=np.float32)
+        for row in range(length):
+            band[row, row : row + past + 1] = memory.weights
+        return band @ joined, memory._replace(pictures=joined[..., length:, :])
+
+    def mean_weights(self, rate_hz: float) -> Signal:
+        """What each of the last pictures counts in the newest mean, the newest last: exact for pictures of 8 bits."""
+        weights = _window(self.blur * rate_hz)
+        return weights[int(np.argmax(weights > 0.0)) :]
+
+
+@dataclass(frozen=True)
+class RollingShutter:
+    """Rows are read out one after another: the last is on time, row r of R older by readout · (1 − (r + ½)/R).
+
+    The picture as a whole is thus older by half the readout, which looks like a latency; bends alone show that the rows
+    differ.
+    """
+
+    readout: float
+    name: ClassVar[str] = "rolling_shutter"
+    stage: ClassVar[Stage] = Stage.IMAGE
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="readout",
+            unit="s",
+            low=0.0,
+            high=0.1,
+            neutral=0.0,
+            probes=(0.01, 0.02, 0.033, 0.06),
+            source="CMOS sensors: up to the time between two frames, 0.033 s at 30 Hz, 0.067 s at 15 Hz",
+        ),
+    )
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, setting: Setting) -> Late:
+        """As if the robot had stood before the first picture for ever."""
+        rows = int(setting.nominal["camera_rows"])
+        return _late(self.readout * setting.rate_hz * (1.0 - (np.arange(rows) + 0.5) / rows), setting)
+
+    def apply(self, signal: Signal, memory: Late) -> tuple[Signal, Late]:
+        """Show each row as old as it is."""
+        return _show(signal, memory)
+
+
+@dataclass(frozen=True)
+class CameraLatency:
+    """Pictures arrive late by a constant time; between two of them, their linear mix.
+
+    Pictures at known places tell it where speeds and turns vary. What is found without blur in the model is the latency
+    and half the blur.
+    """
+
+    camera_latency: float
+    name: ClassVar[str] = "camera_latency"
+    stage: ClassVar[Stage] = Stage.IMAGE
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="camera_latency",
+            unit="s",
+            low=0.0,
+            high=0.5,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.1, 0.2),
+            source="USB cameras 0.03 to 0.1 s; over a wireless link some tenths of a second",
+        ),
+    )
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, setting: Setting) -> Late:
+        """As if the robot had stood before the first picture for ever."""
+        return _late(np.array([self.camera_latency * setting.rate_hz]), setting)
+
+    def apply(self, signal: Signal, memory: Late) -> tuple[Signal, Late]:
+        """Show each picture as old as it is."""
+        return _show(signal, memory)
+
+
+def _still(setting: Setting, count: int) -> Signal:
+    """So many pictures of what was there before time zero."""
+    rest = np.asarray(setting.rest, dtype=np.float32)[..., None, :]
+    return np.repeat(rest, count, axis=-2)
+
+
+def _late(samples: Signal, setting: Setting) -> Late:
+    """The memory before the first picture of parts that are so many samples old."""
+    whole = np.floor(samples + 1e-9).astype(np.int64)
+    fraction = np.maximum(0.0, samples - whole).astype(np.float32)
+    return Late(_still(setting, int(whole.max()) + 1), whole, fraction)
+
+
+def _show(signal: Signal, memory: Late) -> tuple[Signal, Late]:
+    """Mix, for each part, the two pictures that its age falls between."""
+    length, past, parts = signal.shape[-2], memory.pictures.shape[-2], memory.whole.size
+    joined = np.concatenate((memory.pictures, signal), axis=-2)
+    split = joined.reshape(*joined.shape[:-1], parts, -1)
+    newer, part = np.arange(past, past + length)[:, None] - memory.whole, np.arange(parts)
+    older = memory.fraction[:, None]
+    mixed = (1.0 - older) * split[..., newer, part, :] + older * split[..., newer - 1, part, :]
+    return mixed.reshape(signal.shape), memory._replace(pictures=joined[..., length:, :])
+
+
+_QUANTUM = 2**16
+_NONE = 1e-9
+"""A window of fewer samples has weight on the newest alone; the arithmetic of the smallest numbers overflows."""
+
+
+def _window(samples: float) -> Signal:
+    """Trapezoid weights of a window that reaches back a fractional number of samples, the newest last.
+
+    They are whole multiples of 2⁻¹⁶ that add up to 1: sums over 8-bit pictures are then exact in single precision, so
+    that every processor gives the same picture, whatever the order in which it adds.
+    """
+    if samples < _NONE:
+        return np.ones(1, dtype=np.float32)
+    whole = int(np.floor(samples + 1e-9))
+    part = max(0.0, samples - whole)
+    backwards = np.zeros(whole + 2)
+    backwards[:whole] += 0.5
+    backwards[1 : whole + 1] += 0.5
+    backwards[whole] += part * (1.0 - part / 2.0)
+    backwards[whole + 1] += part * part / 2.0
+    quanta = np.diff(np.rint(np.cumsum(backwards) * (_QUANTUM / samples)), prepend=0.0)
+    return (quanta[::-1] / _QUANTUM).astype(np.float32)

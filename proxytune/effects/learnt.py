@@ -1,0 +1,419 @@
+"""Motion that was learnt from drives and has no name: curves over causal features. It is not physics.
+
+A learnt effect as named values of θ, and as the `[effects.learnt.GROUP]` tables of a model.toml.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from proxytune.effects.effect import Known, Setting, Signal, Stage, Trace, beforehand, values_along
+from proxytune.effects.features import (
+    GROUPS,
+    HEADING,
+    Asked,
+    Group,
+    Knot,
+    Knots,
+    low_passes,
+    moved_since,
+    play,
+    rings,
+    rolled_since,
+)
+from proxytune.effects.motion import REST_SPEED
+from proxytune.errors import SettingsError
+from proxytune.settings import Section, nearest
+from proxytune.space import Parameter, Theta
+
+
+class Curve(NamedTuple):
+    """One channel of one group: a weight for each of its knots, in their order."""
+
+    group: str
+    channel: str
+    knots: Knots
+    weights: tuple[float, ...]
+
+
+class Seen(NamedTuple):
+    """The speeds [m/s] and yaw rates [rad/s] that the fit saw: what is asked for beyond them counts as the last."""
+
+    forward: tuple[float, float]
+    yaw: tuple[float, float]
+
+
+class Past(NamedTuple):
+    """What has been so far: arrays of the batch's shape, and low-passes with their time constants last.
+
+    Attributes:
+        seconds: Since the start [s].
+        use: Minutes at full speed.
+        slow: Low-passes of each wheel's speed (2, …, time constants).
+        load: Low-passes of the mean wheel speed's size (…, time constants).
+        rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …), negative
+            backwards.
+        started: Since each wheel last stood [s] (2, …).
+        last: Each wheel's newest speed (2, …).
+        ring: Swings of each wheel's speed, complex (2, …, frequencies).
+        dragged: Each wheel's speed through plays (2, …, widths).
+        bearing: The heading, and headings that are known beforehand.
+        rate_hz: Samples per second.
+        baseline: The robot's effective baseline [m].
+        full_speed: The robot's full speed [m/s].
+    """
+
+    seconds: Signal
+    use: Signal
+    slow: Signal
+    load: Signal
+    rolled: Signal
+    started: Signal
+    last: Signal
+    ring: Signal
+    dragged: Signal
+    bearing: Known
+    rate_hz: float
+    baseline: float
+    full_speed: float
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """Adds to the twist the sum of curves over features of the twist that is asked for.
+
+    It vanishes where the robot stands, and beyond what the fit saw it is what it is at the edge.
+    """
+
+    seen: Seen
+    curves: tuple[Curve, ...]
+    name: ClassVar[str] = "learnt"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    trace: ClassVar[Trace | None] = None
+
+    def begin(self, setting: Setting) -> Past:
+        """At rest, unused."""
+        batch = np.shape(setting.rest)[:-1]
+        slow = np.zeros((2, *batch, len(self._constants("transients"))))
+        load = np.zeros((*batch, len(self._constants("load"))))
+        nominal = setting.nominal
+        figures = (setting.rate_hz, nominal["effective_baseline"], nominal["full_speed"])
+        return Past(
+            np.zeros(batch),
+            np.zeros(batch),
+            slow,
+            load,
+            np.zeros((3, *batch)),
+            np.zeros((2, *batch)),
+            np.zeros((2, *batch)),
+            np.zeros((2, *batch, len(self._constants("ringing"))), dtype=complex),
+            np.zeros((2, *batch, len(self._constants("play")))),
+            beforehand(setting.headings, setting),
+            *figures,
+        )
+
+    def apply(self, signal: Signal, memory: Past) -> tuple[Signal, Past]:
+        """Add what the curves say."""
+        asked, after = self._asked(signal, memory)
+        moved = signal + self._added(asked, memory.baseline, of_heading=False)
+        if self._constants(HEADING):
+            moved, onwards = self._bent(moved, asked, memory)
+            after = after._replace(bearing=onwards)
+        return moved, after
+
+    def _bent(self, moved: Signal, asked: Asked, memory: Past) -> tuple[Signal, Known]:
+        """The motion with what depends on the heading: sample by sample where that leads to another heading."""
+        bearing, length = memory.bearing, moved.shape[-2]
+        at_once = bearing.values.shape[-1] - bearing.next >= length or not self._turns_by_heading
+        out = []
+        for begin in range(0, length, length if at_once else 1):
+            here = slice(begin, length if at_once else begin + 1)
+            course, _ = values_along(moved[..., here, 2], bearing)
+            there = asked._replace(forward=asked.forward[..., here], yaw=asked.yaw[..., here], heading=course)
+            out.append(moved[..., here, :] + self._added(there, memory.baseline, of_heading=True))
+            _, bearing = values_along(out[-1][..., 2], bearing)
+        return np.concatenate(out, axis=-2), bearing
+
+    @property
+    def _turns_by_heading(self) -> bool:
+        return any(
+            curve.group == HEADING and GROUPS[HEADING].channels[curve.channel].to == "yaw" for curve in self.curves
+        )
+
+    def recall(self, setting: Setting, signal: Signal, row: Signal, sample: Signal) -> Past:
+        """The memory as of given samples of longer signals: the past of windows that begin amid drives.
+
+        Args:
+            setting: Of the windows (W, …).
+            signal: What was asked for from the start on (rows, time, 3).
+            row: The row of each window (W,).
+            sample: The sample of its row at which each window begins (W,).
+        """
+        whole = self.begin(Setting(setting.rate_hz, np.zeros((len(signal), 3)), setting.nominal))
+        asked, _ = self._asked(signal, whole)
+
+        def before(values: Signal) -> Signal:
+            return np.where((sample > 0).reshape(-1, *[1] * (values.ndim - 2)), values[row, sample - 1], 0.0)
+
+        slow = [
+            wheel[..., None] - np.cumsum(band, axis=-1) for wheel, band in zip(asked.wheels, asked.bands, strict=True)
+        ]
+        return self.begin(setting)._replace(
+            seconds=sample / setting.rate_hz,
+            use=before(asked.use),
+            slow=np.stack([before(one) for one in slow]),
+            load=before(asked.loads),
+            rolled=np.stack([before(one) for one in asked.rolled]),
+            started=np.stack([before(one) for one in asked.started]),
+            last=np.stack([before(one) for one in asked.wheels]),
+            ring=np.stack([before(one) for one in asked.rings]),
+            dragged=np.stack([before(one) for one in asked.played]),
+        )
+
+    def features(self, signal: Signal, memory: Past) -> list[tuple[Signal, Signal]]:
+        """What each weight adds, curve by curve: its features (…, time, knots) and the twist of one unit (3,).
+
+        The heading is taken from what is known beforehand and from the twist that is asked for.
+        """
+        asked, _ = self._asked(signal, memory)
+        course, _ = values_along(signal[..., 2], memory.bearing)
+        asked = asked._replace(heading=course)
+        channels = [(curve, GROUPS[curve.group].channels[curve.channel]) for curve in self.curves]
+        return [(one.basis(asked, curve.knots), _direction(one.to, memory.baseline)) for curve, one in channels]
+
+    def _added(self, asked: Asked, baseline: float, *, of_heading: bool) -> Signal:
+        added = np.zeros((*asked.forward.shape, 3))
+        for curve in self.curves:
+            if (curve.group == HEADING) == of_heading:
+                channel = GROUPS[curve.group].channels[curve.channel]
+                amount = channel.basis(asked, curve.knots) @ np.asarray(curve.weights)
+                added += amount[..., None] * _direction(channel.to, baseline)
+        return added
+
+    def _constants(self, group: str) -> Knots:
+        """The knots of a group, none where the effect has no such group."""
+        return next((curve.knots for curve in self.curves if curve.group == group), ())
+
+    def _asked(self, signal: Signal, past: Past) -> tuple[Asked, Past]:
+        """What is asked for and its past, and the past of the next chunk; no heading yet."""
+        forward, yaw = np.clip(signal[..., 0], *self.seen.forward), np.clip(signal[..., 2], *self.seen.yaw)
+        turn = yaw * (past.baseline / 2.0)
+        wheels = np.stack((forward - turn, forward + turn))
+        effort = np.abs(wheels).mean(axis=0) / past.full_speed
+        seconds = past.seconds[..., None] + np.arange(1, forward.shape[-1] + 1) / past.rate_hz
+        use = past.use[..., None] + np.cumsum(effort, axis=-1) / (60.0 * past.rate_hz)
+        slow = low_passes(wheels, past.slow, self._constants("transients"), past.rate_hz)
+        load = low_passes(effort, past.load, self._constants("load"), past.rate_hz)
+        bands = -np.diff(slow, axis=-1, prepend=wheels[..., None])
+        rolled = rolled_since(np.stack((*wheels, forward)), past.rolled, past.rate_hz)
+        started = moved_since(wheels, past.started, REST_SPEED, past.rate_hz)
+        change = np.diff(wheels, axis=-1, prepend=past.last[..., None])
+        ringing = rings(change, past.ring, self._constants("ringing"), past.rate_hz)
+        played = play(wheels, past.dragged, self._constants("play"))
+        after = past._replace(seconds=seconds[..., -1], use=use[..., -1], slow=slow[..., -1, :], load=load[..., -1, :])
+        of_wheels = (bands, load, rolled, started, ringing, played)
+        asked = Asked(forward, yaw, wheels, seconds, use, np.zeros_like(yaw), *of_wheels)
+        after = after._replace(rolled=rolled[..., -1], started=started[..., -1], last=wheels[..., -1])
+        return asked, after._replace(ring=ringing[..., -1, :], dragged=played[..., -1, :])
+
+
+def _direction(to: str, baseline: float) -> Signal:
+    """The twist that a unit of forward, sideways, yaw, or of a wheel's speed makes (3,)."""
+    wheel = {"left": (0.5, 0.0, -1.0 / baseline), "right": (0.5, 0.0, 1.0 / baseline)}
+    body = {"forward": (1.0, 0.0, 0.0), "sideways": (0.0, 1.0, 0.0), "yaw": (0.0, 0.0, 1.0)}
+    return np.array({**wheel, **body}[to])
+
+
+RANGE = "range"
+"""The table of what the fit saw, beside those of the groups."""
+
+LARGEST = 100.0
+"""No weight is larger: a curve that adds 100 m/s is a slip of the pen."""
+
+LABEL = "learnt from drives: not physics, and of no use beyond what they visited"
+
+
+def is_learnt(name: str) -> bool:
+    """Whether a name of θ belongs to the learnt effect."""
+    return name.startswith(f"{Learnt.name}.")
+
+
+def learnt_theta(effect: Learnt) -> dict[str, float]:
+    """The values of a learnt effect by their names in θ: `learnt.GROUP.CHANNEL@KNOT`."""
+    theta = {}
+    for channel, bounds in zip(Seen._fields, effect.seen, strict=True):
+        for end, value in zip(("low", "high"), bounds, strict=True):
+            theta[f"{Learnt.name}.{RANGE}.{channel}@{end}"] = float(value)
+    for curve in effect.curves:
+        for knot, weight in zip(curve.knots, curve.weights, strict=True):
+            theta[f"{Learnt.name}.{curve.group}.{curve.channel}@{_text(knot)}"] = float(weight)
+    return theta
+
+
+def learnt_effect(theta: Theta) -> Learnt | None:
+    """The learnt effect that θ names, or None.
+
+    Raises:
+        SettingsError: If names or values do not make one.
+    """
+    named = {name: float(value) for name, value in theta.items() if is_learnt(name)}
+    if not named:
+        return None
+    bounds: dict[str, float] = {}
+    found: dict[tuple[str, str], dict[Knot, float]] = {}
+    for name, value in named.items():
+        group, channel, knot = _parts(name)
+        if group == RANGE:
+            bounds[f"{channel}@{knot}"] = value
+        else:
+            found.setdefault((group, channel), {})[_knot(name, knot)] = value
+    ends = [bounds.get(f"{channel}@{end}", math.nan) for channel in Seen._fields for end in ("low", "high")]
+    curves = [
+        Curve(group, channel, tuple(sorted(values)), tuple(values[knot] for knot in sorted(values)))
+        for (group, channel), values in found.items()
+    ]
+
+    def problem(where: str, what: str) -> SettingsError:
+        return SettingsError(f"{Learnt.name}.{where}: {what}")
+
+    return _checked(Seen((ends[0], ends[1]), (ends[2], ends[3])), curves, problem)
+
+
+def read_learnt(section: Section) -> dict[str, float]:
+    """The values of the `[effects.learnt]` tables by their names in θ.
+
+    Raises:
+        SettingsError: With file, key and remedy.
+    """
+    section.only((RANGE, *GROUPS))
+    if not section.values:
+        return {}
+    ranges = section.section(RANGE)
+    ranges.only(Seen._fields)
+    seen = Seen(ranges.bounds("forward"), ranges.bounds("yaw"))
+    curves = [curve for group in section.values if group != RANGE for curve in _read_group(section, group)]
+    return learnt_theta(_checked(seen, curves, section.error))
+
+
+def _read_group(section: Section, name: str) -> list[Curve]:
+    table = section.section(name)
+    table.only(("knots", *GROUPS[name].channels))
+    knots = tuple(_read_knot(table, value) for value in _list(table, "knots"))
+    curves = []
+    for channel in table.values:
+        if channel != "knots":
+            weights = [_number(table, channel, value) for value in _list(table, channel)]
+            if len(weights) != len(knots):
+                raise table.error(channel, f"must have one weight for each of {len(knots)} knots, got {len(weights)}")
+            curves.append(Curve(name, channel, knots, tuple(weights)))
+    if not curves:
+        raise table.error("knots", f"is alone; add weights for {' or '.join(GROUPS[name].channels)}")
+    return curves
+
+
+def _list(table: Section, key: str) -> list[object]:
+    value = table.values.get(key)
+    if not isinstance(value, list) or not value:
+        raise table.error(key, f"must be a list of numbers, got {value!r}")
+    return value
+
+
+def _number(table: Section, key: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise table.error(key, f"must be a list of numbers, got {value!r} in it")
+    return float(value)
+
+
+def _read_knot(table: Section, value: object) -> Knot:
+    if isinstance(value, list) and len(value) == 2:
+        return _number(table, "knots", value[0]), _number(table, "knots", value[1])
+    return _number(table, "knots", value)
+
+
+def _checked(seen: Seen, curves: list[Curve], problem: Callable[[str, str], SettingsError]) -> Learnt:
+    """The effect, if its values make one."""
+    for channel, (low, high) in zip(Seen._fields, seen, strict=True):
+        if not (math.isfinite(low) and math.isfinite(high) and low <= 0.0 <= high):
+            raise problem(
+                f"{RANGE}.{channel}", f"must be finite with 0 in it, got [{low:g}, {high:g}]; state what was seen"
+            )
+    for curve in curves:
+        where, group = f"{curve.group}.{curve.channel}", GROUPS[curve.group]
+        _check_knots(curve, f"{curve.group}.knots", group, problem)
+        for weight in curve.weights:
+            if not abs(weight) <= LARGEST:
+                raise problem(where, f"weights must be between {-LARGEST:g} and {LARGEST:g}, got {weight:g}")
+        other = next(one for one in curves if one.group == curve.group)
+        if other.knots != curve.knots:
+            raise problem(where, f"must have the same knots as {other.group}.{other.channel}: one weight for each")
+    order = {(group, channel): None for group, one in GROUPS.items() for channel in one.channels}
+    places = list(order)
+    return Learnt(seen, tuple(sorted(curves, key=lambda curve: places.index((curve.group, curve.channel)))))
+
+
+def _check_knots(curve: Curve, where: str, group: Group, problem: Callable[[str, str], SettingsError]) -> None:
+    pairs = group.unit.count(",") == 1
+    for knot in curve.knots:
+        values = knot if isinstance(knot, tuple) else (knot,)
+        if (len(values) == 2) != pairs:
+            raise problem(where, f"must be {'pairs' if pairs else 'numbers'} [{group.unit}], got {list(values)}")
+        if not all(map(math.isfinite, values)):
+            raise problem(where, "must be finite")
+        if not any(values):
+            raise problem(where, "0 is no knot: nothing is added there; take it out")
+        if group.low is not None and values[0] < group.low:
+            raise problem(where, f"must be at least {group.low:g} {group.unit}, got {values[0]:g}")
+    if list(curve.knots) != sorted(set(curve.knots)):
+        raise problem(where, "must be in ascending order, each once")
+
+
+def learnt_text(theta: Theta) -> str:
+    """The `[effects.learnt.GROUP]` tables that read back as the learnt effect of this θ, empty where it has none."""
+    effect = learnt_effect(theta)
+    if effect is None:
+        return ""
+    lines = [f"\n# {LABEL}", f"[effects.{Learnt.name}.{RANGE}]"]
+    lines += [
+        f"{channel} = [{low!r}, {high!r}]" for channel, (low, high) in zip(Seen._fields, effect.seen, strict=True)
+    ]
+    for group in dict.fromkeys(curve.group for curve in effect.curves):
+        curves = [curve for curve in effect.curves if curve.group == group]
+        lines += [
+            f"\n[effects.{Learnt.name}.{group}]  # {GROUPS[group].title}",
+            _row("knots", curves[0].knots, GROUPS[group].unit),
+        ]
+        lines += [_row(curve.channel, curve.weights, GROUPS[group].channels[curve.channel].unit) for curve in curves]
+    return "\n".join(lines) + "\n"
+
+
+def _row(key: str, values: Knots, unit: str) -> str:
+    return f"{key} = [{', '.join(repr(list(v) if isinstance(v, tuple) else v) for v in values)}]  # {unit}"
+
+
+def _parts(name: str) -> tuple[str, str, str]:
+    """Group, channel and knot of a name in θ."""
+    head, _, knot = name.partition("@")
+    words = head.split(".")
+    channels: Mapping[str, object] = {}
+    if len(words) == 3 and (words[1] in GROUPS or words[1] == RANGE):
+        channels = GROUPS[words[1]].channels if words[1] in GROUPS else {**dict.fromkeys(Seen._fields)}
+    if len(words) != 3 or words[2] not in channels or not knot:
+        known = [f"{Learnt.name}.{group}.{channel}@KNOT" for group, one in GROUPS.items() for channel in one.channels]
+        raise SettingsError(f"{name}: no group of the learnt effect has this name; {nearest(name, known)}")
+    return words[1], words[2], knot
+
+
+def _knot(name: str, text: str) -> Knot:
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise SettingsError(f"{name}: '{text}' is no knot; write a number, or two with a comma") from None
+    return (values[0], values[1]) if len(values) == 2 else values[0]
+
+
+def _text(knot: Knot) -> str:
+    return ",".join(repr(float(value)) for value in (knot if isinstance(knot, tuple) else (knot,)))

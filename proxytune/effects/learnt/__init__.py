@@ -1,1 +1,0 @@
-"""The learnt remainder as an effect like any other."""

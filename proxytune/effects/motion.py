@@ -1,0 +1,478 @@
+"""Effects between the motion that the wheels ask of the body and the motion that the body makes.
+
+Effects on how driving and turning mix: each is changed by the other, or turning comes late.
+Effects of the floor: slopes that slow the robot down or push it aside, and patches where its wheels slip.
+Effects between the pose of the robot and the pose that is measured of it.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from proxytune.effects.effect import (
+    TURN,
+    Cue,
+    Known,
+    Lag,
+    Means,
+    Panel,
+    Setting,
+    Signal,
+    Stage,
+    Trace,
+    beforehand,
+    follow,
+    lag_of,
+    values_along,
+)
+from proxytune.space import Parameter
+
+
+def _moved(forward: Signal, sideways: Signal, yaw: Signal) -> Signal:
+    return np.stack((forward, sideways, yaw), axis=-1)
+
+
+@dataclass(frozen=True)
+class YawScrub:
+    """Tyres that scrub turn the robot as if its wheels were `baseline` apart."""
+
+    baseline: float
+    name: ClassVar[str] = "yaw_scrub"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="baseline",
+            unit="m",
+            low=0.03,
+            high=3.0,
+            neutral="effective_baseline",
+            probes=(0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0),
+            source="wheel distance on hard tyres to a few times it with scrub: 0.16 m instead of 0.10 m on a Duckiebot",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
+    )
+
+    def begin(self, setting: Setting) -> float:
+        """The factor on the yaw rate."""
+        return setting.nominal["effective_baseline"] / self.baseline
+
+    def apply(self, signal: Signal, memory: float) -> tuple[Signal, float]:
+        """Scale the yaw rate."""
+        return _moved(signal[..., 0], signal[..., 1], signal[..., 2] * memory), memory
+
+
+@dataclass(frozen=True)
+class TurnSlip:
+    """Turning costs forward speed: it shrinks by the factor 1 − loss · |yaw rate|."""
+
+    loss: float
+    name: ClassVar[str] = "turn_slip"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="loss",
+            unit="s/rad",
+            low=0.0,
+            high=1.5,
+            neutral=0.0,
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+            source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
+        shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),)),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Slow the robot down in bends, at most to a stop."""
+        kept = np.maximum(0.0, 1.0 - self.loss * np.abs(signal[..., 2]))
+        return _moved(signal[..., 0] * kept, signal[..., 1], signal[..., 2]), None
+
+
+@dataclass(frozen=True)
+class LateralSlip:
+    """The robot slides outwards in bends, by `slip` times its forward speed and its yaw rate."""
+
+    slip: float
+    name: ClassVar[str] = "lateral_slip"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="slip",
+            unit="s",
+            low=-0.5,
+            high=0.5,
+            neutral=0.0,
+            probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2),
+            source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks the same",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE,),
+        shown=Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),)),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Slide to the right in a bend to the left."""
+        outwards = self.slip * signal[..., 0] * signal[..., 2]
+        return _moved(signal[..., 0], signal[..., 1] - outwards, signal[..., 2]), None
+
+
+@dataclass(frozen=True)
+class CrossCoupling:
+    """Turning pushes the robot forwards, and driving turns it, whichever way it turns and drives.
+
+    The forward speed grows by `forward` times the square of the yaw rate, the yaw rate by `turn` times |forward speed|.
+    """
+
+    forward: float
+    turn: float
+    name: ClassVar[str] = "cross_coupling"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="forward",
+            unit="m·s/rad²",
+            low=-0.2,
+            high=0.2,
+            neutral=0.0,
+            probes=(-0.03, -0.01, -0.003, 0.003, 0.01, 0.03),
+            source="a centre of turning some millimetres to centimetres off the middle of the axle",
+        ),
+        Parameter(
+            name="turn",
+            unit="rad/m",
+            low=-2.0,
+            high=2.0,
+            neutral=0.0,
+            probes=(-0.6, -0.2, -0.06, 0.06, 0.2, 0.6),
+            source="a dragging caster or a tyre that pulls: some degrees to tens of degrees a metre",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE, Cue.DIRECTION, Cue.COMMAND_DIFFERENCE),
+        shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("forward", "forward speed [m/s]", "turn"))),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Add to each what comes of the other."""
+        forward, yaw = signal[..., 0], signal[..., 2]
+        pushed, turned = forward + self.forward * yaw**2, yaw + self.turn * np.abs(forward)
+        return np.stack((pushed, signal[..., 1], turned), axis=-1), None
+
+
+@dataclass(frozen=True)
+class Understeer:
+    """The faster the robot drives the less it turns: the yaw rate is divided by 1 + gain · |forward speed|."""
+
+    gain: float
+    name: ClassVar[str] = "understeer"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="gain",
+            unit="s/m",
+            low=0.0,
+            high=5.0,
+            neutral=0.0,
+            probes=(0.03, 0.1, 0.3, 0.8, 2.0),
+            source="tyres that slip sideways: some tenths of the turn at 1 m/s, small robots more",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
+        shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "turn", share=True),)),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Scale the yaw rate."""
+        turned = signal[..., 2] / (1.0 + self.gain * np.abs(signal[..., 0]))
+        return np.stack((signal[..., 0], signal[..., 1], turned), axis=-1), None
+
+
+class Turning(NamedTuple):
+    """The yaw rate at the end of the last sample (…, 1), and how it follows."""
+
+    yaw: Signal
+    lag: Lag
+
+
+@dataclass(frozen=True)
+class YawLag:
+    """The yaw rate follows the one that the wheels ask for with a first-order lag; the forward speed does not."""
+
+    time_constant: float
+    name: ClassVar[str] = "yaw_lag"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="time_constant",
+            unit="s",
+            low=0.0,
+            high=1.0,
+            neutral=0.0,
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+            source="a body that has to be turned on tyres that give: some hundredths to tenths of a second",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS, Cue.TURN_RATE), shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),))
+    )
+
+    def begin(self, setting: Setting) -> Turning:
+        """The resting yaw rate has been reached."""
+        return Turning(np.asarray(setting.rest, dtype=float)[..., 2:], lag_of(self.time_constant * setting.rate_hz))
+
+    def apply(self, signal: Signal, memory: Turning) -> tuple[Signal, Turning]:
+        """The mean yaw rate over each sample."""
+        late, yaw = follow(signal[..., 2:], memory.yaw, memory.lag)
+        return np.concatenate((signal[..., :2], late), axis=-1), memory._replace(yaw=yaw)
+
+
+REST_SPEED = 0.02
+"""Below this forward speed [m/s] static friction takes up more and more of the slope."""
+
+RIM_M = 0.1
+"""A patch begins to be felt over this way: a robot is not a point."""
+
+
+@dataclass(frozen=True)
+class FloorSlope:
+    """The floor rises along x and y: uphill the robot is slower, downhill faster, and at rest it stays.
+
+    The forward speed shrinks by (x · cos heading + y · sin heading) · min(1, |forward speed| / REST_SPEED); across the
+    slope the robot slides downhill by `push` times what the slope would take from it along its heading.
+    """
+
+    x: float
+    y: float
+    push: float
+    name: ClassVar[str] = "floor_slope"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        *(
+            Parameter(
+                name=axis,
+                unit="m/s",
+                low=-0.3,
+                high=0.3,
+                neutral=0.0,
+                probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
+                source="speed that a small robot loses on a floor some degrees from level",
+            )
+            for axis in ("x", "y")
+        ),
+        Parameter(
+            name="push",
+            unit="",
+            low=0.0,
+            high=2.0,
+            neutral=0.0,
+            probes=(0.25, 0.5, 1.0, 1.0, 0.5, 0.25),
+            source="0 for tyres that hold sideways, 1 for a robot that slides as easily across as along",
+            shape=True,
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.HEADING,),
+        shown=Means(
+            Cue.HEADING, tuple(Panel("heading", "heading [deg]", motion) for motion in ("forward", "sideways"))
+        ),
+    )
+
+    def begin(self, setting: Setting) -> Known:
+        """With the headings that are known beforehand."""
+        return beforehand(setting.headings, setting)
+
+    def apply(self, signal: Signal, memory: Known) -> tuple[Signal, Known]:
+        """Slow the robot down by the slope along its heading at the start of each sample."""
+        forward, sideways, yaw = np.moveaxis(signal, -1, 0)
+        headings, after = values_along(yaw, memory)
+        cosine, sine = np.cos(headings), np.sin(headings)
+        moving = np.minimum(1.0, np.abs(forward) / REST_SPEED)
+        slowed = forward - (self.x * cosine + self.y * sine) * moving
+        pushed = sideways + self.push * (self.x * sine - self.y * cosine) * moving
+        return np.stack((slowed, pushed, yaw), axis=-1), after
+
+
+class Walk(NamedTuple):
+    """Poses known beforehand (…, n, 3), number of the next sample, the pose at its start (…, 3), samples per second."""
+
+    known: Signal
+    next: int
+    pose: Signal
+    rate_hz: float
+
+
+@dataclass(frozen=True)
+class SlipperyPatch:
+    """In a round part of the map the wheels slip: the robot loses a share of its motion there.
+
+    The part's rim is RIM_M wide, and half of the loss is felt in its middle, `radius` away from (x, y).
+    """
+
+    loss: float
+    x: float
+    y: float
+    radius: float
+    name: ClassVar[str] = "slippery_patch"
+    stage: ClassVar[Stage] = Stage.MOTION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="loss",
+            unit="",
+            low=0.0,
+            high=0.9,
+            neutral=0.0,
+            probes=(0.05, 0.1, 0.2, 0.4),
+            source="carpet, dust and wet floors: some hundredths to half of the motion",
+        ),
+        *(
+            Parameter(
+                name=axis,
+                unit="m",
+                low=-20.0,
+                high=20.0,
+                neutral=0.0,
+                probes=(-1.0, -0.5, 0.5, 1.0),
+                source="where the robot drives; a diagnosis looks over all places that were driven through",
+                shape=True,
+            )
+            for axis in ("x", "y")
+        ),
+        Parameter(
+            name="radius",
+            unit="m",
+            low=0.1,
+            high=5.0,
+            neutral=0.5,
+            probes=(0.3, 0.8, 1.5, 2.5),
+            source="from a puddle to a carpet",
+            shape=True,
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.POSITION,),
+        shown=Means(Cue.POSITION, tuple(Panel(axis, f"{axis} [m]", "forward", share=True) for axis in ("x", "y"))),
+        placed=True,
+    )
+
+    def begin(self, setting: Setting) -> Walk:
+        """With the poses that are known beforehand."""
+        places, headings = np.asarray(setting.places, dtype=float), np.asarray(setting.headings, dtype=float)
+        count = min(places.shape[-2], headings.shape[-1])
+        shape = np.broadcast_shapes(places.shape[:-2], headings.shape[:-1], np.shape(setting.rest)[:-1])
+        parts = (places[..., :count, 0], places[..., :count, 1], headings[..., :count])
+        known = np.stack([np.broadcast_to(part, (*shape, count)) for part in parts], axis=-1)
+        return Walk(known, 0, known[..., 0, :], setting.rate_hz)
+
+    def apply(self, signal: Signal, memory: Walk) -> tuple[Signal, Walk]:
+        """Scale the motion by where the robot is at the start of each sample."""
+        length = signal.shape[-2]
+        known = memory.known[..., memory.next : memory.next + length, :]
+        given = known.shape[-2]
+        pose = known[..., -1, :] if given else memory.pose
+        moved = signal.copy()
+        moved[..., :given, :] *= self._kept(known)[..., None]
+        for sample in range(max(0, given - 1), length):
+            if sample >= given:
+                moved[..., sample, :] *= self._kept(pose)[..., None]
+            pose = _after(pose, moved[..., sample, :] / memory.rate_hz)
+        return moved, memory._replace(next=memory.next + length, pose=pose)
+
+    def _kept(self, poses: Signal) -> Signal:
+        """The share of the motion that is kept at each pose (…)."""
+        away = np.hypot(poses[..., 0] - self.x, poses[..., 1] - self.y)
+        return np.asarray(1.0 - self.loss * np.clip((self.radius - away) / RIM_M + 0.5, 0.0, 1.0))
+
+
+def _after(pose: Signal, motion: Signal) -> Signal:
+    """The pose after a small motion in the body's frame, (…, 3) both."""
+    middle = pose[..., 2] + motion[..., 2] / 2.0
+    cosine, sine = np.cos(middle), np.sin(middle)
+    x = pose[..., 0] + motion[..., 0] * cosine - motion[..., 1] * sine
+    y = pose[..., 1] + motion[..., 0] * sine + motion[..., 1] * cosine
+    return np.stack((x, y, pose[..., 2] + motion[..., 2]), axis=-1)
+
+
+@dataclass(frozen=True)
+class MarkerOffset:
+    """The point that is tracked lies ahead of the middle of the axle and to the left of it."""
+
+    forward: float
+    left: float
+    name: ClassVar[str] = "marker_offset"
+    stage: ClassVar[Stage] = Stage.MEASUREMENT
+    parameters: ClassVar[tuple[Parameter, ...]] = tuple(
+        Parameter(
+            name=direction,
+            unit="m",
+            low=-0.3,
+            high=0.3,
+            neutral=0.0,
+            probes=(-0.1, -0.04, -0.015, 0.015, 0.04, 0.1),
+            source="a marker is anywhere on the robot: up to half its length",
+        )
+        for direction in ("forward", "left")
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE,),
+        shown=Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways"))),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Move each pose to the tracked point."""
+        x, y, heading = signal[..., 0], signal[..., 1], signal[..., 2]
+        cosine, sine = np.cos(heading), np.sin(heading)
+        tracked_x = x + self.forward * cosine - self.left * sine
+        tracked_y = y + self.forward * sine + self.left * cosine
+        return np.stack((tracked_x, tracked_y, heading), axis=-1), None
+
+
+@dataclass(frozen=True)
+class HeadingOffset:
+    """The marker is stuck on turned: measured headings are off by a constant angle."""
+
+    angle: float
+    name: ClassVar[str] = "heading_offset"
+    stage: ClassVar[Stage] = Stage.MEASUREMENT
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="angle",
+            unit="deg",
+            low=-45.0,
+            high=45.0,
+            neutral=0.0,
+            probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0),
+            source="a marker stuck on by hand: some degrees; more where its axes are another's",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TURN_RATE,), shown=Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "sideways"),))
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Add the angle to each heading."""
+        return signal + np.array((0.0, 0.0, np.radians(self.angle))), None

@@ -1,0 +1,436 @@
+"""Effects between a command that has arrived and the speed that a wheel turns at, as a fraction of full speed.
+
+How an effect on the wheels is shared out between the left one and the right one.
+Effects of what a motor and its driver can bear: commands that rise slowly, motors that tire under load.
+Effects of the battery and the motor's limits on how fast wheels can turn.
+"""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from proxytune.effects.effect import (
+    Cue,
+    Form,
+    Lag,
+    Means,
+    Panel,
+    Setting,
+    Signal,
+    Stage,
+    Trace,
+    WheelCurve,
+    follow,
+    lag_of,
+)
+from proxytune.space import Parameter
+
+IMBALANCE = Parameter(
+    name="imbalance",
+    unit="",
+    low=-1.0,
+    high=1.0,
+    neutral=0.0,
+    probes=(-1.0, -0.5, 0.5, 1.0),
+    source="by definition: −1 is the left wheel alone, 1 the right one",
+    shape=True,
+)
+"""How much more of an effect the right wheel has than the left one."""
+
+SLIGHT_IMBALANCE = replace(IMBALANCE, probes=(-0.5, -0.2, 0.2, 0.5))
+"""The same where a wheel without any of the effect is no sensible guess."""
+
+
+def per_wheel(value: float, imbalance: float) -> Signal:
+    """A value's share on each wheel, (2,): value · (1 − imbalance) left, value · (1 + imbalance) right."""
+    return np.array((value * (1.0 - imbalance), value * (1.0 + imbalance)))
+
+
+def wheel_forms(*parameters: str) -> tuple[Form, ...]:
+    """Forms with these parameters free: both wheels alike, one of them alone, or, where both have it, unevenly."""
+    free = tuple((name,) for name in parameters)
+    return (
+        Form(free),
+        Form(free, "left wheel", fixed={"imbalance": -1.0}, present=False),
+        Form(free, "right wheel", fixed={"imbalance": 1.0}, present=False),
+        Form((*free, ("imbalance",)), "uneven wheels", moved=("imbalance",), present=True),
+    )
+
+
+@dataclass(frozen=True)
+class DriverMap:
+    """The motor driver jumps to a smallest output as soon as the duty leaves zero.
+
+    |output| = offset + (1 − offset)·|duty| from a duty of 0.01 on, nothing below it.
+    """
+
+    offset: float
+    name: ClassVar[str] = "driver_map"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="offset",
+            unit="duty",
+            low=0.0,
+            high=0.4,
+            neutral=0.0,
+            probes=(0.02, 0.04, 0.08, 0.15, 0.3),
+            source="Duckiebot motor driver: (195|u| + 60)/255 above a duty of 0.01",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Map each sample on its own."""
+        size = np.abs(signal)
+        jumped = np.sign(signal) * (self.offset + (1.0 - self.offset) * size)
+        return (signal if self.offset == 0.0 else np.where(size < 0.01, 0.0, jumped)), None
+
+
+@dataclass(frozen=True)
+class Trim:
+    """The right wheel runs faster than the left: left · (1 − trim), right · (1 + trim)."""
+
+    trim: float
+    name: ClassVar[str] = "trim"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="trim",
+            unit="",
+            low=-0.5,
+            high=0.5,
+            neutral=0.0,
+            probes=(-0.2, -0.1, -0.05, 0.05, 0.1, 0.2),
+            source="31 calibrated Duckiebots: −0.014 ± 0.057; box of the paper ±0.3",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY)
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Scale the two wheels apart."""
+        return signal * np.array((1.0 - self.trim, 1.0 + self.trim)), None
+
+
+@dataclass(frozen=True)
+class WheelGain:
+    """Each wheel turns faster or slower than nominal by a factor of its own."""
+
+    left: float
+    right: float
+    name: ClassVar[str] = "wheel_gain"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = tuple(
+        Parameter(
+            name=side,
+            unit="",
+            low=0.3,
+            high=1.7,
+            neutral=1.0,
+            probes=(0.7, 0.85, 0.95, 1.05, 1.15, 1.3),
+            source="31 calibrated Duckiebots: 1.01 ± 0.14",
+        )
+        for side in ("left", "right")
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND,),
+        shown=WheelCurve.STEADY,
+        forms=(Form((("left", "right"),)), Form((("left",),), "left wheel"), Form((("right",),), "right wheel")),
+    )
+
+    def begin(self, setting: Setting) -> None:
+        """Nothing to remember."""
+
+    def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
+        """Scale each wheel."""
+        return signal * np.array((self.left, self.right)), None
+
+
+class Spin(NamedTuple):
+    """Wheel speed at the end of the last sample, and the lag of the wheels: one for both, or one for each."""
+
+    speed: Signal
+    lags: tuple[Lag, ...]
+
+
+@dataclass(frozen=True)
+class MotorLag:
+    """Wheels follow the speed asked of them with a first-order lag, τ dω/dt = ω* − ω."""
+
+    time_constant: float
+    imbalance: float
+    name: ClassVar[str] = "motor_lag"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="time_constant",
+            unit="s",
+            low=0.0,
+            high=1.0,
+            neutral="motor_time_constant",
+            probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8),
+            source="gym-duckietown's dynamics fit: 0.20 s",
+        ),
+        SLIGHT_IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP, forms=wheel_forms("time_constant")
+    )
+
+    def begin(self, setting: Setting) -> Spin:
+        """Wheels turn at the speed asked of them before time zero."""
+        samples = per_wheel(self.time_constant * setting.rate_hz, self.imbalance)
+        # One filter over both wheels is faster than one for each
+        apart = samples if self.imbalance else samples[:1]
+        return Spin(np.asarray(setting.rest, dtype=float), tuple(lag_of(value) for value in apart.tolist()))
+
+    def apply(self, signal: Signal, memory: Spin) -> tuple[Signal, Spin]:
+        """The mean speed over each sample, exact for a command that holds over it."""
+        if len(memory.lags) == 1:
+            mean, speed = follow(signal, memory.speed, memory.lags[0])
+            return mean, Spin(speed, memory.lags)
+        sides = [
+            follow(signal[..., side : side + 1], memory.speed[..., side : side + 1], lag)
+            for side, lag in enumerate(memory.lags)
+        ]
+        mean, speed = (np.concatenate(parts, axis=-1) for parts in zip(*sides, strict=True))
+        return mean, memory._replace(speed=speed)
+
+
+class Ramp(NamedTuple):
+    """The newest duty (…, 2), and how far it can change within a sample."""
+
+    duty: Signal
+    step: float
+
+
+@dataclass(frozen=True)
+class SlewRate:
+    """The motor driver changes each wheel's duty no faster than from rest to full within `rise_time`."""
+
+    rise_time: float
+    name: ClassVar[str] = "slew_rate"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="rise_time",
+            unit="s",
+            low=0.0,
+            high=3.0,
+            neutral=0.0,
+            probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
+            source="ramps of motor drivers: some tenths of a second to a few seconds from rest to full speed",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(cues=(Cue.TRANSIENTS, Cue.WHEEL_COMMAND), shown=WheelCurve.STEP)
+
+    def begin(self, setting: Setting) -> Ramp:
+        """The resting duty has been reached."""
+        step = 1.0 / (self.rise_time * setting.rate_hz) if self.rise_time > 0.0 else np.inf
+        return Ramp(np.asarray(setting.rest, dtype=float), step)
+
+    def apply(self, signal: Signal, memory: Ramp) -> tuple[Signal, Ramp]:
+        """Go towards each sample by one step at most."""
+        series = np.moveaxis(np.asarray(signal, dtype=float), -2, -1)
+        start = np.broadcast_to(memory.duty, series.shape[:-1])
+        ramps = _ramps(series.reshape(-1, series.shape[-1]), start.ravel(), memory.step)
+        reached = np.moveaxis(ramps.reshape(series.shape), -1, -2)
+        return reached, memory._replace(duty=reached[..., -1, :])
+
+
+def _ramps(wanted: Signal, start: Signal, step: float) -> Signal:
+    """Each row (rows, time) followed by one step a sample at most: one ramp for each change of what is wanted."""
+    begins = np.flatnonzero(np.diff(wanted, axis=1, prepend=np.nan))
+    lengths = np.diff(begins, append=wanted.size)
+    held = wanted.ravel()[begins]
+    gaps = np.empty(len(begins))
+    row, here = 0, 0.0
+    for number, (first, value, reach) in enumerate(
+        zip(begins.tolist(), held.tolist(), (lengths * step).tolist(), strict=True)
+    ):
+        if first % wanted.shape[1] == 0:
+            row, here = row + 1, float(start[row])
+        gaps[number] = gap = here - value
+        here = value + (gap - reach if gap > reach else gap + reach if gap < -reach else 0.0)
+    of = np.repeat(np.arange(len(begins)), lengths)
+    way = (np.arange(wanted.size) - begins[of] + 1) * step
+    ramp = np.sign(gaps[of]) * np.maximum(0.0, np.abs(gaps[of]) - way)
+    return np.asarray((held[of] + ramp).reshape(wanted.shape))
+
+
+class Heat(NamedTuple):
+    """The load of late (…, 1), and how it follows the load of the moment."""
+
+    load: Signal
+    lag: Lag
+
+
+@dataclass(frozen=True)
+class ThermalFade:
+    """Both wheels turn slower the harder they have worked of late, by `loss` after long work at full duty.
+
+    Their speed is multiplied by 1 − loss · load, where load follows mean |u| with a lag of `time_constant`.
+    """
+
+    loss: float
+    time_constant: float
+    name: ClassVar[str] = "thermal_fade"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="loss",
+            unit="",
+            low=0.0,
+            high=0.9,
+            neutral=0.0,
+            probes=(0.05, 0.1, 0.2, 0.4, 0.8),
+            source="windings that are 80 °C warmer have a third more resistance",
+        ),
+        Parameter(
+            name="time_constant",
+            unit="s",
+            low=0.5,
+            high=120.0,
+            neutral=8.0,
+            probes=(2.0, 4.0, 15.0, 40.0),
+            source="small motors warm up within seconds to minutes",
+            shape=True,
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.USE, Cue.TIME),
+        shown=Means(Cue.USE, (Panel("", "use so far [s at full duty]", "forward", share=True),)),
+    )
+
+    def begin(self, setting: Setting) -> Heat:
+        """With motors as warm as the resting duty keeps them."""
+        rest = np.abs(np.asarray(setting.rest, dtype=float)).mean(axis=-1, keepdims=True)
+        return Heat(rest, lag_of(self.time_constant * setting.rate_hz))
+
+    def apply(self, signal: Signal, memory: Heat) -> tuple[Signal, Heat]:
+        """Slow both wheels by one factor."""
+        late, load = follow(np.abs(signal).mean(axis=-1, keepdims=True), memory.load, memory.lag)
+        return signal * (1.0 - self.loss * np.minimum(1.0, late)), memory._replace(load=load)
+
+
+SMALLEST_LIMIT = 0.05
+"""A wheel keeps so much of its duty, however the lost part is shared out."""
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """Wheels turn no faster than at a duty of `limit`; the lost part, 1 − limit, is what the wheels share."""
+
+    limit: float
+    imbalance: float
+    name: ClassVar[str] = "saturation"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="limit",
+            unit="duty",
+            low=0.1,
+            high=1.0,
+            neutral=1.0,
+            probes=(0.15, 0.25, 0.4, 0.6, 0.8, 0.9),
+            source="drivers that cap the duty, batteries run down: 0.5 to 1",
+        ),
+        IMBALANCE,
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.WHEEL_COMMAND,), shown=WheelCurve.STEADY, forms=wheel_forms("limit")
+    )
+
+    def begin(self, setting: Setting) -> Signal:
+        """The limit of each wheel (2,)."""
+        return np.maximum(SMALLEST_LIMIT, 1.0 - per_wheel(1.0 - self.limit, self.imbalance))
+
+    def apply(self, signal: Signal, memory: Signal) -> tuple[Signal, Signal]:
+        """Clip at ± limit."""
+        return np.clip(signal, -memory, memory), memory
+
+
+def _fading(cue: Cue, label: str) -> Means:
+    return Means(cue, (Panel("", label, "forward", share=True),))
+
+
+class Charge(NamedTuple):
+    """Minutes at full duty since the start (…,), number of the next sample, and how many minutes a sample lasts."""
+
+    use: Signal
+    next: int
+    minutes: float
+
+
+@dataclass(frozen=True)
+class BatterySag:
+    """Both wheels turn slower under load, and the slower the more, or the longer, has been driven since the start.
+
+    Their speed is multiplied by (1 − load · mean |u|) · exp(−fade · use − fade_with_time · time), use being the
+    integral of mean |u|.
+    """
+
+    load: float
+    fade: float
+    fade_with_time: float
+    name: ClassVar[str] = "battery_sag"
+    stage: ClassVar[Stage] = Stage.ACTUATION
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="load",
+            unit="",
+            low=0.0,
+            high=0.8,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.12, 0.25, 0.5),
+            source="inner resistance of small batteries: some hundredths at full load, old ones some tenths",
+        ),
+        Parameter(
+            name="fade",
+            unit="1/min",
+            low=0.0,
+            high=1.0,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+            source="a battery that lasts minutes to an hour at full duty",
+        ),
+        Parameter(
+            name="fade_with_time",
+            unit="1/min",
+            low=0.0,
+            high=1.0,
+            neutral=0.0,
+            probes=(0.03, 0.06, 0.12, 0.25, 0.5, 1.0),
+            source="what else a battery feeds empties it too, driving or not",
+        ),
+    )
+    trace: ClassVar[Trace | None] = Trace(
+        cues=(Cue.USE, Cue.TIME),
+        shown=WheelCurve.STEADY,
+        forms=(
+            Form((("load",),), "load"),
+            Form((("fade",),), "fade", shown=_fading(Cue.USE, "use so far [s at full duty]")),
+            Form((("fade_with_time",),), "fade with time", shown=_fading(Cue.TIME, "time in the episode [s]")),
+        ),
+    )
+
+    def begin(self, setting: Setting) -> Charge:
+        """With the battery as it is at the start."""
+        return Charge(np.zeros(np.shape(setting.rest)[:-1]), 0, 1.0 / (60.0 * setting.rate_hz))
+
+    def apply(self, signal: Signal, memory: Charge) -> tuple[Signal, Charge]:
+        """Slow both wheels by one factor, its fading taken at the middle of each sample."""
+        mean = (np.abs(signal[..., 0]) + np.abs(signal[..., 1])) / 2.0
+        used = memory.use[..., None] + np.cumsum(mean, axis=-1) * memory.minutes
+        numbers = np.arange(memory.next, memory.next + mean.shape[-1])
+        time = (numbers + 0.5) * memory.minutes
+        faded = np.exp(-self.fade * (used - mean * (memory.minutes / 2.0)) - self.fade_with_time * time)
+        factor = np.maximum(0.0, 1.0 - self.load * mean) * faded
+        return signal * factor[..., None], memory._replace(use=used[..., -1], next=memory.next + mean.shape[-1])

@@ -1,1 +1,0 @@
-"""Effects between a command and the speed of a wheel."""

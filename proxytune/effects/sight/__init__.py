@@ -1,1 +1,0 @@
-"""Effects on the camera and on its pictures."""

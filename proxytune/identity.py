@@ -1,0 +1,128 @@
+"""What code means: a digest that comments, layout and docstrings do not change.
+
+Python is digested by its syntax without strings that stand alone, TOML by its values, anything else by its bytes, and
+so is what cannot be parsed. The walk over a syntax tree is our own, since `ast.dump` differs between versions of
+Python. Docstrings are left out even where code reads them when it runs.
+
+Versions of the packages that results depend on, and what has changed of them, in words.
+"""
+
+import ast
+import functools
+import hashlib
+import json
+import os
+import tomllib
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+LEFT_OUT = ("kind", "type_comment")
+"""Fields of a syntax tree without a meaning: the u of u"…", and comments."""
+NOT_A_PACKAGE = ("study.toml", "pyvenv.cfg")
+"""A folder with one of these is another study, or an environment."""
+
+
+def meaning_of(paths: Iterable[Path], root: Path) -> str:
+    """A digest of what files mean and of their names within a folder, whatever the order in which they are given.
+
+    Raises:
+        OSError: If one cannot be read.
+    """
+    parts = {path.relative_to(root).as_posix(): _meaning(path.suffix, path.read_bytes()) for path in paths}
+    return hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()
+
+
+def files_beside(folder: Path) -> list[Path]:
+    """The files of a folder and of those within it that can be packages, hidden ones left out, in order."""
+    found, known = [], set[str]()
+    for here, folders, names in os.walk(folder, followlinks=True):
+        known.add(os.path.realpath(here))
+        # A link may lead back up.
+        within = [name for name in folders if os.path.realpath(Path(here, name)) not in known]
+        folders[:] = [name for name in within if _can_be_package(Path(here, name))]
+        found += [Path(here, name) for name in names if not name.startswith(".")]
+    return sorted(found)
+
+
+def modules_beside(folder: Path) -> list[Path]:
+    """A user's own modules: those in a folder and in its packages, in order."""
+    return [path for path in files_beside(folder) if is_module(path)]
+
+
+def is_module(path: Path) -> bool:
+    """Whether this is a module of Python."""
+    return path.suffix == ".py" and path.is_file()
+
+
+def _can_be_package(folder: Path) -> bool:
+    named = folder.name.isidentifier() and folder.name != "__pycache__"
+    return named and not any((folder / name).exists() for name in NOT_A_PACKAGE)
+
+
+@functools.lru_cache(maxsize=4096)
+def _meaning(suffix: str, content: bytes) -> str:
+    """A digest of one file's meaning."""
+    known = content
+    try:
+        if suffix == ".py":
+            known = "\n".join(_walk(_parsed(content))).encode()
+        if suffix == ".toml":
+            known = json.dumps(tomllib.loads(content.decode()), sort_keys=True, default=str).encode()
+    except (SyntaxError, ValueError, RecursionError):
+        pass
+    return hashlib.sha256(known).hexdigest()
+
+
+def _parsed(content: bytes) -> ast.Module:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return ast.parse(content)
+
+
+def _walk(node: Any) -> Iterator[str]:
+    """A syntax tree as lines; fields that are empty go unsaid, since newer versions of Python have more of them."""
+    if isinstance(node, list):
+        yield "["
+        for one in node:
+            if not _stands_alone(one):
+                yield from _walk(one)
+        yield "]"
+    elif isinstance(node, ast.AST):
+        yield f"({type(node).__name__}"
+        for name, value in ast.iter_fields(node):
+            if name not in LEFT_OUT and value is not None and value != []:
+                yield name
+                yield from _walk(value)
+        yield ")"
+    else:
+        yield repr(node)
+
+
+def _stands_alone(node: Any) -> bool:
+    """Whether this is a string that is a statement of its own: a docstring, or what describes an attribute."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+
+
+CALLED = {"numpy": "NumPy", "pybullet": "PyBullet", "scipy": "SciPy", "optuna": "Optuna"}
+"""What a package is called, where that is not its name."""
+
+
+def versions_of(packages: Iterable[str]) -> dict[str, str]:
+    """The version of each package, without importing it; "unknown" where it was not installed as one."""
+    return {package: _version(package) for package in packages}
+
+
+def version_changes(before: Mapping[str, str], after: Mapping[str, str]) -> list[str]:
+    """Each package whose version has changed, as one phrase for the user."""
+    both = {name: (before.get(name, "not used"), after.get(name, "not used")) for name in {**after, **before}}
+    return [f"{CALLED.get(name, name)} {new} (was {old})" for name, (old, new) in both.items() if old != new]
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"

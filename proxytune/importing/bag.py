@@ -1,0 +1,401 @@
+"""Bags on disk: which they are, what topics they hold, and their messages one after the other.
+
+Whose times count: those in the messages' headers, or those of the bag.
+Messages of commands and poses as rows of numbers.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proxytune.arrays import Floats, Whole
+from proxytune.errors import LogError
+from proxytune.importing.checks import headings_and_tilts
+from proxytune.importing.source import Commands, Poses
+from proxytune.settings import nearest
+
+ROS1 = ".bag"
+ROS2 = (".db3", ".mcap")
+METADATA = "metadata.yaml"
+
+REPAIR = {"ROS 1 bag": "rosbag reindex", "ROS 2 bag (mcap)": "mcap recover", "ROS 2 bag (sqlite3)": "ros2 bag reindex"}
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag, or of several bags together.
+
+    Attributes:
+        name: Its name, as in /cmd_vel.
+        kind: Type of its messages, as in geometry_msgs/msg/Twist.
+        count: How many messages it has.
+        known: Whether the type is defined, so that messages can be read.
+        lacking: How many of the bags have no messages of it.
+    """
+
+    name: str
+    kind: str
+    count: int
+    known: bool = True
+    lacking: int = 0
+
+
+@dataclass(frozen=True)
+class Bag:
+    """A bag that is open.
+
+    Attributes:
+        path: The file, or the folder of a ROS 2 bag.
+        reader: The library's reader of it.
+    """
+
+    path: Path
+    reader: Any
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """Its topics by name."""
+        known = self.reader.typestore.fielddefs
+        kinds = {name: (topic.msgtype or "several types", topic.msgcount) for name, topic in self.reader.topics.items()}
+        return tuple(Topic(name, kind, count, kind in known) for name, (kind, count) in sorted(kinds.items()))
+
+    @property
+    def defines_types(self) -> bool:
+        """Whether the bag says what its messages look like."""
+        return any(connection.msgdef.format.name != "NONE" for connection in self.reader.connections)
+
+    def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
+        """The messages of a topic in the order received: when each was received [ns], and what it holds.
+
+        Raises:
+            LogError: If the bag breaks off, or a message is not what its type says.
+        """
+        connections = [connection for connection in self.reader.connections if connection.topic == topic]
+        numbers = count(1)
+        incoming = self.reader.messages(connections=connections) if connections else iter(())
+        while True:
+            with _complaints(self.path, f"{topic}, message {next(numbers)}: cannot be read"):
+                received = next(incoming, None)
+                if received is None:
+                    return
+                connection, receive_ns, raw = received
+                message = self.reader.deserialize(raw, connection.msgtype)
+            yield receive_ns, message
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is a ROS bag, or a folder of several."""
+    return bool(_bags_in(path))
+
+
+def bags_in(path: Path) -> dict[str, Path]:
+    """The bags that a path holds, by the names of their drives.
+
+    Raises:
+        LogError: If there is none.
+    """
+    if not path.exists():
+        raise LogError(f"{path}: no such file; check the path")
+    bags = _bags_in(path)
+    if not bags:
+        raise LogError(f"{path}: holds no bag; give a .bag, .db3 or .mcap file, or a folder of bags")
+    return bags
+
+
+@contextmanager
+def open_bag(path: Path) -> Iterator[Bag]:
+    """Open a bag while it is read.
+
+    Raises:
+        LogError: If the library is not installed, or the bag is cut short or is none.
+    """
+    reader = _open_reader(path)
+    try:
+        yield Bag(path, reader)
+    finally:
+        reader.close()
+
+
+def form_of(path: Path) -> str:
+    """What a bag is, as in "ROS 2 bag (mcap)"."""
+    if path.suffix == ROS1 and path.is_file():
+        return "ROS 1 bag"
+    files = [path] if path.is_file() else path.glob("*")
+    return "ROS 2 bag (mcap)" if any(".mcap" in file.suffixes for file in files) else "ROS 2 bag (sqlite3)"
+
+
+def _open_reader(path: Path) -> Any:
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ModuleNotFoundError:
+        raise LogError(f'{path}: reading bags needs rosbags; pip install "proxytune[ros]"') from None
+    with _complaints(path, "cannot be read as a bag"):
+        reader = AnyReader(_paths(path), default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        reader.open()
+    return reader
+
+
+def _paths(path: Path) -> list[Path]:
+    """What the library opens: it would take a ROS 2 folder named run.bag for a file of ROS 1."""
+    inside = path.suffix == ROS1 and path.is_dir()
+    return sorted(file for file in path.glob("*") if file.suffix in ROS2) if inside else [path]
+
+
+@contextmanager
+def _complaints(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever the library raises into one line.
+
+    Damaged bags make it raise nearly anything: its own errors, KeyError, struct.error, AssertionError, MemoryError.
+    """
+    try:
+        yield
+    except Exception as problem:
+        text = "".join(letter if letter.isprintable() else " " for letter in str(problem))
+        reason = " ".join(text.split())[:200].rstrip(".") or type(problem).__name__
+        remedy = f"copy it again, or repair it with {REPAIR[form_of(path)]}"
+        raise LogError(f"{path}: {what} ({reason}); {remedy}") from None
+
+
+def _bags_in(path: Path) -> dict[str, Path]:
+    if _is_one(path):
+        return {_name_of(path): path}
+    bags: dict[str, Path] = {}
+    for item in sorted(path.glob("*")):
+        found = [item] if _is_one(item) else [file for file in sorted(item.glob("*")) if _is_one(file)]
+        for bag in found:
+            name = _name_of(bag) if bag == item else item.name if len(found) == 1 else f"{item.name}_{_name_of(bag)}"
+            names = itertools.chain((name, f"{name}{bag.suffix}"), (f"{name}_{n}" for n in itertools.count(2)))
+            bags[next(free for free in names if free not in bags)] = bag
+    return bags
+
+
+def _is_one(path: Path) -> bool:
+    return (path / METADATA).is_file() if path.is_dir() else path.is_file() and path.suffix in (ROS1, *ROS2)
+
+
+def _name_of(bag: Path) -> str:
+    return bag.resolve().name if bag.is_dir() else bag.stem
+
+
+UNSET_NS = 10**8 * 10**9
+"""Stamps before 1973 are no date: a driver left them at zero, or counted from its own start."""
+
+APART_S = 0.05
+"""Clocks whose stamps differ by more in the median are worth a note."""
+
+DRIFT_S = 0.02
+"""Clocks that run apart by more are worth a note."""
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """When the messages of a topic were made and received.
+
+    Attributes:
+        header: Stamps in their headers (N,) [ns], or None for a type without a header.
+        receive: When the bag received them (N,) [ns].
+    """
+
+    header: Whole | None
+    receive: Whole
+
+
+def seconds(stamps_ns: Whole) -> Floats:
+    """Stamps in seconds, exact to half a microsecond: whole seconds and the rest are converted apart."""
+    return stamps_ns // 10**9 + (stamps_ns % 10**9) * 1e-9
+
+
+def choose_times(stamps: Stamps, wanted: str, where: str) -> tuple[Floats, tuple[str, ...]]:
+    """Times of a topic's messages (N,) [s], and what there is to say of them.
+
+    Args:
+        stamps: Both times of each message.
+        wanted: "header" or "receive".
+        where: The topic, as a complaint names it.
+
+    Raises:
+        LogError: If `wanted` is neither, or some headers have a stamp and others have none.
+    """
+    if wanted not in ("header", "receive"):
+        raise LogError(f"{where}: unknown stamps '{wanted}'; {nearest(wanted, ('header', 'receive'))}")
+    received = seconds(stamps.receive)
+    if wanted == "receive":
+        return received, (f"Times of {where} are when the bag received each message, as asked.",)
+    if stamps.header is None:
+        return received, (f"{where} has no header: its times are when the bag received each message.",)
+    unset = stamps.header < UNSET_NS
+    if unset.all() and (stamps.receive >= UNSET_NS).all():
+        reason = f"Headers of {where} hold no date"
+        return received, (f"{reason}: its times are when the bag received each message.",)
+    if unset.any() and not unset.all():
+        number = int(np.argmax(unset)) + 1
+        raise LogError(f"{where}: the header of message {number} has no time stamp; take --stamps receive")
+    header = seconds(stamps.header)
+    return header, _clock_notes(header, received, where)
+
+
+def _clock_notes(header: Floats, received: Floats, where: str) -> tuple[str, ...]:
+    """How far the headers' clock and the bag's are apart."""
+    late = received - header
+    apart, drift = float(np.median(late)), _drift(late)
+    notes = []
+    if apart > APART_S:
+        reason = "messages took that long, or the clocks differ"
+        notes.append(f"Messages of {where} were received {apart:.3f} s after their stamps, in the median: {reason}.")
+    if apart < -APART_S:
+        notes.append(
+            f"Messages of {where} were received {-apart:.3f} s before their stamps, in the median: the clocks differ; "
+            "--stamps receive takes the bag's times."
+        )
+    if abs(drift) > DRIFT_S:
+        notes.append(
+            f"The clock of the headers of {where} drifts by {1e3 * drift:+.0f} ms against the bag's over the drive."
+        )
+    return tuple(notes)
+
+
+def _drift(late: Floats) -> float:
+    """By how much the lateness changes from the first tenth of the messages to the last [s], in the median."""
+    tenth = max(1, len(late) // 10)
+    return float(np.median(late[:tenth]) - np.median(late[-tenth:]))
+
+
+Row = tuple[float, ...]
+
+
+def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool = True) -> tuple[Stamps, Floats]:
+    """The stamps of a topic's messages, and a row of numbers of each (N, columns).
+
+    Args:
+        bag: An open bag.
+        topic: Name of the topic.
+        row_of: Makes a row of a message; a LogError of its own is completed by topic and number.
+        finite: Whether all numbers must be finite.
+
+    Raises:
+        LogError: If a message cannot be read, makes no row, or holds a number that is not finite where it must.
+    """
+    headers, receives, rows = [], [], []
+    for number, (receive_ns, message) in enumerate(bag.messages(topic), start=1):
+        rows.append(_row(message, row_of, f"{bag.path}: {topic}, message {number}", finite=finite))
+        receives.append(receive_ns)
+        headers.append(header_ns(message))
+    if not rows:
+        raise LogError(f"{bag.path}: {topic}: no messages; take another topic, or leave the bag out")
+    stamped = None if headers[0] is None else whole(headers)
+    return Stamps(stamped, whole(receives)), np.array(rows, dtype=np.float64)
+
+
+def read_commands(bag: Bag, topic: str, kind: str, stamps: str) -> tuple[Commands, tuple[str, ...]]:
+    """The commands of a topic, and what there is to say of their times."""
+    both, values = collect(bag, topic, command_of)
+    times, notes = choose_times(both, stamps, topic)
+    return Commands(kind, times, values), notes
+
+
+def read_poses(bag: Bag, topic: str, stamps: str) -> tuple[Poses, tuple[str, ...]]:
+    """The poses of a topic, and what there is to say of their times.
+
+    Raises:
+        LogError: If the topic mixes the poses of several frames, or an orientation is no rotation.
+    """
+    frames: dict[str, None] = {}
+
+    def row_of(message: Any) -> Row:
+        frames[frame_of(message)] = None
+        return pose_of(message)
+
+    both, rows = collect(bag, topic, row_of, finite=False)
+    where = f"{bag.path}: {topic}"
+    if len(frames) > 1:
+        raise LogError(f"{where}: mixes poses of {' and '.join(sorted(frames))}; record each on a topic of its own")
+    times, notes = choose_times(both, stamps, topic)
+    return Poses(times, rows[:, :3], *headings_and_tilts(rows[:, 3:], where)), notes
+
+
+def header_ns(message: Any) -> int | None:
+    """The stamp in a message's header [ns], or None where the type has none."""
+    header = getattr(message, "header", None)
+    return None if header is None else int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
+
+
+def whole(values: list[Any]) -> Whole:
+    """Whole numbers as an array."""
+    return np.array(values, dtype=np.int64)
+
+
+def frame_of(message: Any) -> str:
+    """Which frame a pose is of, and in which, as in "map>base_link"."""
+    return f"{message.header.frame_id.lstrip('/')}>{getattr(message, 'child_frame_id', '').lstrip('/')}".rstrip(">")
+
+
+def pose_of(message: Any) -> Row:
+    """x, y, z and the quaternion x, y, z, w of a pose or a transform, with or without covariance."""
+    if hasattr(message, "transform"):
+        place, turn = message.transform.translation, message.transform.rotation
+    else:
+        pose = message.pose.pose if hasattr(message.pose, "pose") else message.pose
+        place, turn = pose.position, pose.orientation
+    return (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
+
+
+def command_of(message: Any) -> Row:
+    """The two columns of a command: forward speed and yaw rate, or left and right.
+
+    Raises:
+        LogError: If an array has not two elements, or joints are not one left and one right.
+    """
+    return COMMANDS[message.__msgtype__.rpartition("/")[2]](message)
+
+
+def _twist(message: Any) -> Row:
+    twist = getattr(message, "twist", message)
+    return (twist.linear.x, twist.angular.z)
+
+
+def _wheels(message: Any) -> Row:
+    return (message.vel_left, message.vel_right)
+
+
+def _array(message: Any) -> Row:
+    if len(message.data) != 2:
+        raise LogError(f"has {len(message.data)} elements, not a left and a right one; name another by --commands")
+    return (float(message.data[0]), float(message.data[1]))
+
+
+def _joints(message: Any) -> Row:
+    pairs = dict(zip(message.name, message.velocity, strict=False))
+    sides = [[speed for name, speed in pairs.items() if side in name.lower()] for side in ("left", "right")]
+    if [len(side) for side in sides] != [1, 1]:
+        names = ", ".join(message.name) or "none"
+        raise LogError(f"needs the velocities of one left and one right joint, but has joints {names}")
+    return (float(sides[0][0]), float(sides[1][0]))
+
+
+COMMANDS: Mapping[str, Callable[[Any], Row]] = {
+    "Twist": _twist,
+    "TwistStamped": _twist,
+    "WheelsCmdStamped": _wheels,
+    "Float32MultiArray": _array,
+    "Float64MultiArray": _array,
+    "JointState": _joints,
+}
+
+
+def _row(message: Any, row_of: Callable[[Any], Row], where: str, *, finite: bool) -> Row:
+    try:
+        row = row_of(message)
+    except LogError as problem:
+        raise LogError(f"{where}: {problem}") from None
+    if finite and not all(map(math.isfinite, row)):
+        values = ", ".join(f"{value:g}" for value in row)
+        raise LogError(f"{where}: holds a number that is not finite ({values}); leave such messages out of the bag")
+    return row

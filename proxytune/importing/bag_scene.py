@@ -1,0 +1,221 @@
+"""Transforms of a bag: which frames move against which, and the chain between two.
+
+Pictures of a camera's topic as arrays of red, green and blue.
+"""
+
+import struct
+import zlib
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from proxytune.arrays import Floats
+from proxytune.errors import LogError
+from proxytune.importing.bag import Bag, Stamps, choose_times, collect, frame_of, header_ns, open_bag, pose_of, whole
+from proxytune.importing.source import Pictures
+
+WORLDS = ("map", "world", "odom")
+ROBOTS = ("base_link", "base_footprint")
+
+Row = tuple[int, int, tuple[float, ...]]
+"""When a transform was stamped and received [ns], and its place and quaternion."""
+
+
+@dataclass(frozen=True)
+class Transform:
+    """How a frame stands in its parent, over time.
+
+    Attributes:
+        name: Parent and child, as in "odom>base_link".
+        stamps: When it was stamped and received, N times.
+        values: Place and quaternion x, y, z, w (N, 7).
+    """
+
+    name: str
+    stamps: Stamps
+    values: Floats
+
+    @property
+    def moves(self) -> bool:
+        """Whether it ever changes."""
+        return bool((self.values != self.values[0]).any())
+
+
+def read_transforms(bag: Bag, topics: tuple[str, ...]) -> dict[str, Transform]:
+    """The transforms of a bag, by parent and child.
+
+    Args:
+        bag: An open bag.
+        topics: Topics of transforms; of those named tf_static the last message holds for all times.
+
+    Raises:
+        LogError: If a message cannot be read.
+    """
+    rows: dict[str, list[Row]] = defaultdict(list)
+    for topic in topics:
+        for receive_ns, message in bag.messages(topic):
+            for each in message.transforms:
+                if topic.endswith("tf_static"):
+                    rows[frame_of(each)].clear()
+                rows[frame_of(each)].append((header_ns(each) or 0, receive_ns, pose_of(each)))
+    return {name: _transform(name, some) for name, some in rows.items()}
+
+
+def choose_transform(transforms: dict[str, Transform], where: str) -> str:
+    """Parent and child of the robot's pose: a map, world or odom frame and a base, or all that moves.
+
+    Raises:
+        LogError: If none is plainly the robot's pose.
+    """
+    for parent in WORLDS:
+        for child in ROBOTS:
+            for name in _pairs(transforms, parent, child):
+                return name
+    moving = [name for name, transform in transforms.items() if transform.moves]
+    if len(moving) == 1:
+        return moving[0]
+    raise LogError(f"{where}: no transform is plainly the robot's pose; {_remedy(transforms)}")
+
+
+def chain_of(transforms: dict[str, Transform], name: str, where: str) -> list[Transform]:
+    """The transforms that lead from a parent down to a child, as in "map>base_link".
+
+    Raises:
+        LogError: If there is no way, or nothing on it moves.
+    """
+    parent, _, child = name.partition(">")
+    chain = _chain(transforms, parent, child)
+    if not chain:
+        raise LogError(f"{where}: no transforms lead from '{parent}' to '{child}'; {_remedy(transforms)}")
+    if not any(transform.moves for transform in chain):
+        raise LogError(f"{where}: {name} never moves; {_remedy(transforms)}")
+    return chain
+
+
+def _transform(name: str, rows: list[Row]) -> Transform:
+    header, receive = (whole([row[column] for row in rows]) for column in (0, 1))
+    return Transform(name, Stamps(header, receive), np.array([values for _, _, values in rows], dtype=np.float64))
+
+
+def _pairs(transforms: dict[str, Transform], parent: str, child: str) -> list[str]:
+    """Pairs of frames with these last names that a chain leads between, as in "map>robot1/base_link"."""
+    frames = sorted({frame for name in transforms for frame in name.split(">")})
+    parents, children = ([f for f in frames if f.rpartition("/")[2] == last] for last in (parent, child))
+    pairs = [(p, c) for p in parents for c in children]
+    return [f"{p}>{c}" for p, c in pairs if any(each.moves for each in _chain(transforms, p, c))]
+
+
+def _chain(transforms: dict[str, Transform], parent: str, child: str) -> list[Transform]:
+    """Transforms that lead from a parent down to a child; none where there is no way."""
+    ways: list[tuple[str, list[Transform]]] = [(child, [])]
+    met = {child}
+    for frame, chain in ways:
+        for transform in transforms.values():
+            above, _, below = transform.name.partition(">")
+            if below == frame and above not in met:
+                longer = [transform, *chain]
+                if above == parent:
+                    return longer
+                met.add(above)
+                ways.append((above, longer))
+    return []
+
+
+def _remedy(transforms: dict[str, Transform]) -> str:
+    known = ", ".join(f"{name}{'' if transform.moves else ' (static)'}" for name, transform in transforms.items())
+    return f"name a parent and a child by --poses 'parent>child'; the bag has {known}"
+
+
+Picture = NDArray[np.uint8]
+
+ENCODINGS: Mapping[str, tuple[int, tuple[int, int, int]]] = {
+    "rgb8": (3, (0, 1, 2)),
+    "bgr8": (3, (2, 1, 0)),
+    "rgba8": (4, (0, 1, 2)),
+    "bgra8": (4, (2, 1, 0)),
+    "mono8": (1, (0, 0, 0)),
+}
+"""Bytes of a pixel, and which of them are red, green and blue."""
+
+BROKEN = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError)
+"""What Pillow raises at pictures that are cut off or damaged."""
+
+
+def read_pictures(bag: Bag, topic: str, stamps: str) -> tuple[Pictures, tuple[str, ...]]:
+    """The pictures of a topic, and what there is to say of their times.
+
+    Times are read at once, the pictures when they are asked for, from the bag opened anew.
+
+    Raises:
+        LogError: If a message cannot be read, or its pixels are of a kind that is not known.
+    """
+    both, _ = collect(bag, topic, _check)
+    times, notes = choose_times(both, stamps, topic)
+    return Pictures(times, partial(iterate, bag.path, topic)), notes
+
+
+def iterate(path: Path, topic: str) -> Iterator[Picture]:
+    """The pictures of a topic, one after the other, (rows, columns, 3) each.
+
+    Raises:
+        LogError: If one cannot be read.
+    """
+    with open_bag(path) as bag:
+        for number, (_, message) in enumerate(bag.messages(topic), start=1):
+            try:
+                picture = picture_of(message)
+            except LogError as problem:
+                raise LogError(f"{path}: {topic}, message {number}: {problem}") from None
+            yield picture
+
+
+def picture_of(message: Any) -> Picture:
+    """Red, green and blue (rows, columns, 3) of an Image or a CompressedImage.
+
+    Raises:
+        LogError: If its encoding is not known, or it is damaged.
+    """
+    return _plain(message) if hasattr(message, "encoding") else _compressed(message)
+
+
+def _check(message: Any) -> tuple[float, ...]:
+    """Refuse a picture that could not be made later; a compressed one shows only when it is opened."""
+    if not hasattr(message, "encoding"):
+        return ()
+    if message.encoding not in ENCODINGS:
+        known = ", ".join(ENCODINGS)
+        raise LogError(f"encoding '{message.encoding}' is none of {known}; leave pictures out by --pictures none")
+    if not (message.width and message.height):
+        raise LogError("has no pixels; record it again, or leave pictures out by --pictures none")
+    channels = ENCODINGS[message.encoding][0]
+    if message.step < channels * message.width or len(message.data) < message.step * message.height:
+        size = f"{message.width} × {message.height} pixels in rows of {message.step} bytes"
+        raise LogError(f"{len(message.data)} bytes do not hold {size}; record it again, or take --pictures none")
+    return ()
+
+
+def _plain(message: Any) -> Picture:
+    _check(message)
+    channels, order = ENCODINGS[message.encoding]
+    rows = np.asarray(message.data, dtype=np.uint8)[: message.step * message.height].reshape(message.height, -1)
+    pixels = rows[:, : channels * message.width].reshape(message.height, message.width, channels)
+    return np.ascontiguousarray(pixels[:, :, order])
+
+
+def _compressed(message: Any) -> Picture:
+    try:
+        with Image.open(BytesIO(np.asarray(message.data, dtype=np.uint8).tobytes())) as image:
+            if image.mode.startswith(("I", "F")):
+                raise LogError("has more than 8 bits a pixel; leave pictures out by --pictures none")
+            return np.array(image.convert("RGB"))
+    except BROKEN:
+        text = f"is no picture that can be read (format '{message.format}')"
+        raise LogError(f"{text}; record it again, or leave pictures out by --pictures none") from None

@@ -1,0 +1,477 @@
+"""Which column of a table is what: as a map says, else by its name.
+
+Units of columns: those stated, those that a column's name ends in, and whether its values fit.
+Commands and poses of a table's rows, drive by drive.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proxytune.arrays import Floats
+from proxytune.errors import LogError
+from proxytune.importing.checks import headings_and_tilts
+from proxytune.importing.source import Channel, Commands, Poses
+from proxytune.importing.text import EXAMPLE, PLACE, POSE, QUANTITIES, QUATERNION, USUAL, Table
+from proxytune.logs import COMMANDS
+from proxytune.settings import nearest
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of measurement.
+
+    Attributes:
+        name: How a column map writes it.
+        quantity: What it measures, as in "length".
+        factor: What a value is multiplied by to have it in the package's unit: s, m, rad, m/s, rad/s, duty.
+    """
+
+    name: str
+    quantity: str
+    factor: float
+
+
+UNITS = {
+    unit.name: unit
+    for unit in (
+        Unit("s", "time", 1.0),
+        Unit("ms", "time", 1e-3),
+        Unit("us", "time", 1e-6),
+        Unit("ns", "time", 1e-9),
+        Unit("m", "length", 1.0),
+        Unit("cm", "length", 1e-2),
+        Unit("mm", "length", 1e-3),
+        Unit("km", "length", 1e3),
+        Unit("rad", "angle", 1.0),
+        Unit("deg", "angle", np.pi / 180.0),
+        Unit("m/s", "speed", 1.0),
+        Unit("cm/s", "speed", 1e-2),
+        Unit("mm/s", "speed", 1e-3),
+        Unit("km/h", "speed", 1.0 / 3.6),
+        Unit("rad/s", "turning speed", 1.0),
+        Unit("deg/s", "turning speed", np.pi / 180.0),
+        Unit("rpm", "turning speed", np.pi / 30.0),
+        Unit("duty", "duty", 1.0),
+        Unit("percent", "duty", 1e-2),
+        Unit("pwm255", "duty", 1.0 / 255.0),
+        Unit("number", "number", 1.0),
+    )
+}
+"""Every unit by its name; the first of each quantity is the package's own."""
+
+ENDINGS = {unit.name.replace("/", "_"): unit for unit in UNITS.values() if unit.name not in ("duty", "number")} | {
+    "sec": UNITS["s"],
+    "nsec": UNITS["ns"],
+    "mps": UNITS["m/s"],
+    "radps": UNITS["rad/s"],
+    "degps": UNITS["deg/s"],
+    "kmh": UNITS["km/h"],
+    "%": UNITS["percent"],
+    "pct": UNITS["percent"],
+}
+"""What a column's name may end in after an underscore, blank or bracket, as in stamp_ns, pos_x [mm], v_m_s."""
+
+EPOCHS = ((1e17, UNITS["ns"]), (1e14, UNITS["us"]), (1e11, UNITS["ms"]))
+"""From which value on a stamp is no date in a greater unit: 1e11 s lie in the year 5138, 1e11 ms in 1973."""
+
+LARGEST = {"speed": 30.0, "turning speed": 300.0, "length": 1000.0}
+"""Beyond these [m/s, rad/s, m from end to end] a unit that nobody stated is doubted."""
+
+SHORTEST_STEP_S, LONGEST_STEP_S = 1e-5, 10.0
+"""Median step of stamps outside of which a unit that nobody stated is doubted."""
+
+
+def own_unit(quantity: str) -> Unit:
+    """The package's unit of a quantity."""
+    return next(unit for unit in UNITS.values() if unit.quantity == quantity)
+
+
+def plain(name: str) -> str:
+    """A column's name in small letters, everything but letters, figures and % made single underscores."""
+    return re.sub(r"(?:[^\w%]|_)+", "_", name.strip().lower().lstrip("%#")).strip("_")
+
+
+def split_ending(name: str, quantity: str) -> tuple[str, Unit | None]:
+    """The plain name of a column without its unit, and the unit where it ends in one of that quantity."""
+    simple = plain(name)
+    for ending in sorted(ENDINGS, key=len, reverse=True):
+        stem = simple.removesuffix(f"_{ending}")
+        if stem != simple and ENDINGS[ending].quantity == quantity:
+            return stem.strip("_"), ENDINGS[ending]
+    return simple, None
+
+
+def split_unit(entry: str, quantity: str, names: Sequence[str], where: str) -> tuple[str, Unit | None]:
+    """The column that an entry of a map names, and its unit where the entry states one.
+
+    Args:
+        entry: As in "stamp_ns:ns" or "yaw".
+        quantity: What the column measures.
+        names: Columns that the file has; one of them may hold a colon itself.
+        where: What the entry belongs to, for a complaint.
+
+    Raises:
+        LogError: If the unit is unknown or of another quantity.
+    """
+    name, colon, unit = entry.rpartition(":")
+    if entry in names or not colon or (name not in names and unit not in UNITS):
+        return entry, None
+    known = [known.name for known in UNITS.values() if known.quantity == quantity and quantity != "number"]
+    if not known:
+        raise LogError(f"{where}: has no unit; leave out ':{unit}'")
+    if unit not in UNITS:
+        raise LogError(f"{where}: unknown unit '{unit}'; known are: {', '.join(known)}")
+    if unit not in known:
+        raise LogError(f"{where}: '{unit}' is no unit of {quantity}; known are: {', '.join(known)}")
+    return name, UNITS[unit]
+
+
+def epoch_unit(values: Floats) -> Unit | None:
+    """The unit of stamps that are too large for seconds since 1970, or None."""
+    largest = np.nanmax(np.abs(values), initial=0.0)
+    return next((unit for least, unit in EPOCHS if largest >= least), None)
+
+
+def contradiction(unit: Unit, values: Floats) -> str:
+    """What speaks against a unit that nobody stated, or nothing.
+
+    Args:
+        unit: The unit assumed.
+        values: A column in that unit (N,), NaN where a cell is empty.
+    """
+    seen = values[np.isfinite(values)]
+    if not len(seen):
+        return ""
+    with np.errstate(over="ignore"):
+        if unit.quantity == "time":
+            return _time_contradiction(seen * unit.factor)
+        if unit.quantity == "angle":
+            return _angle_contradiction(unit, seen)
+        size = np.ptp(seen) if unit.quantity == "length" else np.abs(seen).max()
+    if unit.quantity == "duty" and size * unit.factor > 1.0 + 1e-6:
+        return f"{size:g} is more than full duty"
+    if size * unit.factor > LARGEST.get(unit.quantity, np.inf):
+        return f"{size:g} {unit.name} {'from end to end ' if unit.quantity == 'length' else ''}is much for a robot"
+    return ""
+
+
+def _time_contradiction(times: Floats) -> str:
+    steps = np.diff(times)
+    step = np.median(steps[steps > 0]) if (steps > 0).any() else 1.0
+    if step < SHORTEST_STEP_S or step > LONGEST_STEP_S:
+        return f"rows would be {step:.2g} s apart"
+    return "stamps would lie after the year 5000" if np.abs(times).max() > 1e11 else ""
+
+
+def _angle_contradiction(unit: Unit, values: Floats) -> str:
+    if unit.name == "rad":
+        jumps = np.abs(np.abs(np.diff(values)) - 360.0) < 30.0
+        return "the values jump by 360, like degrees" if jumps.any() else ""
+    low, high = values.min(), values.max()
+    like_radians = (low >= -3.2 and high <= 3.2) or (low >= 0.0 and high <= 6.3)
+    return f"values from {low:g} to {high:g} look like radians" if like_radians and low < high else ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table and what it is taken for.
+
+    Attributes:
+        field: The package's name of it.
+        name: The table's name of it.
+        unit: The unit of its values.
+        known_by: How the unit is known: "stated", "by its name", "by its size" or "assumed".
+    """
+
+    field: str
+    name: str
+    unit: Unit
+    known_by: str
+
+    def __str__(self) -> str:
+        if self.unit.quantity == "number":
+            return f"{self.field} from '{self.name}'"
+        return f"{self.field} from '{self.name}' ({self.unit.name}, {self.known_by})"
+
+
+Columns = Mapping[str, Column]
+
+
+def own_columns(names: Sequence[str]) -> dict[str, Column]:
+    """Columns that have the package's names and units."""
+    return {name: Column(name, name, own_unit(QUANTITIES[name]), "stated") for name in names}
+
+
+def usual_names(field: str, names: Sequence[str]) -> list[str]:
+    """Those names that are usual for a field."""
+    stems = {name: split_ending(name, QUANTITIES[field])[0].removeprefix("field_") for name in names}
+    return [name for name, stem in stems.items() if stem.replace("_", "") in USUAL[field]]
+
+
+def choose_columns(table: Table, stated: Mapping[str, str], fields: Sequence[str]) -> dict[str, Column]:
+    """Find the columns of some fields.
+
+    Args:
+        table: The table.
+        stated: Entries of a column map, by field; a field that it leaves out is looked for by its usual names.
+        fields: What may be looked for.
+
+    Raises:
+        LogError: If a stated column is not there, or two columns may be the same field.
+    """
+    chosen = {field: _stated(table, field, stated[field]) for field in fields if field in stated}
+    if "heading" in chosen:
+        fields = [field for field in fields if field not in QUATERNION]
+    taken = {column.name for column in chosen.values()}
+    for field in fields:
+        column = None if field in chosen else _usual(table, field, taken)
+        if column:
+            chosen[field] = column
+    if set(QUATERNION) <= set(chosen) and "heading" not in stated:
+        chosen.pop("heading", None)
+    return {field: _of_an_epoch(table, column) for field, column in chosen.items()}
+
+
+def check_fields(stated: Mapping[str, str], where: str) -> None:
+    """Refuse a column map that names something else than the package's fields.
+
+    Raises:
+        LogError: If it does.
+    """
+    for field in stated:
+        if field not in QUANTITIES:
+            raise LogError(f"{where}: column map: unknown name '{field}'; {nearest(field, QUANTITIES)}")
+
+
+def column_values(table: Table, column: Column) -> Floats:
+    """The values of a column in the package's unit (N,), NaN where a cell is empty.
+
+    Raises:
+        LogError: If a cell is no number, or the values contradict a unit that was not stated.
+    """
+    values = table.numbers(column.name)
+    problem = contradiction(column.unit, values) if column.known_by in ("assumed", "by its name") else ""
+    if problem:
+        raise LogError(
+            f"{table.path}: column '{column.name}' as {column.field} in {column.unit.name} ({column.known_by}): "
+            f"{problem}; state its unit, as in --columns {column.field}={column.name}:{column.unit.name}"
+        )
+    return values * column.unit.factor
+
+
+def missing(table: Table, fields: Sequence[str]) -> LogError:
+    """The complaint about fields that no column was found for."""
+    return LogError(
+        f"{table.path}: no column found for {', '.join(fields)}; its columns are: {', '.join(table.names)}; "
+        f"say which is which, as in {EXAMPLE}"
+    )
+
+
+def command_kind(columns: Columns, kind: str, table: Table) -> str:
+    """The kind of the commands that a table holds.
+
+    Args:
+        columns: The columns that were found.
+        kind: The kind asked for, or "".
+        table: The table.
+
+    Raises:
+        LogError: If it holds none, half of a pair, or several kinds and none is asked for.
+    """
+    kinds = [name for name, pair in COMMANDS.items() if pair and set(pair) <= set(columns) and kind in ("", name)]
+    stated = [name for name in kinds if all(columns[field].known_by == "stated" for field in COMMANDS[name])]
+    kinds = stated if len(stated) == 1 else kinds
+    if len(kinds) > 1:
+        either = " or ".join(kinds)
+        raise LogError(f"{table.path}: its commands may be {either}; choose one, as in --kind {kinds[0]}")
+    if kinds:
+        return kinds[0]
+    pairs = [COMMANDS[kind]] if kind in COMMANDS else [pair for pair in COMMANDS.values() if set(pair) & set(columns)]
+    lacking = [field for pair in pairs for field in pair if field not in columns]
+    raise missing(table, lacking or ["commands (v and omega, or left and right)"])
+
+
+def holds_commands(columns: Columns) -> bool:
+    """Whether there is a column of any kind of command."""
+    return any(set(pair) & set(columns) for pair in COMMANDS.values())
+
+
+def named_in(table: Table, entry: str) -> bool:
+    """Whether an entry of a column map names a column of a table."""
+    return entry in table.names or entry.rpartition(":")[0] in table.names
+
+
+def described(columns: Columns) -> str:
+    """What was taken for what."""
+    return ", ".join(str(column) for column in columns.values())
+
+
+def channels_of(table: Table, columns: Columns) -> list[Channel]:
+    """All columns of a table and what each was taken for."""
+    fields = {column.name: column.field for column in columns.values()}
+    return [Channel(name, "column", table.filled(name), fields.get(name, "left out")) for name in table.names]
+
+
+def _stated(table: Table, field: str, entry: str) -> Column:
+    where = f"{table.path}: column map: {field}={entry}"
+    name, unit = split_unit(entry, QUANTITIES[field], table.names, where)
+    if name not in table.names:
+        raise LogError(f"{where}: has no column '{name}'; {nearest(name, table.names)}")
+    if unit:
+        return Column(field, name, unit, "stated")
+    return _by_ending(field, name)
+
+
+def _by_ending(field: str, name: str) -> Column:
+    _, unit = split_ending(name, QUANTITIES[field])
+    return Column(field, name, unit or own_unit(QUANTITIES[field]), "by its name" if unit else "assumed")
+
+
+def _usual(table: Table, field: str, taken: set[str]) -> Column | None:
+    """The one column whose name is usual for a field."""
+    names = [name for name in usual_names(field, table.names) if name not in taken]
+    if len(names) > 1:
+        either = " or ".join(f"'{name}'" for name in names)
+        raise LogError(f"{table.path}: {field} may be {either}; say which, as in --columns {field}={names[0]}")
+    return _by_ending(field, names[0]) if names else None
+
+
+def _of_an_epoch(table: Table, column: Column) -> Column:
+    """Stamps whose unit nobody gave, taken for those since 1970 where they are too large for seconds."""
+    if column.field != "time" or column.known_by != "assumed":
+        return column
+    unit = epoch_unit(table.numbers(column.name))
+    return replace(column, unit=unit, known_by="by its size") if unit else column
+
+
+def summed(parts: Sequence[Sequence[Channel]]) -> tuple[Channel, ...]:
+    """Columns of several files, those of equal name and role as one."""
+    counts: dict[tuple[str, str], int] = {}
+    for channel in (channel for part in parts for channel in part):
+        key = channel.name, channel.role
+        counts[key] = counts.get(key, 0) + channel.count
+    return tuple(Channel(name, "column", count, role) for (name, role), count in counts.items())
+
+
+LEAST_EXTENT_M = 0.01
+"""A drive that stays within this, in a unit that nobody stated, is taken for one in another unit."""
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """Rows of a table that hold something, M of them.
+
+    Attributes:
+        times: Their stamps (M,) [s].
+        values: What they hold (M, fields).
+        labels: The drive that each belongs to (M,); "" where the table names none.
+    """
+
+    times: Floats
+    values: Floats
+    labels: NDArray[np.str_]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The drives in order of their first rows."""
+        return tuple(dict.fromkeys(str(label) for label in self.labels))
+
+
+def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Commands]:
+    """The commands of each drive that a table names; of "" where it names none.
+
+    Raises:
+        LogError: If a cell is no number, or half of a command is empty.
+    """
+    rows = _filled_rows(table, columns, COMMANDS[kind])
+    drives = {}
+    for name in rows.names:
+        mine = rows.labels == name
+        drives[name] = Commands(kind, rows.times[mine], rows.values[mine])
+        _check_clock(drives[name].times, f"{_where(table, name)}: commands")
+    if not drives:
+        raise LogError(f"{table.path}: has columns of commands, but no row with one; fill them, or take them out")
+    return drives
+
+
+def pose_fields(table: Table, columns: Columns) -> list[str]:
+    """The fields of a pose that the table has, quaternions last.
+
+    Raises:
+        LogError: If it lacks some.
+    """
+    lacking = [field for field in ("time", "x", "y") if field not in columns]
+    if "heading" not in columns and not set(QUATERNION) <= set(columns):
+        lacking.append("heading (or qx, qy, qz, qw)")
+    if lacking:
+        raise missing(table, lacking)
+    turned = ("heading",) if "heading" in columns else QUATERNION
+    return [field for field in POSE if field in columns and field in (*PLACE, *turned)]
+
+
+def poses_by_drive(table: Table, columns: Columns) -> dict[str, Poses]:
+    """The poses of each drive that a table names; of "" where it names none.
+
+    Raises:
+        LogError: If a column is missing, a cell is no number, part of a pose is empty, or a drive has no two poses.
+    """
+    fields = pose_fields(table, columns)
+    rows = _filled_rows(table, columns, fields)
+    if not len(rows.times):
+        raise LogError(f"{table.path}: has no row with a pose; give the file that the poses were written to")
+    by_field = dict(zip(fields, rows.values.T, strict=True))
+    places = np.stack([by_field.get(axis, np.zeros(len(rows.times))) for axis in PLACE], axis=1)
+    _check_extent(table, columns, places)
+    headings, tilts = by_field.get("heading"), np.zeros(len(rows.times))
+    if headings is None:
+        headings, tilts = headings_and_tilts(rows.values[:, -4:], str(table.path))
+    poses = Poses(rows.times, places, headings, tilts)
+    drives = {}
+    for name in rows.names:
+        mine = rows.labels == name
+        if mine.sum() < 2:
+            raise LogError(f"{_where(table, name)}: has a single pose; a drive needs two or more")
+        drives[name] = poses.only(mine)
+        _check_clock(drives[name].times, f"{_where(table, name)}: poses")
+    return drives
+
+
+def _filled_rows(table: Table, columns: Columns, fields: Sequence[str]) -> Labelled:
+    """The rows in which some fields are given, all of them or none."""
+    if "time" not in columns:
+        raise missing(table, ["time"])
+    times = column_values(table, columns["time"])
+    values = np.stack([column_values(table, columns[field]) for field in fields], axis=1)
+    rows = np.isfinite(values).any(axis=1)
+    for field, lacks in zip(("time", *fields), ~np.isfinite(np.column_stack((times, values))).T, strict=True):
+        if (lacks & rows).any():
+            row = int(np.argmax(lacks & rows))
+            others = ", ".join(name for name in ("time", *fields) if name != field)
+            raise table.error(row, columns[field].name, f"is empty beside {others}; fill it, or empty those too")
+    labels = table.labels(columns["episode"].name) if "episode" in columns else np.full(len(times), "")
+    return Labelled(times[rows], values[rows], labels[rows])
+
+
+def _check_clock(times: Floats, where: str) -> None:
+    if len(times) > 1 and np.ptp(times) == 0.0:
+        raise LogError(f"{where}: all {len(times)} stamps are {times[0]:.12g} s; record with a clock that runs")
+
+
+def _check_extent(table: Table, columns: Columns, places: Floats) -> None:
+    """Refuse metres in columns whose names end in mm or cm: the robot would hardly have moved."""
+    guessed = [columns[axis] for axis in ("x", "y") if columns[axis].known_by == "by its name"]
+    extent = np.ptp(places[:, :2], axis=0).max()
+    for column in guessed:
+        if column.unit.factor < 1.0 and 0.0 < extent < LEAST_EXTENT_M:
+            raise LogError(
+                f"{table.path}: column '{column.name}' in {column.unit.name}, as its name ends: the robot moved "
+                f"{extent * 1e3:.2g} mm in all; state its unit, as in --columns {column.field}={column.name}:m"
+            )
+
+
+def _where(table: Table, name: str) -> str:
+    return f"{table.path}: drive '{name}'" if name else str(table.path)

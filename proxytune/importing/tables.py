@@ -1,0 +1,403 @@
+"""CSV files: poses and commands in one table, or in two that are joined by time.
+
+Commands in a file of their own: which file, what is in it, and which drive each command belongs to.
+The UTIAS MRCLAM data set's own files: velocity commands and motion capture of several robots.
+
+K. Y. K. Leung, Y. Halpern, T. D. Barfoot, H. H. T. Liu: The UTIAS multi-robot cooperative localization and mapping
+dataset. International Journal of Robotics Research 30 (8), 2011.
+TUM trajectories: stamp, place and quaternion in each line, as SLAM and motion capture tools write them.
+"""
+
+import itertools
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from proxytune.errors import LogError
+from proxytune.importing.columns import (
+    Columns,
+    channels_of,
+    check_fields,
+    choose_columns,
+    command_kind,
+    commands_by_drive,
+    described,
+    holds_commands,
+    named_in,
+    own_columns,
+    pose_fields,
+    poses_by_drive,
+    summed,
+)
+from proxytune.importing.source import Channel, Commands, Drive, Source, Wanted
+from proxytune.importing.text import (
+    COMMAND_FIELDS,
+    EXAMPLE,
+    PLACE,
+    POSE,
+    QUATERNION,
+    Table,
+    first_rows,
+    is_number,
+    read_text_table,
+)
+from proxytune.logs import COMMANDS
+from proxytune.settings import nearest
+
+STEMS = ("commands", "cmd_vel", "cmd")
+COMMAND_SUFFIXES = (".csv", ".tsv", ".txt")
+
+
+@dataclass(frozen=True)
+class CommandFile:
+    """What a file of commands holds.
+
+    Attributes:
+        path: The file.
+        commands: The commands by the drive that the file names; of "" where it names none.
+        channels: Its columns.
+        note: What was taken for what.
+    """
+
+    path: Path
+    commands: Mapping[str, Commands]
+    channels: tuple[Channel, ...]
+    note: str
+
+
+def is_named_as_commands(path: Path) -> bool:
+    """Whether a file's name says that it holds commands: commands.csv, cmd_vel.csv, run1_commands.csv and so on."""
+    return path.suffix.lower() in COMMAND_SUFFIXES and any(
+        path.stem == stem or path.stem.endswith(f"_{stem}") for stem in STEMS
+    )
+
+
+def find_commands(path: Path, wanted: Wanted) -> Path | None:
+    """The file with the commands of a file of poses, or None.
+
+    It is the one asked for, else the first that lies beside the poses: run1_commands, run1_cmd_vel, run1_cmd for
+    run1.csv, then commands, cmd_vel, cmd; each as .csv, .tsv or .txt.
+
+    Raises:
+        LogError: If the one asked for is not there.
+    """
+    if wanted.commands == "none" or wanted.kind == "none":
+        return None
+    if wanted.commands:
+        places = (Path(wanted.commands), path.parent / wanted.commands)
+        found = next((place for place in places if place.is_file()), None)
+        if found is None:
+            raise LogError(f"{wanted.commands}: no such file of commands; check the path given with --commands")
+        return found
+    stems = (*(f"{path.stem}_{stem}" for stem in STEMS), *STEMS)
+    beside = (path.with_name(stem + suffix) for stem in stems for suffix in COMMAND_SUFFIXES)
+    return next((place for place in beside if place != path and place.is_file()), None)
+
+
+def read_commands(path: Path, wanted: Wanted) -> CommandFile:
+    """Read a file of commands: a table with stamps and the columns of one kind of command.
+
+    Raises:
+        LogError: If it is not such a table.
+    """
+    table = read_text_table(path)
+    stated = {
+        field: entry for field, entry in wanted.columns.items() if field in COMMAND_FIELDS or named_in(table, entry)
+    }
+    columns = choose_columns(table, stated, ("time", "episode", *COMMAND_FIELDS))
+    kind = command_kind(columns, wanted.kind, table)
+    used = {field: columns[field] for field in ("time", "episode", *COMMANDS[kind]) if field in columns}
+    commands = commands_by_drive(table, used, kind)
+    channels = tuple(replace(c, name=f"{path.name}: {c.name}") for c in channels_of(table, used))
+    return CommandFile(path, commands, channels, f"Commands of {path.name}: {described(used)}.")
+
+
+def share_commands(file: CommandFile, drives: Sequence[Drive], labels: Sequence[str]) -> list[Drive]:
+    """Give each drive its commands: by name, or by time where the file names no drives.
+
+    Args:
+        file: The commands.
+        drives: The drives, without commands.
+        labels: What the table of poses calls each; a drive may go by either name.
+
+    Raises:
+        LogError: If commands and drives do not match.
+    """
+    unnamed = set(file.commands) == {""} or set(labels) == {""}
+    if unnamed and len(file.commands) == 1 and len(drives) == 1:
+        return [replace(drives[0], commands=next(iter(file.commands.values())))]
+    if set(file.commands) == {""}:
+        return _by_time(file, drives)
+    known = {*labels, *(drive.name for drive in drives)}
+    for name in file.commands:
+        if name not in known:
+            raise LogError(f"{file.path}: drive '{name}' has no poses; {nearest(name, known)}")
+    return [_by_name(file, drive, label) for drive, label in zip(drives, labels, strict=True)]
+
+
+def _by_name(file: CommandFile, drive: Drive, label: str) -> Drive:
+    commands = file.commands.get(drive.name) or file.commands.get(label)
+    if commands is None:
+        raise LogError(f"{file.path}: has no commands for drive '{drive.name}'; add them, or leave its poses out")
+    return replace(drive, commands=commands)
+
+
+def _by_time(file: CommandFile, drives: Sequence[Drive]) -> list[Drive]:
+    """Cut commands where drives begin and end; the one in force at a beginning belongs to the drive."""
+    spans = sorted((drive.poses.times.min(), drive.poses.times.max()) for drive in drives)
+    if any(end >= begin for (_, end), (begin, _) in itertools.pairwise(spans)):
+        raise LogError(
+            f"{file.path}: names no drives, and the drives overlap in time, so that commands cannot be shared out; "
+            "add a column 'episode', or give each drive a file of commands"
+        )
+    return [replace(drive, commands=_within(file, drive)) for drive in drives]
+
+
+def _within(file: CommandFile, drive: Drive) -> Commands:
+    commands, times = file.commands[""], drive.poses.times
+    during = (commands.times >= times.min()) & (commands.times <= times.max())
+    before = np.flatnonzero(commands.times < times.min())
+    if len(before):
+        during[before[np.argmax(commands.times[before])]] = True
+    if not during.any():
+        raise LogError(
+            f"{file.path}: has no command while '{drive.name}' was driven, {times.min():.12g} to {times.max():.12g} s; "
+            "check that both files have stamps of one clock"
+        )
+    return replace(commands, times=commands.times[during], values=commands.values[during])
+
+
+SUFFIXES = (".csv", ".tsv")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What one file of poses holds.
+
+    Attributes:
+        drives: Its drives.
+        labels: What the file calls each; "" where it names none.
+        apart: The file that their commands are in; None where they have theirs, or need none.
+        channels: Its columns.
+        note: What was taken for what.
+    """
+
+    drives: tuple[Drive, ...]
+    labels: tuple[str, ...]
+    apart: Path | None
+    channels: tuple[Channel, ...]
+    note: str
+
+
+def is_csv_tables(path: Path) -> bool:
+    """Whether this is a table of text with named columns, or a folder of CSV files."""
+    if path.is_dir():
+        return any(file.suffix.lower() in SUFFIXES for file in path.iterdir())
+    if path.suffix.lower() in SUFFIXES:
+        return path.is_file()
+    rows = first_rows(path)
+    if len(rows) < 2 or len(rows[0]) < 2 or len(rows[0]) != len(rows[1]):
+        return False
+    return not any(map(is_number, rows[0])) and any(map(is_number, rows[1]))
+
+
+def read_csv_tables(path: Path, wanted: Wanted) -> Source:
+    """Read a CSV file, or a folder in which each CSV file is a drive.
+
+    Separators are commas, semicolons, tabs or blanks; lines that begin with # are comments. A command counts as issued
+    in each row in which it stands. Commands may be in a second file (`find_commands`).
+
+    Raises:
+        LogError: If it cannot be read so, with file, line and column.
+    """
+    check_fields(wanted.columns, str(path))
+    files = _files(path, wanted)
+    recordings = [_read_recording(file, wanted, alone=len(files) == 1) for file in files]
+    drives, channels, notes = (
+        [],
+        list(summed([recording.channels for recording in recordings])),
+        [recording.note for recording in recordings],
+    )
+    for apart in dict.fromkeys(recording.apart for recording in recordings):
+        mine = [recording for recording in recordings if recording.apart == apart]
+        group = [drive for recording in mine for drive in recording.drives]
+        if apart:
+            commands = read_commands(apart, wanted)
+            group = share_commands(commands, group, [label for recording in mine for label in recording.labels])
+            channels += commands.channels
+            notes.append(commands.note)
+        drives += group
+    form = "folder of CSV files" if path.is_dir() else "CSV table"
+    return Source(form, tuple(drives), tuple(channels), tuple(dict.fromkeys(notes)))
+
+
+def _files(path: Path, wanted: Wanted) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    tables = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
+    asked_for = {Path(wanted.commands).resolve(), (path / wanted.commands).resolve()} if wanted.commands else set()
+    files = [file for file in tables if file.resolve() not in asked_for and not is_named_as_commands(file)]
+    if not files:
+        raise LogError(f"{path}: has no CSV file with poses; give the folder or the file that they were written to")
+    return files
+
+
+def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> Recording:
+    table = read_text_table(file)
+    apart = find_commands(file, wanted)
+    columns, kind = _columns(table, wanted, apart)
+    poses = poses_by_drive(table, columns)
+    commands: dict[str, Commands] = commands_by_drive(table, columns, kind) if kind != "none" else {}
+    if commands or wanted.commands == "none":
+        apart = None
+    for label in commands:
+        if label not in poses:
+            raise LogError(f"{file}: drive '{label}' has commands but no poses; leave its rows out")
+    names = [label if label and alone else "_".join(filter(None, (file.stem, label))) for label in poses]
+    drives = tuple(Drive(name, commands.get(label), poses[label]) for name, label in zip(names, poses, strict=True))
+    note = f"Columns: {described(columns)}."
+    return Recording(drives, tuple(poses), apart, tuple(channels_of(table, columns)), note)
+
+
+def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns, str]:
+    """The columns of a table of poses that are used, and the kind of its commands; "none" where it has none."""
+    own = wanted.commands == "" and wanted.kind != "none"
+    fields = ("time", "episode", *POSE, *(COMMAND_FIELDS if own else ()))
+    stated = {
+        field: entry
+        for field, entry in wanted.columns.items()
+        if field in fields and not (apart and field in COMMAND_FIELDS and not named_in(table, entry))
+    }
+    columns = choose_columns(table, stated, fields)
+    if not own or (apart and not holds_commands(columns)):
+        return {field: column for field, column in columns.items() if field not in COMMAND_FIELDS}, "none"
+    if not holds_commands(columns):
+        pose_fields(table, columns)
+        raise LogError(
+            f"{table.path}: no column of commands found; its columns are: {', '.join(table.names)}; say which they are "
+            f"({EXAMPLE}), name their file (--commands FILE), or leave them out (--commands none)"
+        )
+    kind = command_kind(columns, wanted.kind, table)
+    unused = set(COMMAND_FIELDS) - set(COMMANDS[kind])
+    return {field: column for field, column in columns.items() if field not in unused}, kind
+
+
+MRCLAM_COMMANDS = ("time", "v", "omega")
+MRCLAM_POSES = ("time", "x", "y", "heading")
+FILE = re.compile(r"(Robot\d+)_(Odometry|Groundtruth)\.dat")
+
+
+def is_mrclam(path: Path) -> bool:
+    """Whether this is a file such as Robot1_Odometry.dat or Robot1_Groundtruth.dat, or a folder with some."""
+    return bool(FILE.fullmatch(path.name)) if path.is_file() else bool(_robots(path))
+
+
+def read_mrclam(path: Path, wanted: Wanted) -> Source:
+    """Read one robot's commands (Robot1_Odometry.dat) and poses (Robot1_Groundtruth.dat).
+
+    Args:
+        path: One of the two files, or the folder; of a folder with several robots `wanted.poses` chooses.
+        wanted: What to take; commands "none" leaves them out.
+
+    Raises:
+        LogError: If a file is missing or not as the data set writes it, or the robot is not chosen.
+    """
+    match = FILE.fullmatch(path.name)
+    folder, robot = (path.parent, match[1]) if match and not path.is_dir() else (path, _choose(path, wanted.poses))
+    table, columns = read_text_table(folder / f"{robot}_Groundtruth.dat", MRCLAM_POSES), own_columns(MRCLAM_POSES)
+    poses = poses_by_drive(table, columns)[""]
+    channels = _channels(table, MRCLAM_POSES, "poses")
+    notes = [f"{robot}: poses from {table.path.name}, in m and rad."]
+    commands = None
+    if "none" not in (wanted.commands, wanted.kind):
+        table = read_text_table(folder / f"{robot}_Odometry.dat", MRCLAM_COMMANDS)
+        commands = commands_by_drive(table, own_columns(MRCLAM_COMMANDS), "twist")[""]
+        channels += _channels(table, MRCLAM_COMMANDS, "commands")
+        notes.append(f"{robot}: commands from {table.path.name}, in m/s and rad/s; the set logs commands there.")
+    return Source("MRCLAM data set", (Drive(robot, commands, poses),), tuple(channels), tuple(notes))
+
+
+def _robots(folder: Path) -> list[str]:
+    """Robots of which a folder has both files or one."""
+    if not folder.is_dir():
+        return []
+    matches = (FILE.fullmatch(file.name) for file in sorted(folder.iterdir()))
+    return list(dict.fromkeys(match[1] for match in matches if match))
+
+
+def _choose(folder: Path, robot: str) -> str:
+    robots = _robots(folder)
+    if not robots:
+        raise LogError(f"{folder}: has no file such as Robot1_Groundtruth.dat; give a folder of the MRCLAM data set")
+    if robot and robot not in robots:
+        raise LogError(f"{folder}: has no robot '{robot}'; {nearest(robot, robots)}")
+    if not robot and len(robots) > 1:
+        names = ", ".join(robots)
+        raise LogError(f"{folder}: has several robots: {names}; choose one, as in --poses {robots[0]}")
+    return robot or robots[0]
+
+
+def _channels(table: Table, fields: tuple[str, ...], role: str) -> list[Channel]:
+    return [
+        Channel(f"{table.path.name}: {c.name}", c.kind, c.count, role) for c in channels_of(table, own_columns(fields))
+    ]
+
+
+COLUMNS = ("time", *PLACE, *QUATERNION)
+
+
+def is_tum(path: Path) -> bool:
+    """Whether this is a text file of eight numbers a line, or named .tum; or a folder of such named files."""
+    if path.is_dir():
+        return any(_trajectory_files(path))
+    if path.suffix.lower() == ".tum":
+        return path.is_file()
+    rows = first_rows(path)
+    return bool(rows) and all(len(row) == len(COLUMNS) and all(map(is_number, row)) for row in rows)
+
+
+def _trajectory_files(path: Path) -> list[Path]:
+    """The trajectories: the file itself, or those of a folder."""
+    return sorted(path.glob("*.tum")) if path.is_dir() else [path]
+
+
+def read_tum(path: Path, wanted: Wanted) -> Source:
+    """Read TUM trajectories, a drive each, and the commands of each from a second file (`find_commands`).
+
+    Raises:
+        LogError: If a line is not stamp, place and quaternion, or there are no commands and none were not asked for.
+    """
+    check_fields(wanted.columns, str(path))
+    parts = [_read_one(file, wanted) for file in _trajectory_files(path)]
+    return replace(
+        parts[0],
+        form=f"{len(parts)} TUM trajectories" if len(parts) > 1 else parts[0].form,
+        drives=tuple(drive for part in parts for drive in part.drives),
+        channels=summed([part.channels for part in parts]),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+    )
+
+
+def _read_one(path: Path, wanted: Wanted) -> Source:
+    table = read_text_table(path, COLUMNS)
+    columns = own_columns(COLUMNS)
+    drive = Drive(path.stem, None, poses_by_drive(table, columns)[""])
+    source = Source("TUM trajectory", (drive,), tuple(channels_of(table, columns)), (f"Poses: {described(columns)}.",))
+    if "none" in (wanted.commands, wanted.kind):
+        return source
+    file = find_commands(path, wanted)
+    if file is None:
+        raise LogError(
+            f"{path}: a TUM file holds no commands; lay {path.stem}_commands.csv (time, v, omega) beside it, name "
+            "another file with --commands FILE, or write --commands none for a log without them"
+        )
+    commands = read_commands(file, wanted)
+    return replace(
+        source,
+        drives=tuple(share_commands(commands, [drive], [""])),
+        channels=(*source.channels, *commands.channels),
+        notes=(*source.notes, commands.note),
+    )

@@ -1,0 +1,270 @@
+"""Text files as tables: separators, decimal commas, comments and the names of the columns.
+
+Tables of others: named columns, each cell text or a number, every complaint with file, line and column.
+What a table's column may mean: the package's names, and those that others usually give.
+"""
+
+import codecs
+import csv
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from proxytune.arrays import Floats
+from proxytune.errors import LogError
+from proxytune.logs import COMMANDS
+
+EMPTY = ("", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "none", "None")
+"""What stands in a cell in which there is nothing."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one length.
+
+    Attributes:
+        path: The file.
+        cells: The columns by name, of numbers, or of texts without blanks around them; the index is the number of each
+            row in the file.
+        counted: What that number counts, "line" or "row".
+    """
+
+    path: Path
+    cells: pd.DataFrame
+    counted: str = "line"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(str(name) for name in self.cells.columns)
+
+    def error(self, row: int, column: str, problem: str) -> LogError:
+        """The one-line complaint about a cell, its row counted from 0."""
+        return LogError(f"{self.path}: {self.counted} {self.cells.index[row]}, column '{column}': {problem}")
+
+    def labels(self, column: str) -> NDArray[np.str_]:
+        """A column as texts (N,).
+
+        Raises:
+            LogError: If one is empty.
+        """
+        texts = self.cells[column].astype(str)
+        empty = texts.isin(EMPTY).to_numpy()
+        if empty.any():
+            raise self.error(int(np.argmax(empty)), column, "is empty; name the drive that the row belongs to")
+        return texts.to_numpy(dtype=np.str_)
+
+    def filled(self, column: str) -> int:
+        """How many cells of a column are not empty."""
+        cells = self.cells[column]
+        return len(cells) - int((cells.isna() | cells.isin(EMPTY)).sum())
+
+    def numbers(self, column: str) -> Floats:
+        """A column as numbers (N,), NaN where a cell is empty; decimal commas are read as points.
+
+        Raises:
+            LogError: If a cell holds something else.
+        """
+        cells = self.cells[column]
+        values = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64, copy=True)
+        if not pd.api.types.is_numeric_dtype(cells):
+            odd = np.flatnonzero(~np.isfinite(values))
+            values[odd] = pd.to_numeric(cells.iloc[odd].str.replace(",", "."), errors="coerce")
+        wrong = ~np.isfinite(values) & ~(cells.isna() | cells.isin(EMPTY)).to_numpy()
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            cell = str(cells.iloc[row])[:40]
+            problem = f"must be a finite number, or empty where nothing was measured, got '{cell}'"
+            raise self.error(row, column, problem)
+        return values
+
+
+HEAD_BYTES = 65536
+"""How much of a file is looked at to recognise it."""
+
+Lines = list[tuple[int, str]]
+
+
+def read_text_table(path: Path, names: Sequence[str] = ()) -> Table:
+    """Read a text file.
+
+    Args:
+        path: The file.
+        names: Its columns where it names none itself; its cells are separated by blanks then.
+
+    Raises:
+        LogError: If it is not text, is empty, has no names of columns, or a row has another number of cells.
+    """
+    comments, lines = _split_comments(_read_lines(path))
+    if not lines:
+        raise LogError(f"{path}: is empty; it needs a line of column names and a row for each sample")
+    separator = ""
+    if not names:
+        separator, names, lines = _take_header(path, comments, lines)
+    if not lines:
+        raise LogError(f"{path}: has column names but no rows; add one for each sample")
+    rows = []
+    for number, line in lines:
+        row = _cells(path, number, line, separator)
+        if len(row) != len(names):
+            raise LogError(
+                f"{path}: line {number}: has {len(row)} cells, but there are {len(names)} columns: "
+                f"{', '.join(names)}; correct that line"
+            )
+        rows.append(row)
+    table = pd.DataFrame(rows, columns=list(names), index=[number for number, _ in lines], dtype=str)
+    return Table(path, table)
+
+
+def first_rows(path: Path, count: int = 4) -> list[list[str]]:
+    """The first rows of a file that are no comments, split into cells; none where it is not text."""
+    try:
+        with path.open("rb") as file:
+            text = codecs.getincrementaldecoder("utf-8-sig")().decode(file.read(HEAD_BYTES))
+        _, lines = _split_comments(_numbered(text))
+        separator = _separator(lines[0][1]) if lines else ""
+        return [_cells(path, number, line, separator) for number, line in lines[:count]]
+    except (OSError, UnicodeDecodeError, LogError):
+        return []
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a number, with a decimal point or comma."""
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _read_lines(path: Path) -> Lines:
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise LogError(f"{path}: no such file; check the path") from None
+    except OSError as problem:
+        raise LogError(f"{path}: cannot be read ({problem.strerror})") from None
+    except UnicodeDecodeError:
+        raise LogError(f"{path}: is not text in UTF-8; save it as a text table in that encoding") from None
+    if "\0" in text:
+        raise LogError(f"{path}: is a binary file; save it as a text table, such as CSV")
+    return _numbered(text)
+
+
+def _numbered(text: str) -> Lines:
+    """Lines that are not blank, with their numbers."""
+    return [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
+
+
+def _split_comments(lines: Lines) -> tuple[Lines, Lines]:
+    """The comments before the first row, and all that is no comment."""
+    rows = [line for line in lines if not line[1].lstrip().startswith("#")]
+    first = rows[0][0] if rows else 0
+    return [line for line in lines if line[0] < first], rows
+
+
+def _take_header(path: Path, comments: Lines, lines: Lines) -> tuple[str, list[str], Lines]:
+    """The separator, the columns' names and the rows; the last comment may hold the names."""
+    number, line = lines[0]
+    separator = _separator(line)
+    cells = _cells(path, number, line, separator)
+    if not all(is_number(cell) for cell in cells if cell):
+        return separator, _names(path, number, cells), lines[1:]
+    if comments:
+        number, line = comments[-1][0], comments[-1][1].lstrip().lstrip("#")
+        names = _cells(path, number, line, _separator(line)) if line.strip() else []
+        if len(names) == len(cells):
+            return separator, _names(path, number, names), lines
+    raise LogError(f"{path}: line {lines[0][0]}: holds numbers where the columns' names should be; add a line of names")
+
+
+def _names(path: Path, number: int, cells: list[str]) -> list[str]:
+    names = [cell or f"column {place}" for place, cell in enumerate(cells, start=1)]
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        raise LogError(f"{path}: line {number}: names the column '{repeated[0]}' twice; rename one of them")
+    return names
+
+
+def _separator(line: str) -> str:
+    """What separates the cells of a line; nothing stands for blanks."""
+    return next((mark for mark in (";", "\t", ",") if mark in line), "")
+
+
+def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
+    if not separator:
+        return line.split()
+    try:
+        row = next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True))
+        return [cell.strip() for cell in row]
+    except csv.Error as problem:
+        raise LogError(f"{path}: line {number}: is not a row of a CSV table ({problem}); correct that line") from None
+
+
+PLACE = ("x", "y", "z")
+QUATERNION = ("qx", "qy", "qz", "qw")
+POSE = (*PLACE, "heading", *QUATERNION)
+COMMAND_FIELDS = tuple(field for pair in COMMANDS.values() for field in pair)
+
+EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_deg:deg,v=cmd_lin,omega=cmd_ang"
+"""A column map, for complaints."""
+
+QUANTITIES: Mapping[str, str] = MappingProxyType(
+    {
+        "time": "time",
+        "episode": "number",
+        **dict.fromkeys(PLACE, "length"),
+        "heading": "angle",
+        **dict.fromkeys(QUATERNION, "number"),
+        "v": "speed",
+        "omega": "turning speed",
+        **dict.fromkeys(COMMANDS["duty"], "duty"),
+        **dict.fromkeys(COMMANDS["wheel_speed"], "turning speed"),
+    }
+)
+"""What each field measures; episodes and quaternions have no unit."""
+
+TIMES = "t time times stamp stamps timestamp timestamps headerstamp unixtime elapsed elapsedtime sec secs seconds"
+EPISODES = "episode run drive trial trajectory"
+HEADINGS = "heading yaw theta psi θ ψ headingangle yawangle posetheta poseyaw poseheading"
+PLACES = "# pos# #pos position# #position p# pose# posepos# poseposition# poseposeposition# translation# t# prsr#"
+QUATERNIONS = "q# quat# quaternion# orientation# poseorientation# poseposeorientation# rotation# qrs#"
+SPEEDS = (
+    "v cmdv vcmd cmdlin cmdlinear cmdlinearx cmdvel cmdvelx cmdvellin cmdvellinear cmdvellinearx cmdspeed speedcmd "
+    "linearx commandv vcommand commandspeed commandedspeed"
+)
+TURNING_SPEEDS = (
+    "omega ω w cmdomega omegacmd cmdw wcmd cmdang cmdangular cmdangularz cmdvelang cmdvelangular cmdvelangularz "
+    "cmdveltheta angularz cmdyawrate yawratecmd commandomega omegacommand commandyawrate commandedyawrate"
+)
+DUTIES = "# duty# #duty pwm# #pwm cmd# #cmd u# motor# #motor"
+WHEEL_SPEEDS = "wheelcommand# #wheelcommand wheelcmd# #wheelcmd cmdwheel# wheelspeedcmd# omega#cmd cmdomega#"
+
+
+def _filled(pattern: str, *parts: str) -> frozenset[str]:
+    """The names of a pattern, # standing for any of the parts."""
+    return frozenset(name for part in parts for name in pattern.replace("#", part).split())
+
+
+USUAL: Mapping[str, frozenset[str]] = MappingProxyType(
+    {
+        "time": _filled(TIMES, ""),
+        "episode": _filled(EPISODES, ""),
+        **{axis: _filled(PLACES, axis) for axis in PLACE},
+        "heading": _filled(HEADINGS, ""),
+        **{field: _filled(QUATERNIONS, field[1]) for field in QUATERNION},
+        "v": _filled(SPEEDS, ""),
+        "omega": _filled(TURNING_SPEEDS, ""),
+        "left": _filled(DUTIES, "left"),
+        "right": _filled(DUTIES, "right"),
+        "wheel_command_left": _filled(WHEEL_SPEEDS, "left"),
+        "wheel_command_right": _filled(WHEEL_SPEEDS, "right"),
+    }
+)
+"""Usual names of each field, without underscores and units."""

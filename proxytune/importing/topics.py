@@ -1,0 +1,395 @@
+"""A bag, or a folder of bags, as drives with commands, poses and pictures.
+
+What a log needs of a bag, and how topics for it are told apart.
+Which topic of a bag is taken for what, and why.
+Poses out of a chain of transforms: composed, and interpolated where they come at different times.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+from proxytune.arrays import Floats
+from proxytune.errors import LogError
+from proxytune.importing.bag import Bag, Topic, bags_in, choose_times, form_of, open_bag, read_commands, read_poses
+from proxytune.importing.bag_scene import Transform, chain_of, choose_transform, read_pictures, read_transforms
+from proxytune.importing.checks import complaint, headings_and_tilts, no_rotation
+from proxytune.importing.source import Channel, Drive, Poses, Source, Wanted
+from proxytune.logs import COMMANDS
+from proxytune.settings import nearest
+
+KINDS: Mapping[str, str] = {
+    "Twist": "twist",
+    "TwistStamped": "twist",
+    "WheelsCmdStamped": "duty",
+    "Float32MultiArray": "",
+    "Float64MultiArray": "",
+    "JointState": "wheel_speed",
+}
+"""The kind of command that a type of message says; two numbers in an array do not say theirs."""
+
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+
+
+@dataclass(frozen=True)
+class Role:
+    """Something that a log needs of a bag, and how its topic is found.
+
+    Attributes:
+        name: What the topic is taken for.
+        option: The option that names the topic.
+        ranks: Types of message that can be it, without their package; the lowest rank goes first.
+        first: Parts of names that go first, the foremost first.
+        never: Parts of names that are something else, whatever their type.
+        asked: Types that are taken only where the topic is named.
+    """
+
+    name: str
+    option: str
+    ranks: Mapping[str, int]
+    first: tuple[str, ...] = ()
+    never: tuple[str, ...] = ()
+    asked: tuple[str, ...] = ()
+
+    def can_be(self, topic: Topic) -> bool:
+        """Whether a topic has messages that can be read as this."""
+        return topic.count > 0 and topic.known and not topic.lacking and short(topic.kind) in self.ranks
+
+    def is_offered(self, topic: Topic) -> bool:
+        """Whether a topic may be taken without being named."""
+        named_otherwise = any(part in topic.name.lower() for part in self.never)
+        return self.can_be(topic) and not named_otherwise and short(topic.kind) not in self.asked
+
+    def order(self, topic: Topic) -> tuple[bool, int, int, int, str]:
+        """The lowest goes first: by name, by type, by number of messages."""
+        name = topic.name.lower()
+        differs = name.rpartition("/")[2] not in self.first
+        by_name = next((place for place, part in enumerate(self.first) if part in name), len(self.first))
+        return differs, by_name, self.ranks[short(topic.kind)], -topic.count, topic.name
+
+    def why_not(self, topic: Topic) -> str:
+        """Why a topic is not taken."""
+        if not topic.count:
+            return "it has no messages"
+        if topic.lacking:
+            return f"bags without messages of it: {topic.lacking}"
+        if not topic.known:
+            return f"the bag does not define {topic.kind}; record it by a newer ROS or as mcap, which does"
+        if self.can_be(topic):
+            return f"taken only where it is named ({self.option})"
+        return f"{topic.kind} is none of {', '.join(self.ranks)}"
+
+
+COMMAND_ROLE = Role(
+    "commands",
+    "--commands",
+    {name: place for place, name in enumerate(KINDS)} | {"TwistStamped": 0, "Float64MultiArray": 3},
+    first=("cmd_vel", "cmd", "command"),
+    asked=("JointState",),
+)
+POSE_ROLE = Role(
+    "poses",
+    "--poses",
+    {
+        "PoseStamped": 0,
+        "TransformStamped": 0,
+        "PoseWithCovarianceStamped": 1,
+        "Odometry": 2,
+        "TFMessage": 3,
+        "tfMessage": 3,
+    },
+    first=("mocap", "vicon", "vrpn", "optitrack", "qualisys", "ground_truth"),
+    never=("goal", "target", "setpoint", "initialpose", "cmd", "command", "tf_static"),
+)
+PICTURE_ROLE = Role("pictures", "--pictures", {"Image": 0, "CompressedImage": 1}, never=("depth", "mask", "debug"))
+
+
+def short(kind: str) -> str:
+    """A type without its package: Twist of geometry_msgs/msg/Twist."""
+    return kind.rpartition("/")[2]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is taken from a bag.
+
+    Attributes:
+        commands: Topic of the commands, or None.
+        kind: Kind of the commands.
+        poses: Topic of the poses.
+        transform: Parent and child as "map>base_link" where poses come of transforms; "" until it is chosen.
+        pictures: Topic of the pictures, or None.
+    """
+
+    commands: Topic | None
+    kind: str
+    poses: Topic
+    transform: str
+    pictures: Topic | None
+
+    @property
+    def of_transforms(self) -> bool:
+        """Whether poses come of transforms."""
+        return self.poses.kind in TRANSFORMS
+
+
+def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
+    """Choose topics by what is wanted, else by type, name and number of messages.
+
+    Args:
+        topics: All topics.
+        wanted: What the user asks for.
+        where: The bag, as a complaint names it.
+
+    Raises:
+        LogError: If a topic is named that is missing or of no use, or none can be commands or poses.
+    """
+    if wanted.kind and wanted.kind not in COMMANDS:
+        raise LogError(f"{where}: unknown kind of commands '{wanted.kind}'; {nearest(wanted.kind, COMMANDS)}")
+    without = "none" in (wanted.commands, wanted.kind)
+    commands = None if without else _choose(_command_role(wanted), topics, wanted.commands, where)
+    if not without and commands is None:
+        raise LogError(f"{_nothing(COMMAND_ROLE, topics, where)}, or take a log without commands by --commands none")
+    transform = wanted.poses if ">" in wanted.poses else ""
+    role = replace(POSE_ROLE, ranks={"TFMessage": 0, "tfMessage": 0}) if transform else POSE_ROLE
+    poses = _choose(role, topics, "" if transform else wanted.poses, where)
+    if poses is None:
+        raise LogError(_nothing(role, topics, where))
+    pictures = None if wanted.frames == "none" else _choose(PICTURE_ROLE, topics, wanted.frames, where)
+    kind = "none" if commands is None else _kind_of(commands, wanted.kind, where)
+    return Choice(commands, kind, poses, transform, pictures)
+
+
+def channels_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[Channel, ...]:
+    """Every topic with what it is taken for, or why it is left out."""
+    return tuple(Channel(topic.name, topic.kind, topic.count, _part(topic, choice)) for topic in topics)
+
+
+def notes_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[str, ...]:
+    """What was taken and what else could have been, a sentence each."""
+    taken = ((COMMAND_ROLE, choice.commands), (POSE_ROLE, choice.poses), (PICTURE_ROLE, choice.pictures))
+    return tuple(_note(role, topic, topics) for role, topic in taken if topic is not None)
+
+
+def _command_role(wanted: Wanted) -> Role:
+    """Commands of the kind that is wanted, where one is."""
+    if wanted.commands or not wanted.kind:
+        return COMMAND_ROLE
+    ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if KINDS[name] in ("", wanted.kind)}
+    return replace(COMMAND_ROLE, ranks=ranks)
+
+
+def _choose(role: Role, topics: tuple[Topic, ...], name: str, where: str) -> Topic | None:
+    if not name:
+        return min(filter(role.is_offered, topics), key=role.order, default=None)
+    named = {topic.name: topic for topic in topics}
+    topic = named.get(name) or named.get(f"/{name}")
+    if topic is None:
+        raise LogError(f"{where}: no topic '{name}'; {nearest(name, named)}")
+    if not role.can_be(topic):
+        raise LogError(f"{where}: topic {topic.name} cannot be {role.name}: {role.why_not(topic)}")
+    return topic
+
+
+def _kind_of(topic: Topic, wanted: str, where: str) -> str:
+    said = KINDS[short(topic.kind)]
+    if not said and not wanted:
+        raise LogError(
+            f"{where}: topic {topic.name} does not say what its two numbers are; add --kind duty, "
+            "wheel_speed or twist, or leave commands out by --commands none"
+        )
+    if said and wanted and said != wanted:
+        raise LogError(f"{where}: topic {topic.name} holds commands of kind {said}, not {wanted}; leave --kind out")
+    return said or wanted
+
+
+def _nothing(role: Role, topics: tuple[Topic, ...], where: str) -> str:
+    left = [topic.name for topic in topics if role.can_be(topic)]
+    if left:
+        return f"{where}: no topic is plainly {role.name}; name one of {', '.join(left)} by {role.option}"
+    return f"{where}: no topic has {role.name}, which are messages of type {', '.join(role.ranks)}; record one"
+
+
+def _note(role: Role, topic: Topic, topics: tuple[Topic, ...]) -> str:
+    others = [other.name for other in topics if role.is_offered(other) and other != topic]
+    also = f"; {', '.join(others)} could be as well ({role.option})" if others else ""
+    return f"{role.name.capitalize()} are {topic.count} messages of {topic.name} ({short(topic.kind)}){also}."
+
+
+def _part(topic: Topic, choice: Choice) -> str:
+    roles = ((COMMAND_ROLE, choice.commands), (POSE_ROLE, choice.poses), (PICTURE_ROLE, choice.pictures))
+    for role, taken in roles:
+        if topic == taken:
+            return role.name
+    if choice.of_transforms and topic.kind in TRANSFORMS and topic.count:
+        return POSE_ROLE.name
+    fitting = [role for role, _ in roles if role.is_offered(topic)]
+    if fitting:
+        return f"left out: could be {fitting[0].name} as well ({fitting[0].option})"
+    near = [role for role, _ in roles if short(topic.kind) in role.ranks]
+    return f"left out: {near[0].why_not(topic)}" if near else "left out: neither commands, poses nor pictures"
+
+
+def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: str) -> tuple[Poses, tuple[str, ...]]:
+    """Poses of a child in a parent, at the times of the transform between them that comes most often.
+
+    Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
+
+    Args:
+        transforms: All transforms of a bag.
+        name: Parent and child, as in "map>base_link".
+        stamps: Whose times count.
+        where: The bag and topic, as a complaint names them.
+
+    Raises:
+        LogError: If no chain leads from the one to the other, nothing in it moves, or a transform is no rotation.
+    """
+    chain = chain_of(transforms, name, where)
+    for transform in chain:
+        _check(transform, where)
+    choices = {each.name: choose_times(each.stamps, stamps, each.name) for each in chain if each.moves}
+    times = {moving: of_it for moving, (of_it, _) in choices.items()}
+    most = max(times.values(), key=len)
+    common = most[_covered(most, times.values())]
+    if not len(common):
+        raise LogError(f"{where}: the transforms of {name} share no time; name another pair by --poses")
+    place, turn = np.zeros((len(common), 3)), Rotation.identity(1)
+    for transform in chain:
+        step, rotation = _at(transform.values, times.get(transform.name), common)
+        place, turn = place + turn.apply(step), turn * rotation
+    said = (note for _, notes in choices.values() for note in notes)
+    poses = Poses(common, place, *headings_and_tilts(turn.as_quat(), f"{where}: {name}"))
+    return poses, (_chain_note(name, chain, len(most) - len(common)), *said)
+
+
+def _check(transform: Transform, where: str) -> None:
+    """Refuse numbers that are not finite and quaternions that are no rotation."""
+    finite = np.isfinite(transform.values).all(axis=1)
+    if not finite.all():
+        number = int(np.argmin(finite)) + 1
+        raise LogError(f"{where}: transform {transform.name}: number {number} is not finite; name another by --poses")
+    wrong = no_rotation(transform.values[:, 3:])
+    if wrong.any():
+        raise complaint(transform.values[:, 3:], wrong, f"{where}: transform {transform.name}")
+
+
+def _chain_note(name: str, chain: list[Transform], left_out: int) -> str:
+    parent, _, child = name.partition(">")
+    names = ", ".join(transform.name for transform in chain)
+    outside = f"; {left_out} outside of what all of them cover are left out" if left_out else ""
+    return f"Poses of {child} in {parent} are composed of {names}{outside}."
+
+
+def _covered(times: Floats, others: Collection[Floats]) -> NDArray[np.bool_]:
+    """Which times lie within all others."""
+    first, last = max(other.min() for other in others), min(other.max() for other in others)
+    covered: NDArray[np.bool_] = (times >= first) & (times <= last)
+    return covered
+
+
+def _at(values: Floats, times: Floats | None, wanted: Floats) -> tuple[Floats, Rotation]:
+    """Places and rotations at wanted times: straight between two places, by the shortest turn between two rotations.
+
+    Without times, a transform stands still.
+    """
+    if times is None:
+        return values[:1, :3], Rotation.from_quat(values[:1, 3:])
+    if np.array_equal(times, wanted):
+        return values[:, :3], Rotation.from_quat(values[:, 3:])
+    stamps, order = np.unique(times, return_index=True)
+    places = np.stack([np.interp(wanted, stamps, column) for column in values[order, :3].T], axis=1)
+    rotations = Rotation.from_quat(values[order, 3:])
+    return places, Slerp(stamps, rotations)(wanted) if len(stamps) > 1 else rotations
+
+
+Notes = tuple[str, ...]
+
+
+def read_bag(path: Path, wanted: Wanted) -> Source:
+    """Read a ROS bag, or a folder of bags with a drive each, of the same topics.
+
+    Args:
+        path: A ROS 1 file, a ROS 2 folder or storage file (sqlite3 or mcap), or a folder of such.
+        wanted: Topics and stamps to take.
+
+    Raises:
+        LogError: If a bag cannot be read, or there is nothing that can be commands or poses.
+    """
+    bags = bags_in(path)
+    topics, notes = _list(path, bags)
+    choice = choose(topics, wanted, f"{path}")
+    if choice.of_transforms and not choice.transform:
+        choice = _with_transform(choice, next(iter(bags.values())), wanted)
+    drives = []
+    notes = [*notes_of(topics, choice), *notes]
+    for name, bag in bags.items():
+        drive, said = _read_drive(name, bag, choice, wanted)
+        drives.append(drive)
+        notes += said if len(bags) == 1 else [f"{name}: {note}" for note in said]
+    return Source(_form(bags), tuple(drives), channels_of(topics, choice), tuple(dict.fromkeys(notes)))
+
+
+def _list(path: Path, bags: dict[str, Path]) -> tuple[tuple[Topic, ...], list[str]]:
+    """The topics of all bags together; one that a bag lacks counts as without messages there."""
+    listed, notes = [], []
+    for bag_path in bags.values():
+        with open_bag(bag_path) as bag:
+            if not bag.reader.message_count:
+                raise LogError(f"{bag_path}: holds no messages; record it again, or leave it out")
+            listed.append({topic.name: topic for topic in bag.topics})
+            if not bag.defines_types:
+                notes.append(f"{bag_path.name} does not define its types of message: those of ROS 2 Humble were taken.")
+    names = sorted({name for topics in listed for name in topics})
+    return tuple(_merge([topics[name] for topics in listed if name in topics], len(bags)) for name in names), notes
+
+
+def _merge(topics: list[Topic], bags: int) -> Topic:
+    """A topic of several bags as one."""
+    one = topics[0]
+    lacking = bags - sum(topic.count > 0 for topic in topics)
+    kind = one.kind if len({topic.kind for topic in topics}) == 1 else "several types"
+    known = all(topic.known for topic in topics)
+    return Topic(one.name, kind, sum(topic.count for topic in topics), known, lacking)
+
+
+def _with_transform(choice: Choice, path: Path, wanted: Wanted) -> Choice:
+    """The choice with the transform that the first bag's pose is."""
+    with open_bag(path) as bag:
+        transforms = read_transforms(bag, _transform_topics(bag))
+        return replace(choice, transform=choose_transform(transforms, f"{path}: {choice.poses.name}"))
+
+
+def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[Drive, list[str]]:
+    """One bag as a drive, and what there is to say of it."""
+    commands, pictures = None, None
+    said: list[str] = []
+    with open_bag(path) as bag:
+        if choice.commands is not None:
+            commands, notes = read_commands(bag, choice.commands.name, choice.kind, wanted.stamps)
+            said += notes
+        poses, notes = _read_poses(bag, choice, wanted)
+        said += notes
+        if choice.pictures is not None:
+            pictures, notes = read_pictures(bag, choice.pictures.name, wanted.stamps)
+            said += notes
+    return Drive(name, commands, poses, pictures), said
+
+
+def _read_poses(bag: Bag, choice: Choice, wanted: Wanted) -> tuple[Poses, Notes]:
+    if not choice.of_transforms:
+        return read_poses(bag, choice.poses.name, wanted.stamps)
+    transforms = read_transforms(bag, _transform_topics(bag))
+    return read_chain(transforms, choice.transform, wanted.stamps, f"{bag.path}: {choice.poses.name}")
+
+
+def _transform_topics(bag: Bag) -> tuple[str, ...]:
+    return tuple(topic.name for topic in bag.topics if topic.kind in TRANSFORMS and topic.known)
+
+
+def _form(bags: dict[str, Path]) -> str:
+    forms = sorted({form_of(bag) for bag in bags.values()})
+    return forms[0] if len(bags) == 1 else f"{len(bags)} bags: {', '.join(forms)}"

@@ -1,0 +1,287 @@
+"""Drives whose poses have times of their own: jittered, with gaps, at whatever rate.
+
+A replay goes on in regular steps. Each pose is therefore moved to the nearest free step along the motion measured round
+it: by a step at most, some milliseconds, over which that motion is as good as straight. The poses as they were
+measured, and their times, are kept beside it.
+
+The grid of times that samples lie on.
+Headings: in radians, without jumps by whole turns.
+Drives whose poses lie on a regular grid of times, as log.toml's `rate_hz` says.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from proxytune.arrays import Floats, Whole
+from proxytune.errors import LogError
+from proxytune.logs.log import POSE, WHEELS, LogEpisode, Measured
+from proxytune.logs.rows import Rows
+
+OFF_GRID = 0.25 + 1e-6
+"""A row may be this far from its place on the grid of times, in samples."""
+
+SPARSEST = 10
+"""A log with more missing rows than this for each row that it has states its times or its rate wrongly."""
+
+
+def places_on_grid(samples: Rows, rate_hz: float) -> tuple[Whole, Whole]:
+    """Where each row lies on all grids laid end to end (N,), and where each episode's grid ends (E,).
+
+    Raises:
+        LogError: If rows lie off the grid.
+    """
+    lasts = np.append(samples.firsts[1:], len(samples.lines)) - 1
+    if not rate_hz:
+        return np.arange(len(samples.lines)), lasts + 1
+    time, episode = samples.values["time"], samples.episode
+    elapsed = (time - time[samples.firsts][episode]) * rate_hz
+    _check_grid(samples, elapsed, rate_hz)
+    steps = np.rint(elapsed).astype(np.int64)
+    ends = np.cumsum(steps[lasts] + 1)
+    return steps + np.append(0, ends[:-1])[episode], ends
+
+
+def _check_grid(samples: Rows, elapsed: Floats, rate_hz: float) -> None:
+    """Refuse rows off the grid, two rows at one place of it, and a grid that is nearly empty."""
+    off = np.abs(elapsed - np.rint(elapsed)) > OFF_GRID
+    off[1:] |= samples.follows & (np.diff(np.rint(elapsed)) < 1)
+    sparse = np.append(np.diff(elapsed) * samples.follows, 0.0)
+    longest = int(np.argmax(sparse))
+    if sparse.sum() > SPARSEST * len(elapsed):
+        problem = (
+            f"the rows cover {sparse.sum():.0f} samples of {rate_hz:g} Hz with {len(elapsed)} rows, with a gap of "
+            f"{sparse[longest] / rate_hz:g} s before this one; write seconds, correct rate_hz or split the episode"
+        )
+        raise samples.error(longest + 1, "time", problem)
+    if off.any():
+        row = int(np.argmax(off))
+        problem = (
+            f"{samples.values['time'][row]:.12g} s lies off the grid of {rate_hz:g} Hz from the episode's first row; "
+            "correct rate_hz, or leave it out of log.toml: poses then keep times of their own"
+        )
+        raise samples.error(row, "time", problem)
+
+
+def spread(values: Floats, places: Whole, length: int) -> Floats:
+    """Rows of values (N, columns) at their places on the grid (length, columns), NaN between them."""
+    laid = np.full((length, values.shape[1]), math.nan)
+    laid[places] = values
+    return laid
+
+
+def check_headings(samples: Rows, command: str, rate_hz: float) -> None:
+    """Refuse headings in degrees: they jump by 360, or fit the course over ground far better than as radians.
+
+    Raises:
+        LogError: If they are.
+    """
+    heading = samples.values["heading"]
+    if command == "none" or np.isnan(heading).all():
+        return
+    largest = int(np.nanargmax(np.abs(heading)))
+    beyond = abs(heading[largest]) > 7.0
+    jumps = samples.follows & (np.abs(np.abs(np.diff(heading)) - 360.0) < 30.0)
+    if (beyond and jumps.any()) or _fits_as_degrees(samples, rate_hz, beyond=bool(beyond)):
+        problem = f"{heading[largest]:g} and the others look like degrees; write headings in radians"
+        raise samples.error(largest, "heading", problem)
+
+
+def _fits_as_degrees(samples: Rows, rate_hz: float, *, beyond: bool) -> bool:
+    """Whether course over ground and heading keep together with the heading in degrees only.
+
+    Angles are doubled, so that a robot may go backwards, and longer ways weigh more. Where headings go beyond a turn
+    of radians, a course that hardly varies is told by its direction too.
+    """
+    span = max(2, 2 * round(rate_hz / 4.0))
+    x, y, heading = samples.columns(POSE).T
+    if len(x) <= span:
+        return False
+    way = (x[span:] - x[:-span]) + 1j * (y[span:] - y[:-span])
+    middle = heading[span // 2 : -span // 2]
+    moving = (samples.episode[span:] == samples.episode[:-span]) & (np.abs(way) > 0.02) & np.isfinite(middle)
+    if moving.sum() < 20:
+        return False
+    way, middle = way[moving], middle[moving]
+    doubled = way**2 / np.abs(way) / np.abs(way).sum()
+    degrees, radians = (complex(np.sum(doubled * np.exp(-2j * h))) for h in (np.radians(middle), middle))
+    scattered = abs(degrees) > 0.6 and abs(degrees) > abs(radians) + 0.3
+    return scattered or (beyond and degrees.real > 0.8 and degrees.real > radians.real + 0.3)
+
+
+def unwrapped(samples: Rows) -> Floats:
+    """Headings without jumps by whole turns within an episode, gaps passed over."""
+    heading = samples.values["heading"].copy()
+    measured = np.flatnonzero(np.isfinite(heading))
+    if not len(measured):
+        return heading
+    episode = samples.episode[measured]
+    turns = np.append(0.0, np.rint(np.diff(heading[measured]) / math.tau)).cumsum()
+    begins = np.append(True, np.diff(episode) > 0)
+    start = turns[np.maximum.accumulate(np.where(begins, np.arange(len(measured)), 0))]
+    heading[measured] -= (turns - start) * math.tau
+    return heading
+
+
+Issued = tuple[Floats, Floats]
+"""An episode's commands at times of their own: times (M,) [s], commands (M, 2)."""
+
+
+def episodes_on_grid(
+    samples: Rows, commands: Floats, issued: Mapping[str, Issued], rate_hz: float
+) -> tuple[LogEpisode, ...]:
+    """Lay rows on their grids; missing ones are filled: the last command held, no pose.
+
+    Args:
+        samples: The rows of samples.csv.
+        commands: Their commands (rows, 2); unused where there are commands apart.
+        issued: Every episode's commands, where they have times of their own.
+        rate_hz: Rows per second; 0 for still frames.
+
+    Raises:
+        LogError: If rows lie off the grid.
+    """
+    places, ends = places_on_grid(samples, rate_hz)
+    filled = np.zeros(int(ends[-1]), dtype=np.int64)
+    filled[places] = np.arange(len(places))
+    held = commands[np.maximum.accumulate(filled)]
+    placed = np.column_stack((samples.columns(POSE[:2]), unwrapped(samples)))
+    poses = spread(placed, places, len(filled))
+    wheels = spread(samples.columns(WHEELS), places, len(filled)) if WHEELS[0] in samples.values else None
+    times = samples.values["time"]
+    firsts = (*samples.firsts, len(times))
+    episodes = []
+    for index, (begin, end) in enumerate(zip((0, *ends[:-1]), ends, strict=True)):
+        own = times[firsts[index] : firsts[index + 1]]
+        grid = own[0] + np.arange(end - begin) / rate_hz if rate_hz else own
+        speeds = None if wheels is None else wheels[begin:end]
+        name = samples.names[index]
+        when, given = issued.get(name, (None, held[begin:end]))
+        episodes.append(LogEpisode(name, grid, given, poses[begin:end], speeds, when))
+    return tuple(episodes)
+
+
+STEPS_HZ = 60.0
+"""The grid has about so many steps a second at least."""
+
+MISSED = 10
+"""The rate is counted over intervals in which no more poses than this are missing."""
+
+REACH_S = 0.1
+"""The motion round a pose is taken from so long before it to so long after."""
+
+
+class _Drive(NamedTuple):
+    """The rows of one drive: times (N,), poses (N, 3), wheel speeds (N, 2) or None."""
+
+    times: Floats
+    poses: Floats
+    wheels: Floats | None
+
+
+def usual_rate(samples: Rows) -> float:
+    """Measured poses a second, drop-outs and gaps apart.
+
+    Raises:
+        LogError: If no drive has two poses.
+    """
+    known = np.isfinite(samples.values["x"])
+    times, episode = samples.values["time"][known], samples.episode[known]
+    between = np.diff(times)[np.diff(episode) == 0]
+    if not len(between):
+        raise LogError(f"{samples.path}: no drive has two measured poses; nothing can be learnt from it")
+    periods = np.rint(between / np.median(between))
+    near = (periods >= 1.0) & (periods <= MISSED)
+    return float(periods[near].sum() / between[near].sum())
+
+
+def episodes_at_own_times(
+    samples: Rows, commands: Floats, issued: Mapping[str, Issued]
+) -> tuple[tuple[LogEpisode, ...], float]:
+    """Every drive on a grid of steps, with its poses as they were measured, and the grid's steps a second.
+
+    Args:
+        samples: The rows of samples.csv.
+        commands: The command of each row (rows, 2), issued at the row's time; unused where there are commands apart.
+        issued: Every episode's commands, where they lie apart.
+
+    Raises:
+        LogError: If there are too few poses for their times.
+    """
+    usual = usual_rate(samples)
+    _check_density(samples, usual)
+    rate_hz = usual * math.ceil(STEPS_HZ / usual - 0.05)
+    placed = np.column_stack((samples.columns(POSE[:2]), unwrapped(samples)))
+    wheels = samples.columns(WHEELS) if WHEELS[0] in samples.values else None
+    firsts = (*samples.firsts, len(samples.lines))
+    episodes = []
+    for index, name in enumerate(samples.names):
+        own = slice(firsts[index], firsts[index + 1])
+        times = samples.values["time"][own]
+        drive = _Drive(times, placed[own], None if wheels is None else wheels[own])
+        when, given = issued.get(name, (times, commands[own]))
+        episodes.append(_episode(name, drive, given, when, rate_hz))
+    return tuple(episodes), rate_hz
+
+
+def _check_density(samples: Rows, usual: float) -> None:
+    """Refuse poses so few for the time that they cover that their times cannot be seconds."""
+    times = samples.values["time"]
+    gaps = np.append(np.diff(times) * samples.follows, 0.0)
+    if gaps.sum() * usual > SPARSEST * len(times):
+        longest = int(np.argmax(gaps))
+        problem = (
+            f"the rows cover {gaps.sum():.0f} s with {len(times)} rows, usually {1.0 / usual:.3g} s apart, with a gap "
+            f"of {gaps[longest]:g} s before this one; write seconds, or split the episode at its gaps"
+        )
+        raise samples.error(longest + 1, "time", problem)
+
+
+def _episode(name: str, drive: _Drive, commands: Floats, issued: Floats, rate_hz: float) -> LogEpisode:
+    steps = (drive.times - drive.times[0]) * rate_hz
+    known, rows = _free_steps(steps, np.flatnonzero(np.isfinite(drive.poses[:, 0])))
+    length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
+    grid = drive.times[0] + np.arange(length) / rate_hz
+    measured = Measured(drive.times[known], drive.poses[known], rows)
+    poses = np.full((length, 3), np.nan)
+    poses[rows] = moved(measured, grid[rows])
+    return LogEpisode(name, grid, commands, poses, _held(drive, np.rint(steps), length), issued, measured)
+
+
+def _free_steps(steps: Floats, known: Whole) -> tuple[Whole, Whole]:
+    """The nearest step to each known pose that none before it has, and which poses are not a step off by that."""
+    order = np.arange(len(known))
+    nearest = np.rint(steps[known]).astype(np.int64)
+    rows = np.maximum.accumulate(nearest - order) + order if len(known) else nearest
+    near = np.abs(rows - steps[known]) <= 1.0
+    return known[near], rows[near]
+
+
+def moved(measured: Measured, times: Floats) -> Floats:
+    """Poses (N, 3) as they were at other times (N,) nearby, by the motion measured round each.
+
+    A pose that repeats the one before exactly is an older one shown again, and stays a repeat.
+    """
+    count = len(measured.times)
+    here = np.arange(count)
+    before = np.searchsorted(measured.times, measured.times - REACH_S)
+    after = np.searchsorted(measured.times, measured.times + REACH_S, side="right") - 1
+    before, after = np.maximum(np.minimum(before, here - 1), 0), np.minimum(np.maximum(after, here + 1), count - 1)
+    seconds = measured.times[after] - measured.times[before]
+    rates = (measured.poses[after] - measured.poses[before]) / np.where(seconds > 0.0, seconds, 1.0)[:, None]
+    out = measured.poses + rates * (times - measured.times)[:, None]
+    repeats = np.append(False, (np.diff(measured.poses, axis=0) == 0.0).all(axis=1))
+    return np.asarray(out[np.maximum.accumulate(np.where(repeats, 0, here))])
+
+
+def _held(drive: _Drive, steps: Floats, length: int) -> Floats | None:
+    """Measured wheel speeds at every step, the last measured one held."""
+    if drive.wheels is None:
+        return None
+    known = np.flatnonzero(np.isfinite(drive.wheels).all(axis=1))
+    if not len(known):
+        return np.full((length, 2), np.nan)
+    newest = np.searchsorted(steps[known], np.arange(length), side="right") - 1
+    return np.asarray(drive.wheels[known[np.maximum(newest, 0)]])

@@ -1,0 +1,255 @@
+"""Before and after: each measure of the proxy without what was found and with it, its interval and its floor.
+
+What a loop found, in a sentence, and what to do next.
+PRPV of the tuned proxy before and after, against its noise floor.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from proxytune.report.numbers import listed, short
+from proxytune.report.style import BLUE, COLUMN, GREY, LIGHT_GREY, VERMILLION, dress, plain
+from proxytune.space import Theta
+from proxytune.usefulness import Assessment
+
+Ends = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Level:
+    """A measure of one proxy.
+
+    Attributes:
+        value: The measure.
+        interval: Its 95 % interval; None where there is none.
+        floor: What a perfect proxy would have; None where only a bracket, or nothing, is known.
+        floor_ends: The interval of that, or the bracket; None where there is none.
+        chance: Mean and standard deviation of what a ranking at random would have; None where chance has no meaning.
+    """
+
+    value: float
+    interval: Ends | None
+    floor: float | None = None
+    floor_ends: Ends | None = None
+    chance: Ends | None = None
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One measure, before and after.
+
+    Attributes:
+        key: What it is called in the JSON document.
+        title: What it is of, for people.
+        unit: Its unit; empty where it has none.
+        before: Without what was found.
+        after: With it; None where nothing was found.
+        most: The largest that it can be; None where there is no such value.
+    """
+
+    key: str
+    title: str
+    unit: str
+    before: Level
+    after: Level | None
+    most: int | None = None
+
+    @property
+    def falls(self) -> bool:
+        """Whether it is lower after than before, beyond its intervals."""
+        if self.after is None or self.after.interval is None or self.before.interval is None:
+            return False
+        return self.after.interval[1] < self.before.interval[0]
+
+
+def prpv_level(assessment: Assessment) -> Level:
+    """PRPV of an assessment."""
+    inner, floor, chance = assessment.prpv_interval, assessment.noise_floor, assessment.chance
+    ends, floor_ends = _ends(inner.low, inner.high), _ends(floor.low, floor.high)
+    return Level(float(assessment.prpv.value), ends, floor.value, floor_ends, (chance.mean, chance.deviation))
+
+
+def compare_prpv(key: str, title: str, before: Assessment, after: Assessment | None) -> Compared:
+    """PRPV of the tuned proxies."""
+    levels = prpv_level(before), None if after is None else prpv_level(after)
+    return Compared(key, f"PRPV of {title}", "", *levels, most=before.prpv.range[1])
+
+
+def compare_errors(diagnosis: Mapping[str, Any]) -> list[Compared]:
+    """The errors of a diagnosis, on drives and frames that were not fitted.
+
+    Args:
+        diagnosis: What `diagnose --json` prints.
+    """
+    camera = diagnosis["camera"] or {}
+    errors = (
+        ("error", "position in windows of {:g} s, planar plant", diagnosis.get("error")),
+        ("error_on_bullet", "position in windows of {:g} s, bullet plant", diagnosis.get("error_on_bullet")),
+        ("markings_error", "displacement of markings", camera.get("error")),
+        ("brightness_error", "brightness of the floor", camera.get("grey_error")),
+    )
+    return [_compare_error(key, title, error) for key, title, error in errors if error and error["before"] is not None]
+
+
+def _compare_error(key: str, title: str, error: Mapping[str, Any]) -> Compared:
+    scale, unit = (1000.0, "mm") if error["unit"] == "m" else (1.0, error["unit"])
+    low, high = (error.get(name) for name in ("noise_floor", "noise_floor_upper"))
+    bracket = _scaled((low, high), scale)
+    floor = scale * low if low is not None and bracket is None else None
+    before, after = (
+        Level(scale * error[side], _scaled(error[f"{side}_interval"], scale), floor, bracket)
+        for side in ("before", "after")
+    )
+    return Compared(key, title.format(error.get("horizon_s", 0.0)), unit, before, after)
+
+
+def _scaled(ends: Sequence[float | None], scale: float) -> Ends | None:
+    low, high = ends
+    return None if low is None or high is None else (scale * low, scale * high)
+
+
+def _ends(low: float | None, high: float | None) -> Ends | None:
+    return None if low is None or high is None else (low, high)
+
+
+MOST_NAMED = 5
+OPEN = ("partly explained", "unexplained", "cannot be told")
+"""Verdicts after which more is to be found."""
+
+NEXT = " Next: "
+"""What the sentence of a study has before its last part."""
+
+
+def lacking(diagnosis: Mapping[str, Any]) -> str:
+    """What the proxy lacks, as in "a dead band and a turn slip"; empty where it has no name."""
+    camera = diagnosis["camera"] or {}
+    names = [effect["name"] for effect in (*diagnosis["effects"], *camera.get("effects", ()))]
+    return listed([plain(name) for name in dict.fromkeys(names)])
+
+
+def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
+    """What the simulator lacked, and what it is worth to declare it."""
+    verdict, named = diagnosis["verdict"], lacking(diagnosis)
+    if all(row.after is None for row in rows):
+        return f"The log shows nothing to extend the simulator by (verdict: {verdict}). {_only(rows[0])}"
+    if named:
+        lacked = f"The simulator lacked: {named} (verdict: {verdict})."
+    else:
+        lacked = f"The simulator lacked what no named effect explains (verdict: {verdict}); curves stand in for it."
+    chosen = {row.key: row for row in rows}
+    moved = chosen.get("error_on_bullet") or chosen.get("error")
+    seen = chosen.get("markings_error") if (diagnosis["camera"] or {}).get("effects") else None
+    shown = (chosen["prpv"], chosen.get("held_out"), moved, seen)
+    return f"{lacked} With it, {'; '.join(_change(row) for row in shown if row)}."
+
+
+def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:
+    """What to do next.
+
+    Args:
+        diagnosis: What `diagnose --json` prints.
+        studied: The sentence of the last study that was run.
+        model: Where the model that was found lies; empty where nothing was found.
+        theta: The best θ of that study.
+    """
+    drive, step = diagnosis.get("next_manoeuvre"), studied.rpartition(NEXT)[2]
+    if drive and diagnosis["verdict"] in OPEN:
+        return f"Log {drive['name']} ({drive['description']}), and close the loop with that log."
+    if not model:
+        return _log_more(diagnosis) if "diagnose" in step else f"{step[:1].upper()}{step[1:]}"
+    known = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
+    rest = [f"{plain(name)} {value:.4g}" for name, value in theta.items() if name not in known]
+    left = f"; what the log does not show is known from scores alone: {listed(rest)}" if rest else ""
+    return f"Run your simulator with {model}, which was fitted to the log{left}."
+
+
+def _log_more(diagnosis: Mapping[str, Any]) -> str:
+    unseen = [plain(name) for name in diagnosis["could_not_be_seen"]]
+    shows = f" that can show {listed(unseen[:MOST_NAMED])}" if unseen else ", longer and more varied"
+    return f"No θ explains the scores, and this log does not tell why: log drives{shows}."
+
+
+def level_text(level: Level | None, unit: str) -> str:
+    """A measure with its interval, as "28 (21 to 45)"."""
+    if level is None:
+        return "–"
+    ends = f" ({_span(level.interval)})" if level.interval else ""
+    return f"{short(level.value)}{unit and ' '}{unit}{ends}"
+
+
+def floor_text(level: Level | None, unit: str) -> str:
+    """The noise floor: a value with its interval, or the two ends of a bracket."""
+    if level is None or (level.floor is None and level.floor_ends is None):
+        return "–"
+    if level.floor is None and level.floor_ends:
+        return f"{_span(level.floor_ends)}{unit and ' '}{unit}"
+    assert level.floor is not None
+    ends = f" ({_span(level.floor_ends)})" if level.floor_ends else ""
+    return f"{short(level.floor)}{unit and ' '}{unit}{ends}"
+
+
+def chance_text(level: Level | None) -> str:
+    """What a random ranking would have."""
+    return "–" if level is None or level.chance is None else f"{level.chance[0]:.1f} ± {level.chance[1]:.1f}"
+
+
+def _only(row: Compared) -> str:
+    return f"{row.title}: {level_text(row.before, row.unit)}."
+
+
+def _change(row: Compared) -> str:
+    assert row.after is not None
+    before, after = level_text(row.before, row.unit), level_text(row.after, row.unit)
+    if row.falls:
+        return f"{row.title} falls from {before} to {after}"
+    if row.after.value < row.before.value:
+        overlap = "; the intervals overlap" if row.before.interval and row.after.interval else ""
+        return f"{row.title} goes from {before} to {after}{overlap}"
+    return f"{row.title} does not fall: {before} before, {after} after"
+
+
+def _span(ends: tuple[float, float]) -> str:
+    return f"{short(ends[0])} to {short(ends[1])}"
+
+
+HALF = 0.3
+"""Half the width of a floor's bar."""
+
+
+def prpv_figure(rows: Sequence[Compared]) -> Figure:
+    """A panel per set of agents: PRPV before and after with 95 % intervals, over the bracket of the noise floor."""
+    figure = Figure(figsize=(COLUMN, 0.62 * COLUMN), layout="constrained")
+    panels = figure.subplots(1, len(rows), squeeze=False)[0]
+    for axes, row in zip(panels, rows, strict=True):
+        _panel(axes, row)
+    panels[0].set_ylabel("PRPV (lower is better)", fontsize=8)
+    floor = rows[0].before.floor_ends
+    if floor:
+        panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=6.5, color="0.3", va="bottom")
+    return figure
+
+
+def _panel(axes: Axes, row: Compared) -> None:
+    dress(axes)
+    for place, (level, colour) in enumerate(((row.before, VERMILLION), (row.after, BLUE))):
+        if level is not None:
+            _level(axes, place, level, colour)
+    axes.set_xlim(-0.6, 1.6)
+    axes.set_xticks([0, 1], ["before", "after"], fontsize=7)
+    axes.set_ylim(bottom=0.0)
+    axes.set_title("held-out agents" if row.key == "held_out" else "tuned agents", fontsize=8)
+
+
+def _level(axes: Axes, place: int, level: Level, colour: str) -> None:
+    low, high = level.floor_ends or (0.0, 0.0)
+    axes.fill_between([place - HALF, place + HALF], low, high, color=LIGHT_GREY, lw=0)
+    if level.floor is not None:
+        axes.plot([place - HALF, place + HALF], [level.floor] * 2, color=GREY, lw=1.0)
+    below, above = level.interval or (level.value, level.value)
+    spread = [[max(0.0, level.value - below)], [max(0.0, above - level.value)]]
+    axes.errorbar(place, level.value, yerr=spread, fmt="o", ms=5, color=colour, capsize=3, lw=1.2)
+    axes.annotate(f"{level.value:.3g}", (place + 0.1, level.value), fontsize=8, color=colour, va="center")

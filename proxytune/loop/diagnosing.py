@@ -1,0 +1,204 @@
+"""What the target's log says that the proxy lacks.
+
+The extended study: the same study by a proxy that has what the diagnosis found.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from proxytune.api.diagnosing import DiagnosisReport
+from proxytune.api.recording import Wanted, recordable
+from proxytune.diagnosis import camera_effects, diagnose_log, film, motion_effects, robot_of
+from proxytune.driving import Robot
+from proxytune.effects import Catalogue, effect_of
+from proxytune.errors import RunError, SettingsError, StoreError
+from proxytune.extensions import describe
+from proxytune.importing import open_log
+from proxytune.logs import Log
+from proxytune.loop.comparison import NEXT, compare_errors, floor_text, following, lacking, level_text
+from proxytune.loop.opening import Loop, Teller
+from proxytune.report.writing import write_text
+from proxytune.settings import read_settings
+from proxytune.storage import Store, locked
+from proxytune.study import FILE_NAME, MADE, Study, StudyRun, StudySettings, check_facts, study_facts
+
+FRAMES = 120
+"""So many pictures are recorded where the camera matters: as many name an effect on it (closing_the_camera_loop)."""
+
+
+def wanted_of(loop: Loop) -> Wanted:
+    """What is recorded of a twin: frames too where the study declares anything of the camera."""
+    of_camera = camera_effects(Catalogue(loop.settings.folder.resolve()))
+    seen = any(name in of_camera for name in declared_names(loop))
+    return Wanted(frames=FRAMES if seen else 0, seed=loop.settings.seed)
+
+
+def check_camera(loop: Loop) -> None:
+    """Refuse a twin of which frames cannot be recorded, before anything is driven.
+
+    Raises:
+        InputError: If it has no camera, or nobody who drives along lanes.
+    """
+    if loop.log is not None or loop.twin is None or not wanted_of(loop).frames:
+        return
+    try:
+        film(recordable(loop.settings, loop.twin), FRAMES, loop.settings.seed)
+    except SettingsError as problem:
+        remedy = "give a log of it by --log, or take what is of the camera out of [parameters]"
+        raise SettingsError(f"{loop.twin}: no frames can be recorded ({problem}); {remedy}") from None
+
+
+def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> None:
+    """Diagnose a log, and write what `diagnose` does: diagnosis.json, model.toml and figures.
+
+    What is declared is all that the study's box and its proxy have.
+
+    Raises:
+        LogError: If the log cannot bear the question.
+        RunError: If a file cannot be written.
+    """
+    with open_log(source, facts=loop.facts) as (log, notes):
+        for note in notes:
+            teller.say(note)
+        robot = robot_of(log, loop.robot, Catalogue(loop.settings.folder.resolve()))
+        with teller.diagnosis(log) as report:
+            found = diagnose_log(log, robot, declared_of(loop, robot, log), seed=loop.settings.seed, report=report)
+            report("drawing")
+            DiagnosisReport(found).write(folder)
+
+
+def declared_of(loop: Loop, robot: Robot, log: Log) -> tuple[str, ...]:
+    """The effects that the study declares and that this log can be asked for."""
+    known = motion_effects(robot.catalogue)
+    known = known if log.frames is None else (*known, *camera_effects(robot.catalogue))
+    return tuple(name for name in declared_names(loop) if name in known)
+
+
+def read_diagnosis(folder: Path) -> dict[str, Any]:
+    """The diagnosis that was written.
+
+    Raises:
+        RunError: If it cannot be read, or lacks something that a loop reads of it.
+    """
+    path = folder / "diagnosis.json"
+    try:
+        document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        _read_through(document)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as problem:
+        raise RunError(f"{path}: cannot be read ({describe(problem)}); remove it and run again") from None
+    return document
+
+
+def _read_through(document: Mapping[str, Any]) -> None:
+    """Read all that a loop reads, so that what is spoilt shows before anything is made of it."""
+    json.dumps(document, allow_nan=False)
+    lacking(document)
+    for row in compare_errors(document):
+        for level in (row.before, row.after):
+            level_text(level, row.unit), floor_text(level, row.unit)
+    for told in (document, document["camera"] or document):
+        told["verdict"], told["effects"], told["extended"]
+    for studied, model in (("", "model.toml"), (f"{NEXT}diagnose", "")):
+        following(document, studied, model, {})
+
+
+def adds_something(document: Mapping[str, Any]) -> bool:
+    """Whether a diagnosis found anything to extend the proxy by: named effects, or curves."""
+    camera = document["camera"] or {}
+    return bool(document["effects"] or camera.get("effects") or document.get("learnt", {}).get("used"))
+
+
+def declared_names(loop: Loop) -> tuple[str, ...]:
+    """The effects of the study's box, then those that its proxy has."""
+    names = [*loop.settings.space.names, *dict(getattr(loop.family, "effects", ()))]
+    return tuple(dict.fromkeys(effect_of(name) for name in names))
+
+
+LEFT_OUT = (*MADE, "study.db*", "study.lock", "report.html", "sweeps", "__pycache__", "*.md", ".*", FILE_NAME)
+"""What a run makes, and what is written anew."""
+A_FOLDER_OF_ITS_OWN = (FILE_NAME, "log.toml")
+"""A folder with one of these is another study, or a log."""
+
+
+def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
+    """The study.toml of the extended study: as the study's own, but for its proxy and its paths.
+
+    What the study's own proxy has beside what was diagnosed stays, as [domain.effects].
+
+    Args:
+        settings: The study's.
+        model: The model.toml that was found.
+        folder: Where the extended study is to lie.
+    """
+    values = dict(read_settings(settings.path).values)
+    values |= {"name": f"{settings.name}_extended", "proxy": _from(folder, model)}
+    targets = [_from(folder, path) for path in settings.targets]
+    values["target"] = targets if settings.more_targets else targets[0]
+    if settings.truth:
+        values["truth"] = _from(folder, settings.truth)
+    domain = {key: value for key, value in settings.domain.items() if key != "effects"}
+    kept = _kept_effects(settings, model)
+    values["domain"] = {**domain, "effects": kept} if kept else domain
+    return f"# {settings.name} with what `diagnose` found, written by `loop`.\n" + tomlkit.dumps(values)
+
+
+def write_extension(settings: StudySettings, model: Path, folder: Path) -> None:
+    """Write the extended study, with the study's own modules, robots, maps and weights beside it.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    # Without study.toml its modules would count as the study's own.
+    write_text(folder / FILE_NAME, extension_text(settings, model, folder))
+    try:
+        for path in files_of(settings):
+            _copy(path, folder / path.name)
+    except (OSError, shutil.Error) as problem:
+        raise StoreError(f"{folder}: cannot be written ({problem}); make room and run again") from None
+
+
+def files_of(settings: StudySettings) -> list[Path]:
+    """The files and folders beside study.toml that a study may read."""
+    names = [path.name for path in settings.folder.iterdir() if path not in settings.targets]
+    return [settings.folder / name for name in sorted({*names} - _ignored(str(settings.folder), names))]
+
+
+def begin_anew_if_changed(study: Study) -> None:
+    """Forget the trials of an extended study that was another one; its episodes are kept."""
+    with locked(study.settings.folder), Store.open(study.settings.folder) as store:
+        try:
+            check_facts(StudyRun(study, store))
+        except SettingsError:
+            store.begin(study_facts(study), study.objective.name)
+
+
+def _copy(source: Path, target: Path) -> None:
+    if source.is_dir():
+        shutil.copytree(source, target, ignore=_ignored, dirs_exist_ok=True)
+    else:
+        shutil.copy2(source, target)
+
+
+def _ignored(folder: str, names: list[str]) -> set[str]:
+    """What is not copied of a folder's entries."""
+    made = shutil.ignore_patterns(*LEFT_OUT)(folder, names)
+    own = {name for name in names if any(Path(folder, name, one).exists() for one in A_FOLDER_OF_ITS_OWN)}
+    return made | own
+
+
+def _kept_effects(settings: StudySettings, model: Path) -> dict[str, Any]:
+    """Effects of the study's proxy and [domain] that the found model does not have."""
+    found = read_settings(model).section("effects").keys()
+    proxy = read_settings(settings.proxy).section("effects").values if settings.proxy else {}
+    own = settings.domain.section("effects").values
+    return {name: {**proxy.get(name, {}), **own.get(name, {})} for name in {**proxy, **own} if name not in found}
+
+
+def _from(folder: Path, path: Path) -> str:
+    return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()

@@ -1,0 +1,201 @@
+"""The righted agent on its way: beside the target in the proxy tuned before, and in the extended one after.
+
+A loop that has come to its end.
+The agent whose place among the others was wrong before and is right after.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proxytune.api.studies import StudyReport
+from proxytune.arrays import Floats
+from proxytune.domain import DomainFamily, make_episode
+from proxytune.errors import EpisodeError, StoreError
+from proxytune.loop.opening import Loop
+from proxytune.report.drive.document import parting
+from proxytune.report.drive.figure import episode_figure
+from proxytune.report.numbers import short
+from proxytune.report.page.parts import Picture
+from proxytune.report.style import plain
+from proxytune.report.writing import save, write_text
+from proxytune.seeds import episode_seed
+from proxytune.study import SideBySide, can_record, drive_side_by_side, load_family
+from proxytune.usefulness import Assessment, dominance
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A loop that has come to its end.
+
+    Attributes:
+        loop: Which one.
+        before: The study.
+        diagnosis: What `diagnose --json` prints of the log.
+        after: The extended study; None where nothing was found to extend the proxy by.
+        held_out: What held-out agents say of both tuned proxies; None where there are none, or nothing was found.
+        done: The steps that this run has done or gone on with.
+        episodes: How many episodes this run has driven.
+    """
+
+    loop: Loop
+    before: StudyReport
+    diagnosis: Mapping[str, Any]
+    after: StudyReport | None
+    held_out: tuple[Assessment, Assessment] | None
+    done: tuple[str, ...]
+    episodes: int
+
+
+def righted(closed: Closed) -> dict[str, Any] | None:
+    """The agent that most wrongly ordered pairs lose, a held-out one where there are any; None where none loses any."""
+    if closed.after is None:
+        return None
+    both = closed.held_out or (closed.before.result.judged, closed.after.result.judged)
+    before, after = map(wrong_pairs, both)
+    agents = both[0].inputs.agents
+    gains = [before[agent] - after[agent] for agent in agents]
+    if max(gains) <= 0.0:
+        return None
+    agent = agents[int(np.argmax(gains))]
+    return {"agent": agent, "wrong_pairs_before": before[agent], "wrong_pairs_after": after[agent]}
+
+
+def wrong_pairs(assessment: Assessment) -> dict[str, float]:
+    """How many pairs with each agent proxy and target order differently; a tie of one side alone counts half."""
+    inputs = assessment.inputs
+    proxy, target = (_dominance(table.means, assessment) for table in (inputs.proxy, inputs.target))
+    return dict(zip(inputs.agents, np.abs(proxy - target).sum(axis=1).tolist(), strict=True))
+
+
+def _dominance(means: Floats, assessment: Assessment) -> Floats:
+    return dominance(means, assessment.inputs.metrics)
+
+
+MOST_STARTS = 4
+"""The start that is shown is one of the first so many: each is driven to choose it."""
+
+
+class BothEpisodes(NamedTuple):
+    """The same episode beside the target in both tuned proxies."""
+
+    before: SideBySide
+    after: SideBySide
+
+
+def pictures_file(home: Path) -> Path:
+    """Where a loop keeps titles and captions of the pictures that lie beside them."""
+    return home / "righted" / "pictures.json"
+
+
+def write_pictures(closed: Closed) -> None:
+    """Drive the righted agent, and keep a picture of it before and after; none without such an agent, or a twin.
+
+    Raises:
+        RunError: If they cannot be written.
+    """
+    path, gain = pictures_file(closed.loop.home), righted(closed)
+    both = drive_both(closed, gain["agent"]) if gain else None
+    texts = []
+    if gain and both:
+        metrics = [metric.name for metric in closed.loop.settings.metrics]
+        for name, pair, caption in zip(BothEpisodes._fields, both, _captions(closed, gain, both), strict=True):
+            save(episode_figure(pair, metrics), path.with_name(f"{name}.png"))
+            title = f"{gain['agent']} beside the target, {name}"
+            texts.append({"file": f"{name}.png", "title": title, "caption": caption})
+    write_text(path, json.dumps(texts, indent=2) + "\n")
+
+
+def read_pictures(home: Path) -> list[Picture]:
+    """The pictures that were kept.
+
+    Raises:
+        StoreError: If they cannot be read.
+    """
+    path = pictures_file(home)
+    try:
+        texts = json.loads(path.read_text(encoding="utf-8"))
+        return [
+            Picture(_text(one["title"]), path.with_name(one["file"]).read_bytes(), _text(one["caption"]))
+            for one in texts
+        ]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        raise StoreError(f"{path}: cannot be read; remove it to draw the righted agent again") from None
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError("not a text")
+    return value
+
+
+def drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
+    """Drive an agent from the start in which the proxy before is furthest from the target; None without a twin."""
+    loop = closed.loop
+    if loop.twin is None or closed.after is None or not can_record(loop.family):
+        return None
+    twin = load_family(loop.settings, loop.twin)
+    known = [pair for start in _starts(closed) if (pair := _drive(closed.before, twin, agent, start))]
+    if not known:
+        return None
+    start = max(known, key=mean_gap_m).episode.start
+    before, after = (_drive(report, twin, agent, start, filmed=True) for report in (closed.before, closed.after))
+    return BothEpisodes(before, after) if before and after else None
+
+
+def mean_gap_m(pair: SideBySide) -> float:
+    """How far proxy and target are apart on average [m]; a robot whose episode has ended stays where it is."""
+    sides = [episode.poses for episode in pair.sides.values()]
+    times = max((poses["time"] for poses in sides), key=lambda time: float(time[-1]))
+    here, there = ([np.interp(times, poses["time"], poses[name]) for name in ("x", "y")] for poses in sides)
+    return float(np.hypot(*np.subtract(here, there)).mean())
+
+
+def _drive(
+    report: StudyReport, twin: DomainFamily, agent: str, start: int, *, filmed: bool = False
+) -> SideBySide | None:
+    """The episode that `drive` shows of a study; None where it fails, or places are not kept."""
+    study = report.result.study
+    episode = make_episode(report.theta, agent=agent, start=start, seed=episode_seed(study.settings.seed, start))
+    try:
+        pair = drive_side_by_side(study.family, twin, episode, filmed=filmed)
+    except EpisodeError:
+        return None
+    return pair if all(side.has_places for side in pair.sides.values()) else None
+
+
+def _starts(closed: Closed) -> range:
+    return range(min(MOST_STARTS, closed.loop.settings.starts))
+
+
+def _captions(closed: Closed, gain: dict[str, Any], both: BothEpisodes) -> tuple[str, str]:
+    metrics = [metric.name for metric in closed.loop.settings.metrics]
+    before, after = (f"{parting(pair)} {_scores(pair, metrics)}" for pair in both)
+    rest = "This is one episode; the order of the agents counts every start, under other seeds."
+    return (
+        f"{_introduction(closed, gain, both.before)} {before}",
+        f"The same start and seed in the extended proxy. {after} {rest}",
+    )
+
+
+def _introduction(closed: Closed, gain: dict[str, Any], pair: SideBySide) -> str:
+    agent, start, starts = gain["agent"], pair.episode.start, _starts(closed)
+    pairs = f"{short(gain['wrong_pairs_before'])} before, {short(gain['wrong_pairs_after'])} after"
+    chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
+    return (
+        f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
+        f"under the same seed from start {start}{chosen}."
+    )
+
+
+def _scores(pair: SideBySide, metrics: list[str]) -> str:
+    """The compared metrics of proxy and target, as a sentence."""
+    values = [
+        ", ".join(f"{plain(name)} {short(side.metrics[name])} {pair.units[name]}".rstrip() for name in metrics)
+        for side in pair.sides.values()
+    ]
+    return "; ".join(f"{side}: {value}" for side, value in zip(pair.sides, values, strict=True)).capitalize() + "."

@@ -1,0 +1,369 @@
+"""What a loop is about, checked before anything is driven.
+
+Agents that no tuning sees: how well each tuned proxy orders them.
+Steps that are kept: one whose output is there, made from the same inputs, is not done again.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from proxytune.api.recording import recordable
+from proxytune.domain import DomainFamily, Episode, Outcome
+from proxytune.driving import AGENTS, LaneFollowing
+from proxytune.errors import InputError, LogError, RunError, SettingsError, StoreError
+from proxytune.extensions import ask
+from proxytune.importing import Facts, open_log
+from proxytune.logs import Log
+from proxytune.report.writing import write_text
+from proxytune.running import Watcher
+from proxytune.scores import ScoreTable, read_scores
+from proxytune.seeds import fresh_seed
+from proxytune.settings import read_settings
+from proxytune.space import Theta
+from proxytune.storage import Store, locked
+from proxytune.study import (
+    LEARNING,
+    Study,
+    StudyRun,
+    StudySettings,
+    bare_family,
+    failure_of,
+    load_family,
+    plan,
+    read_study_settings,
+    read_target,
+    table,
+)
+from proxytune.usefulness import Assessment, assess, floor_of_repeats
+
+KEY = "held_out"
+FEWEST = 3
+"""Of fewer agents PRPV says nothing."""
+
+
+class HeldOut(NamedTuple):
+    """What held-out agents say of a proxy.
+
+    Attributes:
+        assessment: How useful it is for them.
+        episodes: How many episodes were driven now.
+    """
+
+    assessment: Assessment
+    episodes: int
+
+
+def held_out_of(settings: StudySettings, family: DomainFamily, *, driven: bool) -> tuple[str, ...]:
+    """The agents that study.toml holds out, else shipped ones that it does not use; empty where they are too few.
+
+    Args:
+        settings: Of the study.
+        family: Its family.
+        driven: Whether the target is driven; otherwise only agents that its table has can be held out.
+
+    Raises:
+        InputError: If one that study.toml names is tuned on, or has no rank: the target's table has no scores of it.
+    """
+    named = read_settings(settings.path).texts(KEY, ())
+    scored = scored_agents(settings)
+    used = {*settings.agents, *settings.loaded_agents}
+    for name in named:
+        if name in used:
+            raise settings.error(KEY, f"'{name}' is among the agents that are tuned on; take it out of one of them")
+        if name not in scored and not driven:
+            raise settings.error(KEY, f"the target's table has no scores of '{name}'; measure them, or take it out")
+    if named and len(named) < FEWEST:
+        raise settings.error(KEY, f"names {len(named)} of at least {FEWEST} agents; add some, or take the key out")
+    candidates = _shipped(settings) if driven else scored
+    others = [name for name in candidates if name not in used and _is_known(family, name)]
+    found = named or tuple(others)
+    return found if len(found) >= FEWEST else ()
+
+
+def check_held_out(settings: StudySettings, family: DomainFamily, names: tuple[str, ...]) -> None:
+    """Refuse agents that the family cannot run.
+
+    Raises:
+        InputError: With the agent's name.
+    """
+    for name in names:
+        try:
+            ask(f"check_agent('{name}') of {settings.family}", partial(family.check_agent, name))
+        except InputError as problem:
+            raise settings.error(KEY, str(problem)) from None
+
+
+def scored_agents(settings: StudySettings) -> tuple[str, ...]:
+    """The agents that the target's table has."""
+    if not all(path.is_file() for path in settings.targets):
+        return ()
+    metrics = [metric.name for metric in settings.metrics]
+    return read_scores(settings.targets, metrics, columns=settings.target_columns).agents
+
+
+def _shipped(settings: StudySettings) -> tuple[str, ...]:
+    """The agents that come with the family; one that names its agents otherwise is asked without its guard."""
+    return tuple(AGENTS) if isinstance(bare_family(settings, settings.proxy), LaneFollowing) else ()
+
+
+def _is_known(family: DomainFamily, name: str) -> bool:
+    try:
+        family.check_agent(name)
+    except InputError:
+        return False
+    return True
+
+
+def held_out_settings(settings: StudySettings, names: tuple[str, ...], target: Path | None = None) -> StudySettings:
+    """The same study with these agents, and the target's scores of them from another file if one is given."""
+    known = replace(settings, agents=names)
+    return known if target is None else replace(known, target=target, more_targets=(), target_columns={})
+
+
+def drive_held_out(study: Study, settings: StudySettings, theta: Theta, watcher: Watcher) -> HeldOut:
+    """Drive held-out agents in the instance of a study's family, twice from each start, and assess it.
+
+    Episodes are kept in the study's own database, and those that are there are not driven again. The second time is
+    for the noise floor: what the instance scores against itself.
+
+    Args:
+        study: The proxy's study.
+        settings: Its settings with held-out agents, and the target's scores of them.
+        theta: The instance.
+        watcher: Hears of every episode.
+
+    Raises:
+        RunError: If an agent has no episode that works.
+    """
+    held = replace(study, settings=settings, target=read_target(settings, study.family)[0])
+    seeds = [fresh_seed(settings.seed, repetition) for repetition in (1, 2)]
+    with locked(study.settings.folder), Store.open(study.settings.folder) as store:
+        run = StudyRun(held, store, watcher)
+        once, again = (_scores(run, plan(settings, theta, seed)) for seed in seeds)
+    floor = floor_of_repeats(domain=once, again=again, metrics=settings.metrics)
+    return HeldOut(assess(proxy=once, target=held.target, metrics=settings.metrics, floor=floor), run.spent.episodes)
+
+
+def _scores(run: StudyRun, planned: list[Episode]) -> ScoreTable:
+    outcomes = list(run.outcomes(planned, "held-out agents").values())
+    _check_worked(outcomes)
+    return table(outcomes)
+
+
+def _check_worked(outcomes: list[Outcome]) -> None:
+    worked = {outcome.episode.agent for outcome in outcomes if outcome.metrics is not None}
+    for outcome in outcomes:
+        if outcome.episode.agent not in worked:
+            raise RunError(f"held out: {failure_of(outcome)}; name other agents under {KEY} in study.toml")
+
+
+HOME = "loop"
+"""The folder of a loop, in that of its study."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop to be closed.
+
+    Attributes:
+        settings: What study.toml says.
+        family: The proxy's domain family.
+        robot: The robot that proxy and log are of.
+        twin: The model.toml of the target, where that is a simulator.
+        log: The target's log, a folder or what `import` reads; None: the twin is recorded.
+        held_out: Agents that the tuning does not see.
+    """
+
+    settings: StudySettings
+    family: DomainFamily
+    robot: str
+    twin: Path | None
+    log: Path | None
+    held_out: tuple[str, ...]
+
+    @property
+    def home(self) -> Path:
+        """Where all is kept that the loop makes."""
+        return self.settings.folder / HOME
+
+    @property
+    def facts(self) -> Facts:
+        """What a source that is no log's folder does not say: the study's robot and map."""
+        road = self.settings.domain.get("map", "small_loop")
+        return Facts(self.robot, road=str(self.settings.folder.resolve() / road) if road.endswith(".toml") else road)
+
+
+def open_loop(study: Path, twin: Path | None = None, log: Path | None = None) -> Loop:
+    """Read a study and check it, its twin, its log and its held-out agents.
+
+    Args:
+        study: The study's folder, or its study.toml.
+        twin: The model.toml of the target; the study's `truth` if not given.
+        log: The target's log; recorded of the twin if not given.
+
+    Raises:
+        InputError: If any of them cannot be used.
+        StoreError: If the loop's folder cannot be written.
+    """
+    settings = read_study_settings(study)
+    if settings.families or settings.family_name:
+        raise settings.error("families", "`loop` is of one family; give it a study without this table")
+    if settings.objective == LEARNING:
+        raise settings.error("objective", "`loop` tunes by scores; give it a study with another objective than 'plv'")
+    family = load_family(settings, settings.proxy)
+    robot = getattr(family, "robot", None)
+    if not isinstance(robot, str):
+        raise settings.error("family", "`loop` diagnoses a robot's log, and this family names no robot")
+    twin = _twin(settings, twin, robot)
+    loop = Loop(settings, family, robot, twin, log, held_out_of(settings, family, driven=twin is not None))
+    check_held_out(settings, family, loop.held_out)
+    _check_log(loop)
+    _check_folder(loop.home)
+    return loop
+
+
+def _twin(settings: StudySettings, given: Path | None, robot: str) -> Path | None:
+    """The target's model, whose robot and equipment are the study's."""
+    path, named = (given, f"--twin {given}") if given else (settings.truth, f"{settings.path}: truth")
+    if path is None:
+        return None
+    if not path.is_file():
+        raise InputError(f"{named}: no such file: {path}; check the path")
+    try:
+        of_twin = getattr(load_family(settings, path), "robot", robot)
+    except SettingsError as problem:
+        raise SettingsError(f"{named}: {problem}") from None
+    if of_twin != robot:
+        raise InputError(f"{named}: is of the robot '{of_twin}', the study of '{robot}'; give a model of '{robot}'")
+    return path
+
+
+def _check_log(loop: Loop) -> None:
+    """Refuse a log of another robot, or none where nothing can be recorded."""
+    if loop.log is None:
+        if loop.twin is None:
+            raise InputError(
+                f"{loop.settings.path}: the target is no simulator; give a log of it by --log LOG, or its model.toml "
+                "by --twin or the key truth"
+            )
+        recordable(loop.settings, loop.twin)
+        return
+    with open_log(loop.log, facts=loop.facts) as (log, _):
+        if log.robot != loop.robot:
+            theirs = f"is of the robot '{log.robot}', the study of '{loop.robot}'"
+            raise LogError(f"{loop.log}: {theirs}; give a log of '{loop.robot}'")
+
+
+def _check_folder(home: Path) -> None:
+    try:
+        home.mkdir(exist_ok=True)
+    except OSError as problem:
+        raise StoreError(f"{home}: cannot be written ({problem.strerror}); copy the study elsewhere") from None
+    if not os.access(home, os.W_OK):
+        raise StoreError(f"{home}: cannot be written (permission denied); copy the study elsewhere")
+
+
+FILE_NAME = "loop.json"
+
+
+class Teller(Protocol):
+    """Hears how a loop goes."""
+
+    def say(self, line: str) -> None:
+        """A step begins, or there is something to be known at once."""
+        ...
+
+    def episodes(self, total: int) -> AbstractContextManager[Watcher]:
+        """So many episodes at most are driven."""
+        ...
+
+    def diagnosis(self, log: Log) -> AbstractContextManager[Callable[[str], None]]:
+        """A log is diagnosed; gives what hears of each step of that."""
+        ...
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of a loop.
+
+    Attributes:
+        name: What it is called.
+        inputs: A digest of all that its output depends on.
+        output: The file that is there once it is done.
+        do: Makes the output.
+    """
+
+    name: str
+    inputs: str
+    output: Path
+    do: Callable[[], object]
+
+
+class Kept:
+    """What a loop has done so far, in loop.json: each step's digest of its inputs, written once its output is there."""
+
+    def __init__(self, folder: Path) -> None:
+        """Read what is known.
+
+        Raises:
+            StoreError: If loop.json cannot be read.
+        """
+        self._path = folder / FILE_NAME
+        self._inputs: dict[str, str] = _read(self._path)
+
+    def inputs_of(self, name: str) -> str | None:
+        """The digest of the inputs that a step's output was made of; None where it was never done."""
+        return self._inputs.get(name)
+
+    def has(self, step: Step) -> bool:
+        """Whether a step is done."""
+        return self._inputs.get(step.name) == step.inputs and step.output.exists()
+
+    def run(self, step: Step) -> None:
+        """Do a step.
+
+        Raises:
+            RunError: If loop.json cannot be written.
+        """
+        self._write({name: inputs for name, inputs in self._inputs.items() if name != step.name})
+        step.do()
+        self._write({**self._inputs, step.name: step.inputs})
+
+    def _write(self, inputs: dict[str, str]) -> None:
+        # Until a step has been done again, what is left of its old output counts as none.
+        if inputs != self._inputs:
+            write_text(self._path, json.dumps({"format": 1, "steps": inputs}, indent=2) + "\n")
+        self._inputs = inputs
+
+
+def digest(*parts: Any) -> str:
+    """A digest of plain values."""
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()[:16]
+
+
+def digest_of_files(path: Path) -> str:
+    """A digest of a file, or of all files in a folder with their names; its hidden and compiled ones are left out."""
+    files = [path] if path.is_file() else _files_in(path)
+    return digest([(str(one.relative_to(path)), hashlib.sha256(one.read_bytes()).hexdigest()) for one in files])
+
+
+def _files_in(folder: Path) -> list[Path]:
+    files = sorted(one for one in folder.rglob("*") if one.is_file())
+    return [one for one in files if not one.name.startswith(".") and one.parent.name != "__pycache__"]
+
+
+def _read(path: Path) -> dict[str, str]:
+    try:
+        steps = json.loads(path.read_text(encoding="utf-8"))["steps"]
+        return {str(name): str(inputs) for name, inputs in steps.items()}
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise StoreError(f"{path}: cannot be read; remove it to do every step again") from None

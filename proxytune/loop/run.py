@@ -1,0 +1,380 @@
+"""The loop: tune, diagnose, extend, tune again, compare; whatever was done is kept.
+
+A closed loop as one JSON document and one page.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from proxytune.api.recording import record_log
+from proxytune.api.studies import StudyReport, most_episodes, run_opened
+from proxytune.driving import robot_home
+from proxytune.errors import InputError
+from proxytune.identity import versions_of
+from proxytune.loop.comparison import (
+    Compared,
+    answer,
+    chance_text,
+    compare_errors,
+    compare_prpv,
+    floor_text,
+    following,
+    lacking,
+    level_text,
+    prpv_figure,
+)
+from proxytune.loop.diagnosing import (
+    adds_something,
+    begin_anew_if_changed,
+    check_camera,
+    declared_names,
+    diagnose_target,
+    extension_text,
+    files_of,
+    read_diagnosis,
+    wanted_of,
+    write_extension,
+)
+from proxytune.loop.episodes import Closed, pictures_file, read_pictures, righted, write_pictures
+from proxytune.loop.opening import (
+    Kept,
+    Loop,
+    Step,
+    Teller,
+    digest,
+    digest_of_files,
+    drive_held_out,
+    held_out_settings,
+    scored_agents,
+)
+from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
+from proxytune.report.writing import png_of
+from proxytune.scores import write_scores
+from proxytune.seeds import target_seed
+from proxytune.storage import locked
+from proxytune.study import FILE_NAME, Study, StudySettings, as_document, code_of, measure, open_study
+from proxytune.usefulness import Assessment
+
+STEPS = {
+    "target": "the target's scores",
+    "study": "tuning without",
+    "log": "the target's log",
+    "diagnosis": "what does the proxy lack?",
+    "extension": "the proxy extended",
+    "extended study": "tuning again",
+    "held-out scores": "the target's scores of held-out agents",
+    "held-out agents": "held-out agents in both tuned proxies",
+    "righted agent": "the righted agent on its way",
+}
+"""The steps in their order, as they are told."""
+
+
+def close_loop(loop: Loop, teller: Teller) -> Closed:
+    """Do every step that is not done.
+
+    Stopped at any moment, it goes on when it is called again: what was finished is kept.
+
+    Raises:
+        ProxytuneError: From any step, as the command that does the same; what was finished is kept.
+    """
+    check_camera(loop)
+    with locked(loop.home):
+        return _Closing(loop, teller, Kept(loop.home)).run()
+
+
+@dataclass
+class _Closing:
+    """A loop on its way."""
+
+    loop: Loop
+    teller: Teller
+    kept: Kept
+    done: list[str] = field(default_factory=list)
+    episodes: int = 0
+
+    @property
+    def settings(self) -> StudySettings:
+        return self.loop.settings
+
+    def run(self) -> Closed:
+        self._measure_target()
+        before = self._tune("study", open_study(self.settings.path))
+        diagnosis = self._diagnose()
+        after, held_out = None, None
+        if adds_something(diagnosis):
+            after = self._tune("extended study", self._extend())
+            held_out = self._held_out(before, after)
+        closed = Closed(self.loop, before, diagnosis, after, held_out, (), self.episodes)
+        self._show_righted(closed)
+        return replace(closed, done=tuple(self.done))
+
+    def _begin(self, name: str, how: str = "") -> None:
+        place = list(STEPS).index(name) + 1
+        self.teller.say(f"step {place} of {len(STEPS)}, {STEPS[name]}{how and ': '}{how}")
+
+    def _keep(self, name: str, inputs: str, output: Path, do: Callable[[], object]) -> None:
+        """Do a step unless it is done."""
+        step = Step(name, inputs, output, do)
+        known = self.kept.has(step)
+        self._begin(name, "kept" if known else "")
+        if not known:
+            self.kept.run(step)
+            self.done.append(name)
+
+    def _measure_target(self) -> None:
+        """Measure the twin where the study has no scores of its target yet."""
+        settings, twin, name = self.settings, self.loop.twin, "target"
+        if twin is None or (settings.target.exists() and self.kept.inputs_of(name) is None):
+            self._begin(name, "given")
+            return
+        inputs = digest(name, twin.read_text(encoding="utf-8"), self._agents(settings.agents))
+        if settings.target.exists() and self.kept.inputs_of(name) != inputs:
+            raise InputError(
+                f"{settings.target}: was measured of another model, or of other agents, starts, seed, [domain] or "
+                "modules of your own; move it and study.db away to start again"
+            )
+        self._keep(name, inputs, settings.target, partial(self._measure, settings, settings.target))
+
+    def _measure(self, settings: StudySettings, output: Path) -> None:
+        assert self.loop.twin is not None
+        with self.teller.episodes(len(settings.agents) * settings.starts) as watcher:
+            scores = measure(settings, self.loop.twin, target_seed(settings.seed), watcher)
+        self.episodes += len(settings.agents) * settings.starts
+        write_scores(scores, output)
+
+    def _tune(self, name: str, study: Study) -> StudyReport:
+        """Run what is left of a study, and write its page."""
+        self._begin(name)
+        report = run_opened(study, self.teller.episodes(most_episodes(study.settings)), self.teller.say)
+        self.episodes += report.spent.episodes
+        if report.spent.episodes:
+            self.done.append(name)
+        if report.spent.episodes or not (study.settings.folder / "report.html").exists():
+            report.write()
+        return report
+
+    def _diagnose(self) -> Mapping[str, Any]:
+        """Diagnose the given log, or the twin's."""
+        loop, home = self.loop, self.loop.home / "diagnosed"
+        log, seen = self._record() if loop.log is None else (loop.log, digest_of_files(loop.log))
+        if loop.log is not None:
+            self._begin("log", "given")
+        robot = digest_of_files(robot_home(loop.robot, self.settings.folder))
+        made_by = (robot, code_of(self.settings), versions_of(["proxytune"]))
+        inputs = digest("diagnosis", seen, declared_names(loop), self.settings.seed, made_by)
+        do = partial(diagnose_target, loop, log, home, self.teller)
+        self._keep("diagnosis", inputs, home / "diagnosis.json", do)
+        return read_diagnosis(home)
+
+    def _record(self) -> tuple[Path, str]:
+        """Record the twin; the log, and a digest of what it was made of."""
+        loop, folder, wanted = self.loop, self.loop.home / "log", wanted_of(self.loop)
+        assert loop.twin is not None
+        twin, domain = loop.twin.read_text(encoding="utf-8"), self.settings.domain.values
+        inputs = digest("log", twin, domain, vars(wanted), code_of(self.settings), versions_of(["proxytune"]))
+        do = partial(record_log, self.settings, loop.twin, folder, wanted, lambda line: None)
+        self._keep("log", inputs, folder / "log.toml", do)
+        return folder, inputs
+
+    def _extend(self) -> Study:
+        """Write the extended study, and open it."""
+        settings, folder, model = (
+            self.settings,
+            self.loop.home / "extended",
+            self.loop.home / "diagnosed" / "model.toml",
+        )
+        files = [(path.name, digest_of_files(path)) for path in files_of(settings)]
+        inputs = digest("extension", extension_text(settings, model, folder), digest_of_files(model), files)
+        do = partial(write_extension, settings, model, folder)
+        self._keep("extension", inputs, folder / FILE_NAME, do)
+        study = open_study(folder)
+        begin_anew_if_changed(study)
+        return study
+
+    def _held_out(self, before: StudyReport, after: StudyReport) -> tuple[Assessment, Assessment] | None:
+        """Drive the held-out agents in both tuned proxies."""
+        names, name = self.loop.held_out, "held-out agents"
+        if not names:
+            self._begin(name, "there are none")
+            return None
+        target = self._held_out_target(names)
+        self._begin(name)
+        studies = [(report.result.study, report.theta) for report in (before, after)]
+        with self.teller.episodes(4 * len(names) * self.settings.starts) as watcher:
+            driven = [
+                drive_held_out(study, held_out_settings(study.settings, names, target), theta, watcher)
+                for study, theta in studies
+            ]
+        episodes = sum(one.episodes for one in driven)
+        self.episodes += episodes
+        self.done += [name] if episodes else []
+        return driven[0].assessment, driven[1].assessment
+
+    def _show_righted(self, closed: Closed) -> None:
+        """Draw the righted agent's episodes, where there is a proxy after."""
+        if closed.after is None:
+            return
+        name, twin, home = "righted agent", self.loop.twin, self.loop.home
+        seen = twin and twin.read_text(encoding="utf-8"), digest_of_files(home / "diagnosed" / "model.toml")
+        thetas = [dict(report.theta) for report in (closed.before, closed.after)]
+        metrics = [metric.name for metric in self.settings.metrics]
+        inputs = digest(name, righted(closed), seen, thetas, metrics, self._agents(self.settings.agents))
+        self._keep(name, inputs, pictures_file(home), partial(write_pictures, closed))
+
+    def _held_out_target(self, names: tuple[str, ...]) -> Path | None:
+        """The target's scores of held-out agents: a file of their own, or None where the study's table has them."""
+        name, output = "held-out scores", self.loop.home / "held_out.csv"
+        if self.loop.twin is None or set(names) <= set(scored_agents(self.settings)):
+            self._begin(name, "given")
+            return None
+        inputs = digest(name, self.loop.twin.read_text(encoding="utf-8"), self._agents(names))
+        do = partial(self._measure, held_out_settings(self.settings, names), output)
+        self._keep(name, inputs, output, do)
+        return output
+
+    def _agents(self, names: tuple[str, ...]) -> list[Any]:
+        """What scores of a domain depend on besides its model."""
+        settings, code = self.settings, code_of(held_out_settings(self.settings, names))
+        return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]
+
+
+COLUMNS = ("", "before", "after", "noise floor before; after", "a random ranking")
+PACKAGES = ("proxytune", "numpy", "scipy", "pybullet")
+PICTURES = {
+    "effect_curve": ("The effect", "What was measured against what the simulator did without it, and with it."),
+    "learnt": ("What was learnt", "Curves over what the robot does, for what no named effect explains."),
+    "error": (
+        "Motion error",
+        "Error of predicted positions by how far ahead, on drives that were not fitted; lower is better.",
+    ),
+    "camera_markings": (
+        "Markings",
+        "The map's markings as the declared camera draws them on frames, and as the extended one does.",
+    ),
+}
+"""Figures of `diagnose` that the page shows where they are there: title and caption."""
+
+
+def rows_of(closed: Closed) -> list[Compared]:
+    """Every measure before and after: PRPV, of held-out agents too, then the errors."""
+    after = None if closed.after is None else closed.after.result.judged
+    rows = [compare_prpv("prpv", "the agents tuned on", closed.before.result.judged, after)]
+    if closed.held_out:
+        names = len(closed.loop.held_out)
+        rows.append(compare_prpv("held_out", f"{names} agents that no tuning saw", *closed.held_out))
+    errors = compare_errors(closed.diagnosis)
+    if closed.after is None:
+        errors = [Compared(row.key, row.title, row.unit, row.before, None) for row in errors]
+    return rows + errors
+
+
+def document_of(closed: Closed) -> dict[str, Any]:
+    """Everything that `loop --json` prints but for its files; what differs from run to run is under `this_run`."""
+    rows = {row.key: _row(row) for row in rows_of(closed)}
+    held_out = {"agents": list(closed.loop.held_out), **rows.pop("held_out", {"before": None, "after": None})}
+    camera = closed.diagnosis["camera"] or {}
+    reports = (("before", closed.before), ("after", closed.after))
+    return {
+        "study": closed.loop.settings.name,
+        "sentence": answer(closed.diagnosis, rows_of(closed)),
+        "next": _following(closed),
+        "steps": list(STEPS) if closed.after else list(STEPS)[:4],
+        "verdict": closed.diagnosis["verdict"],
+        "effects": closed.diagnosis["effects"],
+        "camera": {"verdict": camera["verdict"], "effects": camera["effects"]} if camera else None,
+        "theta": {side: None if report is None else report.theta for side, report in reports},
+        "prpv": {**rows.pop("prpv"), "held_out": held_out},
+        "error": closed.diagnosis.get("error"),
+        "errors": rows,
+        "righted": righted(closed),
+        "this_run": {"steps": list(closed.done), "episodes": closed.episodes},
+    }
+
+
+def page_of(closed: Closed, command: str, date: str) -> Page:
+    """The page.
+
+    Args:
+        closed: The loop.
+        command: The command that makes it, as typed in a shell.
+        date: When it was written.
+    """
+    rows = rows_of(closed)
+    prpv = [row for row in rows if row.key in ("prpv", "held_out")]
+    values = {key: value for key, value in as_document(closed.loop.settings).items() if value not in (None, {}, [])}
+    settings = tuple((key, _text(value)) for key, value in values.items() if key != "path")
+    caption = "PRPV of the best θ on fresh episodes with 95 % intervals; grey: what a perfect proxy scores."
+    shown = []
+    if closed.after:
+        first = Picture("PRPV before and after", png_of(prpv_figure(prpv)), caption)
+        shown = [first, *read_pictures(closed.loop.home)]
+    return Page(
+        title=f"{closed.loop.settings.name}: the loop closed",
+        answer=answer(closed.diagnosis, rows),
+        following=_following(closed),
+        parts=(_table(closed, rows), *shown, *_found(closed), _words(closed)),
+        foot=Foot(command, settings, tuple(versions_of(PACKAGES).items()), date),
+    )
+
+
+def table_rows(rows: list[Compared]) -> list[tuple[str, ...]]:
+    """The table's cells as COLUMNS says."""
+    return [
+        (
+            f"{row.title}, 0 to {row.most}" if row.most else row.title,
+            level_text(row.before, row.unit),
+            level_text(row.after, row.unit),
+            "; ".join(dict.fromkeys(floor_text(level, row.unit) for level in (row.before, row.after) if level)),
+            "; ".join(dict.fromkeys(chance_text(level) for level in (row.before, row.after) if level)),
+        )
+        for row in rows
+    ]
+
+
+def notes_of(closed: Closed) -> list[str]:
+    """What the table does not hold."""
+    counted = "PRPV (proxy relative predictivity value) counts wrongly ordered pairs of agents at the best θ"
+    notes = [f"{counted}; in brackets 95 % intervals"]
+    if closed.after and not closed.held_out:
+        notes.append(
+            "no agent was held out: name at least three under held_out in study.toml that the target has scores of"
+        )
+    return notes
+
+
+def _table(closed: Closed, rows: list[Compared]) -> Table:
+    return Table("Before and after", COLUMNS, tuple(table_rows(rows)), tuple(notes_of(closed)))
+
+
+def _words(closed: Closed) -> Words:
+    found = lacking(closed.diagnosis) or "nothing that has a name"
+    paragraphs = (
+        f"Found: {found}; verdict: {closed.diagnosis['verdict']}.",
+        f"Before: {closed.before.sentence}",
+        *((f"After: {closed.after.sentence}",) if closed.after else ()),
+    )
+    return Words("What each step said", paragraphs)
+
+
+def _found(closed: Closed) -> list[Picture]:
+    """The figures that `diagnose` wrote."""
+    home = closed.loop.home / "diagnosed"
+    there = {name: home / f"{name}.png" for name in PICTURES if (home / f"{name}.png").is_file()}
+    return [Picture(PICTURES[name][0], path.read_bytes(), PICTURES[name][1]) for name, path in there.items()]
+
+
+def _following(closed: Closed) -> str:
+    last, model = closed.after or closed.before, closed.loop.home / "diagnosed" / "model.toml"
+    return following(closed.diagnosis, last.sentence, str(model) if closed.after else "", last.theta)
+
+
+def _row(row: Compared) -> dict[str, Any]:
+    levels = {"before": asdict(row.before), "after": None if row.after is None else asdict(row.after)}
+    return levels | ({"most": row.most} if row.most else {"unit": row.unit})
+
+
+def _text(value: Any) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -1,0 +1,339 @@
+"""Score tables as CSV files.
+
+The cells of a score table's file: by commas, semicolons or tabs, with decimal points or commas.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.errors import ScoresError
+from proxytune.files import draft_of
+from proxytune.scores.table import LARGEST, ScoreTable
+from proxytune.settings import nearest, read_text
+
+LABELS = ("agent", "episode", "domain")
+SEPARATORS = (",", ";", "\t")
+Columns = Mapping[str, str]
+"""What a column is called in a file, by what it is called here: `{"agent": "policy"}`."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """What stands in a file.
+
+    Attributes:
+        path: The file.
+        named: Its columns, as the file names them.
+        header: The same, those of a column map by the names they have here.
+        lines: The line number of each row.
+        cells: The cells of each row by column: labels and the metrics asked for.
+        decimal: What numbers have before their fractions.
+    """
+
+    path: Path
+    named: Sequence[str]
+    header: Sequence[str]
+    lines: Sequence[int]
+    cells: Mapping[str, Sequence[str]]
+    decimal: str = "."
+
+    def label(self, name: str) -> Sequence[str]:
+        """The labels of this kind, one per row; empty ones where the file has no such column.
+
+        Raises:
+            ScoresError: If one is empty in the file.
+        """
+        labels = self.cells.get(name)
+        if labels is None:
+            return [""] * len(self.lines)
+        if "" in labels:
+            raise ScoresError(
+                f"{self.path}: line {self.lines[labels.index('')]}, column '{name}': is empty; fill it in"
+            )
+        return labels
+
+    def numbers(self, columns: Sequence[str]) -> Floats:
+        """The numbers of these columns, shape (rows, columns).
+
+        Raises:
+            ScoresError: If one is none, or too large.
+        """
+        values = np.empty((len(self.lines), len(columns)))
+        for place, name in enumerate(columns):
+            values[:, place] = [_number(cell.replace(self.decimal, ".")) for cell in self.cells[name]]
+        for row, place in np.argwhere(~(np.abs(values) < LARGEST)):
+            where, cell = f"line {self.lines[row]}, column '{columns[place]}'", self.cells[columns[place]][row]
+            remedy = "; give it in another unit" if math.isfinite(values[row, place]) else ""
+            raise ScoresError(f"{self.path}: {where}: must be a finite number, got {cell!r}{remedy}")
+        return values
+
+
+def read_cells(path: Path, metrics: Sequence[str], columns: Columns | None = None) -> Cells:
+    """Read a file of scores.
+
+    Args:
+        path: CSV, its columns separated by commas, semicolons or tabs; with the latter two, decimals may have commas.
+        metrics: The columns that it must have besides that of the agents.
+        columns: What columns are called in the file; one that is not there may have its name from here.
+
+    Raises:
+        ScoresError: If it cannot be read, or lacks a column.
+    """
+    text = _text(path)
+    separator = _separator(text)
+    rows = _rows(path, text, separator)
+    named = _first(path, rows)
+    header = _renamed(path, named, columns or {})
+    _check_header(path, header, metrics)
+    lines, cells = _columns(path, rows, header, {*LABELS, *metrics})
+    found = Cells(path, named, header, lines, cells)
+    return found if separator == "," else replace(found, decimal=_decimal(found, metrics))
+
+
+def _number(text: str) -> float:
+    """A number as tables have it; NaN for what is none, be it one to Python, as 1_000 is."""
+    try:
+        return float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        return math.nan
+
+
+def column_names(path: Path) -> list[str]:
+    """The columns of a file, as its first line names them.
+
+    Raises:
+        ScoresError: If it cannot be read.
+    """
+    text = _text(path)
+    return _first(path, _rows(path, text, _separator(text)))
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_text(path, "utf-8-sig")
+    except FileNotFoundError:
+        raise ScoresError(f"{path}: no such file; check the path") from None
+    except OSError as problem:
+        raise ScoresError(f"{path}: cannot be read ({problem.strerror})") from None
+    except UnicodeDecodeError:
+        raise _no_csv(path) from None
+
+
+def _separator(text: str) -> str:
+    """What separates the columns that the first line names; a comma where nothing does."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    return max(SEPARATORS, key=first.count)
+
+
+def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of each line that is not empty."""
+    lines = io.TextIOWrapper(io.BytesIO(text.encode()), encoding="utf-8", newline="")
+    reader = csv.reader(lines, strict=True, delimiter=separator)
+    try:
+        for cells in reader:
+            if cells:
+                yield reader.line_num, cells
+    except csv.Error:
+        raise _no_csv(path) from None
+
+
+def _first(path: Path, rows: Iterator[tuple[int, list[str]]]) -> list[str]:
+    """The names in the first line."""
+    _, cells = next(rows, (0, []))
+    if not cells:
+        raise ScoresError(f"{path}: is empty; its first line must name the columns, agent and metrics among them")
+    return [cell.strip() for cell in cells]
+
+
+def _columns(
+    path: Path, rows: Iterable[tuple[int, list[str]]], header: Sequence[str], names: Collection[str]
+) -> tuple[list[int], dict[str, list[str]]]:
+    """Line numbers, and the cells of the columns of these names."""
+    places = {name: header.index(name) for name in names if name in header}
+    cells: dict[str, list[str]] = {name: [] for name in places}
+    lines = []
+    for line, row in rows:
+        if len(row) != len(header):
+            raise ScoresError(
+                f"{path}: line {line}: has {len(row)} cells, but the first line names {len(header)} columns"
+            )
+        lines.append(line)
+        for name, place in places.items():
+            cells[name].append(row[place].strip())
+    return lines, cells
+
+
+def _no_csv(path: Path) -> ScoresError:
+    return ScoresError(f"{path}: is not a CSV file; save it as comma-separated text (UTF-8)")
+
+
+def _renamed(path: Path, header: Sequence[str], columns: Columns) -> list[str]:
+    """The columns by their names here; another column that has such a name is out of the way."""
+    ours = {theirs: name for name, theirs in columns.items() if theirs in header}
+    return [ours.get(name, f"{name} of the file" if name in ours.values() else name) for name in header]
+
+
+def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> None:
+    found = f"columns found: {', '.join(header)[:60]}"
+    if "agent" not in header:
+        remedy = f"rename the one that names the agents, or give its name: --columns agent={header[0][:20]}"
+        remedy = f"{remedy} (in study.toml: target_columns)" if len(header) > 1 else "separate columns by commas"
+        raise ScoresError(f"{path}: no column 'agent'; {found}; {remedy}")
+    for name in metrics:
+        if name not in header:
+            others = [column for column in header if column not in LABELS]
+            raise ScoresError(f"{path}: no column '{name}'; {nearest(name, others)}")
+    for name in (*LABELS, *metrics):
+        if header.count(name) > 1:
+            raise ScoresError(f"{path}: the first line names the column '{name}' twice; rename one")
+
+
+def _decimal(found: Cells, metrics: Sequence[str]) -> str:
+    """What the numbers of a file have before their fractions.
+
+    Raises:
+        ScoresError: If some have a comma and some a point: one of them may separate thousands.
+    """
+    numbers = [
+        (line, name, cell) for name in metrics for line, cell in zip(found.lines, found.cells[name], strict=True)
+    ]
+    commas, points = (next((one for one in numbers if mark in one[2]), None) for mark in ",.")
+    if commas and points:
+        line, name, cell = commas
+        other = f"line {points[0]} has {points[2]!r}"
+        raise ScoresError(
+            f"{found.path}: line {line}, column '{name}': {cell!r} has a comma, but {other}; write all alike"
+        )
+    return "," if commas else "."
+
+
+Files = str | Path | Sequence[str | Path]
+"""A file, or several that make one table."""
+Row = tuple[str, str, str]
+"""Domain, agent and episode."""
+
+
+def read_scores(
+    path: Files, metrics: Iterable[str], domain: str | None = None, columns: Columns | None = None
+) -> ScoreTable:
+    """Read the scores of one domain from a CSV file, or from several that make one table.
+
+    Columns are separated by commas, semicolons or tabs; with the latter two, decimals may be written with a comma.
+
+    Args:
+        path: CSV with the columns agent, episode (not needed for one row per agent), domain (optional) and metrics; or
+            several such files.
+        metrics: The columns to read; others are ignored.
+        domain: Which domain, where there are several.
+        columns: What columns are called in the file where that is another name, as in {"agent": "policy"}.
+
+    Raises:
+        ScoresError: If the file is not such a table, naming line and column.
+    """
+    tables, path = read_domains(path, metrics, columns), " and ".join(map(str, _files(path)))
+    if domain is None:
+        if len(tables) > 1:
+            example = next(iter(tables))
+            raise ScoresError(f"{path}: has the domains {', '.join(tables)}; choose one, as in {path}:{example}")
+        return next(iter(tables.values()))
+    if "" in tables:
+        raise ScoresError(f"{path}: has no column 'domain'; drop ':{domain}'")
+    if domain not in tables:
+        raise ScoresError(f"{path}: no domain '{domain}'; {nearest(domain, tables)}")
+    return tables[domain]
+
+
+def read_domains(path: Files, metrics: Iterable[str], columns: Columns | None = None) -> dict[str, ScoreTable]:
+    """Read every domain of a CSV file or of several, in their order; without a domain column the only one is "".
+
+    Raises:
+        ScoresError: As in read_scores.
+    """
+    names = tuple(metrics)
+    files = [read_cells(file, names, columns) for file in _files(path)]
+    _check_alike(files)
+    _check_columns(files, columns or {})
+    bare = next((cells for cells in files if not cells.lines), None)
+    if bare:
+        raise ScoresError(f"{bare.path}: has no rows; add one per agent and episode")
+    domain, agent, episode = (
+        [one for cells in files for one in cells.label(name)] for name in ("domain", "agent", "episode")
+    )
+    _check_single(files, list(zip(domain, agent, episode, strict=True)))
+    values = np.concatenate([cells.numbers(names) for cells in files])
+    rows: dict[str, list[int]] = {}
+    for row, name in enumerate(domain):
+        rows.setdefault(name, []).append(row)
+    return {
+        name: ScoreTable.from_rows([agent[row] for row in own], [episode[row] for row in own], names, values[own])
+        for name, own in rows.items()
+    }
+
+
+def _files(path: Files) -> list[Path]:
+    """The files, be it one or several."""
+    return [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
+
+
+def _check_alike(files: Sequence[Cells]) -> None:
+    """Refuse files of which one numbers its episodes, or names domains, and another does not."""
+    for label, cells in [(label, cells) for label in LABELS for cells in files]:
+        other = next((one for one in files if label in one.header), None)
+        if other and label not in cells.header:
+            raise ScoresError(f"{cells.path}: has no column '{label}', which {other.path} has; add it")
+
+
+def _check_columns(files: Sequence[Cells], columns: Columns) -> None:
+    """Refuse a column map of which a name is in no file."""
+    for name, theirs in columns.items():
+        if not any(theirs in cells.named for cells in files):
+            raise ScoresError(f"{files[0].path}: no column '{theirs}' for '{name}'; {nearest(theirs, files[0].named)}")
+
+
+def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:
+    """Refuse an episode that one agent drove twice in one domain."""
+    if len(set(rows)) == len(rows):
+        return
+    known: dict[Row, Path] = {}
+    places = ((cells, line) for cells in files for line in cells.lines)
+    for (cells, line), row in zip(places, rows, strict=True):
+        if row in known:
+            where = f", once in {known[row]}" if known[row] != cells.path else ""
+            raise ScoresError(f"{cells.path}: line {line}: {_duplicate(cells, row, where)}")
+        known[row] = cells.path
+
+
+def write_scores(table: ScoreTable, path: Path) -> None:
+    """Write a table as CSV, the same bytes for the same table; an interrupted write leaves the old file.
+
+    Raises:
+        ScoresError: If the file cannot be written.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["agent", "episode", *table.metrics])
+    for row, agent in enumerate(table.agents):
+        for column, episode in enumerate(table.episodes):
+            if table.driven[row, column]:
+                writer.writerow([agent, episode, *(repr(float(value)) for value in table.values[row, column])])
+    try:
+        with draft_of(path) as draft:
+            draft.write_text(text.getvalue(), encoding="utf-8", newline="")
+    except OSError as problem:
+        raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None
+
+
+def _duplicate(cells: Cells, row: Row, before: str) -> str:
+    domain, agent, episode = row
+    where = f" in domain '{domain}'{before}" if "domain" in cells.header else before
+    if "episode" in cells.header:
+        return f"agent '{agent}' has episode '{episode}' twice{where}; number the episodes"
+    remedy = "add a column 'episode', or give its name: --columns episode=NAME"
+    return f"agent '{agent}' is there twice{where}; {remedy}"

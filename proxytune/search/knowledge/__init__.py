@@ -1,1 +1,0 @@
-"""What the finished trials say of θ."""

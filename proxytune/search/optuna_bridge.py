@@ -1,0 +1,202 @@
+"""The trials of a search as other optimisers keep them: an Optuna storage, scikit-optimize's OptimizeResult.
+
+Optuna's tree-structured Parzen estimator, where Optuna is installed.
+PyTorch on one thread: with several, the last bit of a sum is anybody's guess, and a proposal would be too.
+"""
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+from threadpoolctl import threadpool_limits
+
+from proxytune.errors import InputError
+from proxytune.search.engine import Engine, Library, Look
+from proxytune.search.loop import Trial, Values
+from proxytune.seeds import proposal_seed
+from proxytune.space import Space, Theta
+
+
+@dataclass(frozen=True)
+class TreeParzen:
+    """Proposes what Optuna's TPE sampler suggests, with its defaults but for the start: the design stands in for it.
+
+    Optuna's study is built anew from the trials at every proposal, in memory, so nothing is remembered. Its sampler
+    weighs later trials more, so the order of the trials counts. Pending trials are running ones to it, which it takes
+    for bad ("constant liar").
+    """
+
+    def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
+        """The next point, a function of the seed and the trials in their order; those not pending need a score."""
+        import optuna
+
+        drawn = proposal_seed(seed, len(trials))
+        with quiet(optuna.logging):
+            sampler = optuna.samplers.TPESampler(n_startup_trials=1, seed=drawn, constant_liar=True)
+            return suggested(optuna, sampler, space, trials)
+
+
+def suggested(optuna: Any, sampler: Any, space: Space, trials: Sequence[Trial]) -> Values:
+    """What a sampler of Optuna suggests after these trials; pending ones are running to it."""
+    box = {i.name: optuna.distributions.FloatDistribution(i.low, i.high) for i in space.intervals}
+    study = optuna.create_study(sampler=sampler, direction="minimize")
+    for trial in trials:
+        theta = space.theta(trial.values)
+        state = optuna.trial.TrialState.RUNNING if trial.pending else optuna.trial.TrialState.COMPLETE
+        study.add_trial(optuna.trial.create_trial(params=theta, distributions=box, value=trial.score, state=state))
+    return space.values(study.ask(box).params)
+
+
+@contextmanager
+def quiet(logging: Any) -> Iterator[None]:
+    """Without the lines that Optuna writes: of every study, of what is experimental, of what would be faster."""
+    before = logging.get_verbosity()
+    logging.set_verbosity(logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.set_verbosity(before)
+
+
+TREE_PARZEN = Engine(
+    name="tpe",
+    label="Optuna's TPE",
+    summary="Optuna's tree-structured Parzen estimator with its defaults",
+    make=TreeParzen,
+    needs=Library(("optuna",), "Optuna", "tpe"),
+    look=Look("#009E73", "dashed"),
+)
+
+
+Value = float | int | str | None
+
+
+@dataclass(frozen=True)
+class PastTrial:
+    """A trial that has ended.
+
+    Attributes:
+        theta: Where it was.
+        state: Whether it was measured to its end, cut off before, or failed.
+        value: The objective there; None unless it was measured.
+        facts: What else is known of it, by name.
+    """
+
+    theta: Theta
+    state: Literal["finished", "cut", "failed"]
+    value: float | None
+    facts: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class History:
+    """What a search has tried.
+
+    Attributes:
+        name: What the search is called.
+        space: The box that was searched.
+        trials: In their order.
+        maximise: Whether more of the objective is better.
+        answer: The place in `trials` of the one that the search holds for the best.
+    """
+
+    name: str
+    space: Space
+    trials: tuple[PastTrial, ...]
+    maximise: bool
+    answer: int
+
+
+def write_optuna(history: History, path: Path) -> None:
+    """Write an Optuna storage, an SQLite file with one study of one trial per trial.
+
+    Of a trial that was cut off the state is PRUNED, of one that failed FAIL. What else is known of a trial is its user
+    attributes, and the study's `best_trial` the number, as Optuna counts, of the search's own answer.
+
+    Raises:
+        InputError: If Optuna is not installed.
+    """
+    try:
+        import optuna
+    except ImportError:
+        remedy = 'install it with: pip install "proxytune[tpe]"'
+        raise InputError(f"an Optuna storage needs Optuna, which is not installed; {remedy}") from None
+    with quiet(optuna.logging), TemporaryDirectory() as folder:
+        # An address has characters that mean something in it; the name of a user's file may have them too.
+        draft = Path(folder) / "storage.sqlite3"
+        storage = optuna.storages.RDBStorage(f"sqlite:///{draft}")
+        direction: Literal["minimize", "maximize"] = "maximize" if history.maximise else "minimize"
+        study = optuna.create_study(storage=storage, study_name=history.name, direction=direction)
+        study.add_trials([_optuna_trial(optuna, history.space, trial) for trial in history.trials])
+        study.set_user_attr("best_trial", history.answer)
+        storage.remove_session()
+        storage.engine.dispose()
+        path.write_bytes(draft.read_bytes())
+
+
+def _optuna_trial(optuna: Any, space: Space, trial: PastTrial) -> Any:
+    states = optuna.trial.TrialState
+    return optuna.trial.create_trial(
+        state={"finished": states.COMPLETE, "cut": states.PRUNED, "failed": states.FAIL}[trial.state],
+        params={name: trial.theta[name] for name in space.names},
+        distributions={one.name: optuna.distributions.FloatDistribution(one.low, one.high) for one in space.intervals},
+        value=trial.value,
+        user_attrs=dict(trial.facts),
+    )
+
+
+def optimize_result(history: History) -> Any:
+    """scikit-optimize's OptimizeResult: x, fun, x_iters, func_vals, space.
+
+    Values are made small, so an objective that is to be large has its sign turned. Trials that were cut off or failed
+    have no value and are left out. `x` is the search's own answer and `fun` the value of its trial: the lowest of
+    `func_vals` would be partly luck.
+    """
+    import numpy as np
+    from scipy.optimize import OptimizeResult
+    from skopt.space import Real
+    from skopt.space import Space as Box
+
+    sign = -1.0 if history.maximise else 1.0
+    points = [[trial.theta[name] for name in history.space.names] for trial in history.trials]
+    measured = [place for place, trial in enumerate(history.trials) if trial.value is not None]
+    values = [sign * value for trial in history.trials if (value := trial.value) is not None]
+    found = OptimizeResult()
+    found.update(
+        x=points[history.answer],
+        fun=values[measured.index(history.answer)],
+        x_iters=[points[place] for place in measured],
+        func_vals=np.array(values),
+        space=Box([Real(one.low, one.high, name=one.name) for one in history.space.intervals]),
+        models=[],
+        random_state=None,
+        specs=None,
+    )
+    return found
+
+
+def write_skopt(history: History, path: Path) -> None:
+    """Write the OptimizeResult, to be read by `skopt.load`."""
+    from skopt import dump
+
+    dump(optimize_result(history), path)
+
+
+@contextmanager
+def on_one_thread() -> Iterator[None]:
+    """Hold PyTorch and the numerical libraries to one thread."""
+    import torch
+
+    before = torch.get_num_threads()
+    with threadpool_limits(limits=1):
+        torch.set_num_threads(1)
+        try:
+            yield
+        finally:
+            torch.set_num_threads(before)

@@ -1,0 +1,156 @@
+"""The engines by name.
+
+Which code something depends on: with code of another meaning, a finished run may not be what would be run today.
+"""
+
+import ast
+import inspect
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from proxytune.errors import ExtensionError, InputError
+from proxytune.extensions import load, plugins
+from proxytune.identity import meaning_of
+from proxytune.search.engine import RANDOM, SOBOL, AfterDesign, Engine, outside_proposer
+from proxytune.search.engines import botorch_nei, optuna_gp, scikit_optimize
+from proxytune.search.loop import Goal, Proposer
+from proxytune.search.optuna_bridge import TREE_PARZEN
+from proxytune.search.outcomes import COMPOSITE, OUTCOMES
+from proxytune.search.surrogate import GAUSSIAN_PROCESS
+from proxytune.settings import nearest
+
+FOLDER = Path(__file__).resolve().parent.parent
+ROOMS = ("search", "comparison")
+"""What a digest looks into: the ground floor and the simulators are not what proposes."""
+
+
+@cache
+def code_of(*modules: str) -> str:
+    """A digest of what modules of the search or a comparison mean, with all that they import of these."""
+    found: dict[str, Path] = {}
+    waiting = list(modules)
+    while waiting:
+        module = waiting.pop()
+        parts = module.split(".")[1:]
+        path = FOLDER.joinpath(*parts).with_suffix(".py")
+        if module not in found and parts[:1] and parts[0] in ROOMS and path.is_file():
+            found[module] = path
+            waiting.extend(_imported(path))
+    return meaning_of(found.values(), FOLDER)[:12]
+
+
+def _imported(path: Path) -> Iterator[str]:
+    """What a module imports, anywhere in it, by full names."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield str(node.module)
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+ENGINES: tuple[Engine, ...] = (
+    OUTCOMES,
+    COMPOSITE,
+    GAUSSIAN_PROCESS,
+    RANDOM,
+    SOBOL,
+    TREE_PARZEN,
+    scikit_optimize.ENGINE,
+    optuna_gp.ENGINE,
+    botorch_nei.ENGINE,
+)
+"""A new engine is a module of its own and a line here; each says all about itself (engine.py)."""
+
+NAMES = tuple(engine.name for engine in ENGINES)
+"""What can be compared."""
+STUDY_ENGINES = tuple(engine.name for engine in ENGINES if engine.in_studies)
+"""What a study may name."""
+DEFAULT_ENGINE = OUTCOMES.name
+SCORE_ENGINE = GAUSSIAN_PROCESS.name
+"""The default where a score has no parts."""
+
+
+def engine_of(name: str, beside: Path | None = None) -> Engine:
+    """The engine of this name; every look-up goes through here.
+
+    Args:
+        name: Of a shipped engine or of a plug-in, or `module:attribute` of one's own.
+        beside: The folder whose modules come before the installed ones.
+
+    Raises:
+        InputError: If there is no such engine, or it is none.
+    """
+    shipped = {engine.name: engine for engine in ENGINES}
+    if name not in shipped and ":" not in name and name not in plugins("engine", shipped):
+        raise InputError(f"unknown engine '{name}' (your own is written module:attribute); {nearest(name, NAMES)}")
+    engine = load(name, kind="engine", beside=beside, shipped=shipped)
+    if not isinstance(engine, Engine):
+        kind = type(engine).__name__
+        raise ExtensionError(f"engine '{name}' is a {kind}; make it a proxytune.search.engine.Engine")
+    return engine if engine.name == name else replace(engine, name=name)
+
+
+def why_not(name: str, *, composed: bool, beside: Path | None = None) -> str:
+    """Why an engine cannot be used, in one phrase; empty if it can.
+
+    Args:
+        name: Of the engine.
+        composed: Whether the score is computed from outcomes that are known.
+        beside: The folder whose modules come before the installed ones.
+    """
+    try:
+        return why_not_engine(engine_of(name, beside), composed=composed)
+    except InputError as problem:
+        return str(problem)
+
+
+def why_not_engine(engine: Engine, *, composed: bool) -> str:
+    """The same of an engine at hand."""
+    if engine.needs and not installed(engine):
+        modules, library, extra = engine.needs
+        verb = "are" if len(modules) > 1 else "is"
+        remedy = f"pip install 'proxytune[{extra}]', or use another engine"
+        return f"'{engine.name}' needs {library}, which {verb} not installed; {remedy}"
+    if engine.learns_from == "outputs" and not composed:
+        remedy = f"use '{SCORE_ENGINE}'"
+        return f"'{engine.name}' models what a score is computed from, and this one has no such parts; {remedy}"
+    return ""
+
+
+def installed(engine: Engine) -> bool:
+    """Whether the library that an engine needs is there."""
+    return engine.needs is None or all(find_spec(module) for module in engine.needs.modules)
+
+
+def make_proposer(engine: str | Engine, initial: int, goal: Goal | None = None) -> Proposer:
+    """The proposer of an engine, with so many trials from the quasi-random design first: all engines share it.
+
+    Args:
+        engine: The engine, or the name of a shipped one.
+        initial: How many trials come from the design.
+        goal: What the outputs of a trial are to come to; None where a score has no such parts.
+
+    Raises:
+        InputError: If there is no such engine, or it cannot be used.
+    """
+    engine = engine_of(engine) if isinstance(engine, str) else engine
+    reason = why_not_engine(engine, composed=goal is not None)
+    if reason:
+        raise InputError(reason)
+    if engine.name not in NAMES:
+        return AfterDesign(outside_proposer(engine, goal), initial)
+    return AfterDesign(engine.make(goal) if engine.learns_from == "outputs" else engine.make(), initial)
+
+
+def engine_code(engine: str | Engine) -> str:
+    """A digest of the code that an engine's proposals depend on."""
+    engine = engine_of(engine) if isinstance(engine, str) else engine
+    code = code_of(AfterDesign.__module__, engine.make.__module__)
+    if engine.name in NAMES:
+        return code
+    source = Path(inspect.getfile(engine.make))
+    return f"{code} {meaning_of([source], source.parent)[:12]}"

@@ -1,0 +1,266 @@
+"""A skeleton: the files of something to start from, and what to do with them.
+
+A study of a robot to start from, with a target to try it.
+A domain family to start from: a tiny simulator with all that a study asks of one.
+A robot to start from: two wheels, a caster and a camera, for both plants.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
+from string import Template
+from types import MappingProxyType
+
+from proxytune.driving import UNITS, Robot
+from proxytune.effects import PARAMETERS
+from proxytune.errors import InputError, SettingsError
+from proxytune.settings import nearest
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """What `new` writes.
+
+    Attributes:
+        files: Texts by file name.
+        next: The commands to type then.
+        notes: What was read and what is to be known, in one line each.
+    """
+
+    files: Mapping[str, str]
+    next: tuple[str, ...]
+    notes: tuple[str, ...] = field(default=())
+
+
+def fill(template: str, **values: object) -> str:
+    """A file of templates/ with its $names replaced."""
+    text = (files("proxytune.skeletons") / "templates" / template).read_text(encoding="utf-8")
+    return Template(text).substitute(values)
+
+
+AROUND_DEG = 10.0
+"""How far the box of the camera's pitch reaches to either side of the nominal one."""
+
+OFF_DEG = 4.0
+"""How far the pitch that is to be found is from the nominal one."""
+
+HIGHEST_DEG = 45.0
+
+
+def study_skeleton(name: str, robot: Robot) -> Skeleton:
+    """A study.toml for the plant that the robot can drive on, and a truth.toml.
+
+    Args:
+        name: Of the study's folder.
+        robot: Which one; it needs a camera.
+
+    Raises:
+        SettingsError: If it has no camera.
+    """
+    pitch = robot.camera_figures().pitch_deg
+    low, high = max(0.0, pitch - AROUND_DEG), min(HIGHEST_DEG, pitch + AROUND_DEG)
+    off = pitch + OFF_DEG if pitch + OFF_DEG < high else pitch - OFF_DEG
+    plant = _plant(robot)
+    study = fill(
+        "study.toml.txt", name=name, robot=robot.name, plant=plant, pitch_low=f"{low:g}", pitch_high=f"{high:g}"
+    )
+    return Skeleton(
+        {"study.toml": study, "truth.toml": fill("truth.toml.txt", robot=robot.name, pitch=f"{off:g}")},
+        commands(name),
+    )
+
+
+def commands(name: str) -> tuple[str, str]:
+    """What makes the target of a study, and what runs it."""
+    return (
+        f"python -m proxytune measure {name} --model {name}/truth.toml --output {name}/target.csv",
+        f"python -m proxytune study {name}",
+    )
+
+
+def _plant(robot: Robot) -> str:
+    try:
+        robot.body()
+    except SettingsError:
+        return "planar"
+    return "bullet"
+
+
+PAGE = "docs/extending.md"
+
+
+def family_skeleton(name: str) -> Skeleton:
+    """A module, a study of it, a truth.toml and a test.
+
+    Args:
+        name: Of the folder and of the module in it; a Python name.
+    """
+    templates = {
+        f"{name}.py": "family.py.txt",
+        "study.toml": "family_study.toml.txt",
+        "truth.toml": "family_truth.toml.txt",
+        f"test_{name}.py": "family_test.py.txt",
+    }
+    files = {file: fill(template, name=name, page=PAGE) for file, template in templates.items()}
+    note = f"put your simulator where {name}.py says EDIT ({PAGE}, 'Another simulator')"
+    return Skeleton(files, (*commands(name), f"PYTHONPATH={name} python -m pytest {name}/test_{name}.py"), (note,))
+
+
+GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
+    {
+        "wheel_radius": (0.033, "half a driven wheel's diameter"),
+        "wheel_distance": (0.16, "between the middles of the driven wheels"),
+        "full_speed": (0.5, "straight ahead at full duty"),
+        "motor_time_constant": (0.1, "time to 63 % of a new speed; 0 if at once"),
+        "camera_height": (0.11, "of the lens above the floor"),
+        "camera_pitch": (20.0, "how far the camera looks down"),
+        "effective_baseline": (0.16, "2 x full_speed / yaw rate when turning on the spot at full duty"),
+        "wheel_torque": (0.1, "stall torque of a wheel's motor"),
+        "mass": (1.0, "of the whole robot"),
+        "control_rate": (20.0, "how often an agent acts; divides 60"),
+        "camera_rate": (20.0, "pictures a second; divides 60"),
+        "camera_columns": (64.0, "a small picture, as wide to high as the camera's"),
+        "camera_rows": (48.0, "a small picture, as wide to high as the camera's"),
+        "camera_forward": (0.05, "of the lens ahead of the axle"),
+        "field_of_view": (70.0, "vertical, from the data sheet"),
+        "expert_look_ahead": (0.25, "for `teach` alone"),
+        "expert_speed": (0.2, "for `teach` alone"),
+        "expert_gain": (1.0, "for `teach` alone"),
+        "expert_disturbance": (0.1, "for `teach` alone"),
+    }
+)
+"""What is written where nothing is known of a figure, and how to know it."""
+
+SIX = ("wheel_radius", "wheel_distance", "full_speed", "motor_time_constant", "camera_height", "camera_pitch")
+"""What a skeleton's body and model are made of; the rest can wait."""
+
+HIGHEST = {
+    "motor_time_constant": PARAMETERS["motor_lag.time_constant"].high,
+    "camera_pitch": PARAMETERS["camera_pitch"].high,
+}
+"""The most that the effect of the same meaning may have."""
+
+LEAST_S = 0.05
+"""A motor is taken to be no faster than that where its torque is guessed [s]."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a robot's figures.
+
+    Attributes:
+        figures: Values by name, in the units of a robot.toml.
+        source: Where they come from.
+    """
+
+    figures: Mapping[str, float]
+    source: str
+
+
+def robot_skeleton(name: str, figures: Mapping[str, float]) -> Skeleton:
+    """A robot.toml and a URDF of its own, which agree with each other.
+
+    Args:
+        name: Of the robot and its folder.
+        figures: What is known of it; the rest is guessed and marked.
+
+    Raises:
+        InputError: If a figure is unknown or cannot be.
+    """
+    check_figures(figures)
+    values = completed(figures)
+    return Skeleton(
+        {
+            "robot.toml": robot_text(name, values, (Known(figures, "given to `new robot`"),)),
+            f"{name}.urdf": fill("body.urdf.txt", name=name, **_dimensions(values)),
+        },
+        then(name),
+        (f"what is not known of {name} is marked EDIT in robot.toml; its wheels are in {name}.urdf too",),
+    )
+
+
+def then(name: str) -> tuple[str, ...]:
+    """What to type once a robot is there."""
+    return ("python -m proxytune list robots", f"python -m proxytune new study {name}_study --robot {name}")
+
+
+def check_figures(figures: Mapping[str, float]) -> None:
+    """Refuse figures that a robot.toml does not have, and values that none can have.
+
+    Raises:
+        InputError: With the figure's name.
+    """
+    for figure, value in figures.items():
+        if figure not in UNITS:
+            raise InputError(f"--figures: no figure '{figure}'; {nearest(figure, UNITS)}")
+        highest = HIGHEST.get(figure, math.inf)
+        if value > highest:
+            raise InputError(f"--figures: {figure} must be at most {highest:g} {UNITS[figure]}, got {value:g}")
+        may_be_zero = figure in ("motor_time_constant", "camera_pitch", "camera_forward", "expert_disturbance")
+        if not 0.0 <= value < math.inf or (value == 0.0 and not may_be_zero):
+            raise InputError(f"--figures: {figure} must be above 0 and finite, got {value:g}")
+
+
+def completed(figures: Mapping[str, float]) -> dict[str, float]:
+    """Every figure: those known, and guesses that go with them."""
+    values = {name: guess for name, (guess, _) in GUESSES.items()} | dict(figures)
+    if "effective_baseline" not in figures:
+        values["effective_baseline"] = values["wheel_distance"]
+    if "wheel_torque" not in figures:
+        force = 2.0 * values["mass"] * values["full_speed"] / max(values["motor_time_constant"], LEAST_S)
+        values["wheel_torque"] = float(f"{force * values['wheel_radius'] / 2.0:.2g}")
+    return values
+
+
+def robot_text(name: str, values: Mapping[str, float], known: tuple[Known, ...]) -> str:
+    """A robot.toml: the six figures first; what is not known is marked EDIT."""
+    rows = [_row(figure, values[figure], known) for figure in (*SIX, *(f for f in values if f not in SIX))]
+    return fill("robot.toml.txt", name=name, figures="\n".join(rows), **_effects(values))
+
+
+def _row(figure: str, value: float, known: tuple[Known, ...]) -> str:
+    cell = f'value = {value:.6g}, unit = "{UNITS[figure]}"'
+    for one in known:
+        if figure in one.figures:
+            return f'{figure} = {{ {cell}, source = "{one.source}" }}'
+    how = GUESSES[figure][1] if figure in GUESSES else "measure it"
+    return f'{figure} = {{ {cell}, source = "a guess" }}  # EDIT: {how}'
+
+
+def _effects(values: Mapping[str, float]) -> dict[str, str]:
+    return {key: f"{values[key]:.6g}" for key in ("motor_time_constant", "camera_pitch")}
+
+
+def _dimensions(values: Mapping[str, float]) -> dict[str, str]:
+    """What the template of a body asks for: a box between the wheels, its weight behind the axle, on the caster."""
+    radius, distance, mass = values["wheel_radius"], values["wheel_distance"], values["mass"]
+    length, width, height = 1.2 * distance, 0.7 * distance, 1.2 * radius
+    chassis, wheel, caster = 0.88 * mass, 0.05 * mass, 0.35 * radius
+    numbers = {
+        "radius": radius,
+        "half_distance": distance / 2.0,
+        "tread": 0.6 * radius,
+        "torque": values["wheel_torque"],
+        "top_speed": 2.0 * values["full_speed"] / radius,
+        "length": length,
+        "width": width,
+        "height": height,
+        "middle": radius + height / 2.0,
+        "weight_x": -0.15 * distance,
+        "chassis_mass": chassis,
+        "chassis_ixx": chassis * (width**2 + height**2) / 12.0,
+        "chassis_iyy": chassis * (length**2 + height**2) / 12.0,
+        "chassis_izz": chassis * (length**2 + width**2) / 12.0,
+        "wheel_mass": wheel,
+        "wheel_iyy": wheel * radius**2 / 2.0,
+        "wheel_ixx": wheel * radius**2 / 4.0,
+        "small_mass": 0.01 * mass,
+        "small_i": 0.01 * mass * caster**2,
+        "caster": caster,
+        "caster_x": -0.5 * distance,
+        "camera_x": values["camera_forward"],
+        "camera_z": values["camera_height"],
+        "camera_pitch": values["camera_pitch"] * math.pi / 180.0,
+    }
+    return {key: f"{number:.6g}" for key, number in numbers.items()}

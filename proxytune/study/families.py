@@ -1,0 +1,253 @@
+"""Several tuned domain families beside one another: what each predicts, teaches and costs.
+
+The lessons of several families as a file, so that they can be shown again without running any code.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.errors import StoreError
+from proxytune.files import draft_of
+from proxytune.learning import Estimate
+from proxytune.scores import ScoreTable
+from proxytune.seeds import fresh_seed
+from proxytune.settings import is_finite
+from proxytune.space import Theta
+from proxytune.storage import FAMILIES
+from proxytune.study.pruning import seconds_of
+from proxytune.study.result import StudyResult
+from proxytune.study.settings import StudySettings
+from proxytune.study.study_run import StudyRun, plan
+from proxytune.usefulness import Assessment, Selection, interval, select_proxy
+
+RESAMPLES = 1000
+
+
+@dataclass(frozen=True)
+class TunedFamily:
+    """A domain family at the best θ that was found in its time.
+
+    Attributes:
+        name: What study.toml calls it.
+        result: What its study has found.
+        seconds: How long the episodes of its trials took, divided by the processes that ran them [s].
+        episode_seconds: How long each episode at its best θ took [s], in the order in which all families have them.
+    """
+
+    name: str
+    result: StudyResult
+    seconds: float
+    episode_seconds: tuple[float, ...]
+
+    @property
+    def theta(self) -> Theta:
+        """Its best θ."""
+        return self.result.best.trial.theta
+
+    @property
+    def fresh(self) -> Assessment | None:
+        """How useful it is there in fresh episodes; None while these are not driven, or where an agent fails in all."""
+        return self.result.confirmation.answer.assessment if self.result.confirmation else None
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What a family at its best θ is worth as a teacher.
+
+    Attributes:
+        theta: The best θ that taught.
+        zero_shot: Score on the target before any target sample; None where it could not teach.
+        needed: Target samples needed after it.
+        plv: Target samples saved.
+        more: How many more are needed after it than after the family of highest PLV; None of that one itself.
+        failure: Why it could not teach, empty if it could.
+    """
+
+    theta: Theta
+    zero_shot: float | None = None
+    needed: Estimate | None = None
+    plv: Estimate | None = None
+    more: Estimate | None = None
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which family is best at something.
+
+    Attributes:
+        best: Its name; None where that is not known.
+        alike: The others that cannot be told from it.
+    """
+
+    best: str | None = None
+    alike: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ComparedFamilies:
+    """Several tuned families.
+
+    Attributes:
+        settings: Of the study that they are of.
+        families: In the order of study.toml.
+        lessons: What each is worth as a teacher, by name; empty where that was not asked for, or is not known yet.
+    """
+
+    settings: StudySettings
+    families: tuple[TunedFamily, ...]
+    lessons: Mapping[str, Lesson] = field(default_factory=dict)
+
+    @cached_property
+    def selection(self) -> Selection | None:
+        """The families by fresh PRPV, with every difference; fresh episodes share starts and seeds, so all are paired.
+
+        None where no family has any.
+        """
+        tables: dict[str, ScoreTable] = {one.name: one.fresh.inputs.proxy for one in self.families if one.fresh}
+        if not tables:
+            return None
+        target = self.families[0].result.study.target
+        return select_proxy(proxies=tables, target=target, metrics=self.settings.metrics)
+
+    @property
+    def predicts(self) -> Choice:
+        """Which predicts best: the lowest PRPV in fresh episodes."""
+        if self.selection is None:
+            return Choice()
+        best, *others = [name for name, _ in self.selection.ranking]
+        worse = {one.worse for one in self.selection.differences if one.better == best and one.beyond_noise}
+        return Choice(best, tuple(name for name in others if name not in worse))
+
+    @property
+    def teaches(self) -> Choice:
+        """Which teaches best: the highest PLV."""
+        best = best_teacher(self.lessons)
+        if best is None:
+            return Choice()
+        others = [name for name, one in self.lessons.items() if name != best and _may_be_as_good(one)]
+        return Choice(best, tuple(others))
+
+    @property
+    def cheapest(self) -> Choice:
+        """Whose episodes take the shortest."""
+        best = min(self.families, key=lambda one: float(np.mean(one.episode_seconds))).name
+        alike = [name for name, (_, low, _) in self.times_cheapest(best).items() if name != best and low <= 1.0]
+        return Choice(best, tuple(alike))
+
+    def seconds_per_episode(self) -> dict[str, tuple[float, float, float]]:
+        """Mean seconds of an episode of each family, and the ends of its 95 % interval."""
+        return {one.name: _with_ends(means, one.episode_seconds) for one, means in self._resampled()}
+
+    def times_cheapest(self, cheapest: str) -> dict[str, tuple[float, float, float]]:
+        """How many times longer an episode of each takes than one of this family, with 95 % intervals, paired."""
+        base, resampled = next((one, means) for one, means in self._resampled() if one.name == cheapest)
+        shortest = float(np.mean(base.episode_seconds))
+        return {
+            one.name: (float(np.mean(one.episode_seconds)) / shortest, *interval(means / resampled))
+            for one, means in self._resampled()
+        }
+
+    def _resampled(self) -> list[tuple[TunedFamily, Floats]]:
+        """Each family with the means of its episodes' seconds when episodes are drawn, alike in all."""
+        return [(one, _resampled_means(one.episode_seconds)) for one in self.families]
+
+
+def tuned(run: StudyRun, result: StudyResult) -> TunedFamily:
+    """A family's study as it stands, with what its episodes cost."""
+    settings = run.settings
+    planned = [one for seed in _seeds(settings) for one in plan(settings, result.best.trial.theta, seed)]
+    seconds = tuple(outcome.seconds for outcome in run.known(planned).values())
+    return TunedFamily(settings.family_name, result, seconds_of(run, result.trials), seconds)
+
+
+def best_teacher(lessons: Mapping[str, Lesson]) -> str | None:
+    """The family of highest PLV; None where none is known."""
+    known = {name: one.plv.value for name, one in lessons.items() if one.plv and one.plv.value is not None}
+    return max(known, key=known.__getitem__) if known else None
+
+
+def _may_be_as_good(lesson: Lesson) -> bool:
+    """Whether it is not shown that more samples are needed after it: where they never suffice, that is shown too."""
+    if lesson.more is None or lesson.needed is None or lesson.needed.low is None:
+        return False
+    return lesson.more.low is None or lesson.more.low <= 0.0
+
+
+def _seeds(settings: StudySettings) -> list[int]:
+    """The search's own and the fresh ones."""
+    return [settings.seed, *(fresh_seed(settings.seed, number) for number in range(1, settings.confirm + 1))]
+
+
+def _resampled_means(seconds: Sequence[float]) -> Floats:
+    count = len(seconds)
+    drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
+    return np.asarray(drawn @ np.array(seconds) / count)
+
+
+def _with_ends(means: Floats, seconds: Sequence[float]) -> tuple[float, float, float]:
+    return (float(np.mean(seconds)), *interval(means))
+
+
+ESTIMATES = ("needed", "plv", "more")
+
+
+def save_lessons(settings: StudySettings, lessons: Mapping[str, Lesson]) -> None:
+    """Write what each family is worth as a teacher into the folder of all.
+
+    Raises:
+        StoreError: If it cannot be written.
+    """
+    path = _file(settings)
+    text = json.dumps({name: asdict(one) for name, one in lessons.items()}, indent=2, allow_nan=False) + "\n"
+    try:
+        with draft_of(path) as draft:
+            draft.write_text(text, encoding="utf-8")
+    except OSError as problem:
+        raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
+
+
+def read_lessons(settings: StudySettings) -> dict[str, Lesson]:
+    """What was written; none where nothing was.
+
+    Raises:
+        StoreError: If the file is none that we wrote.
+    """
+    path = _file(settings)
+    try:
+        return {name: _lesson(one) for name, one in json.loads(path.read_bytes()).items()}
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise StoreError(f"{path}: is not as proxytune writes it; delete it, and run the study again") from None
+
+
+def _lesson(kept: Mapping[str, Any]) -> Lesson:
+    estimates = {name: None if kept[name] is None else _estimate(**kept[name]) for name in ESTIMATES}
+    theta = {str(name): _number(value) for name, value in kept["theta"].items()}
+    return Lesson(theta, _or_none(kept["zero_shot"]), failure=str(kept["failure"]), **estimates)
+
+
+def _estimate(value: object, low: object, high: object) -> Estimate:
+    return Estimate(_or_none(value), _or_none(low), _or_none(high))
+
+
+def _or_none(value: object) -> float | None:
+    return None if value is None else _number(value)
+
+
+def _number(value: object) -> float:
+    if type(value) not in (int, float) or not is_finite(cast(float, value)):
+        raise ValueError("not a number")
+    return float(cast(float, value))
+
+
+def _file(settings: StudySettings) -> Path:
+    return settings.folder / FAMILIES / "lessons.json"

@@ -1,0 +1,366 @@
+"""A study ready to run: its settings, its domain family, and the target's scores.
+
+The target's scores as a study compares them, from one file or several.
+What a study makes small or large: a measure of how far proxy and target agree on the agents.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proxytune.arrays import Floats
+from proxytune.domain import DomainFamily
+from proxytune.effects import Catalogue, read_model
+from proxytune.errors import ExtensionError, InputError, ScoresError
+from proxytune.extensions import ask, load, plugins
+from proxytune.identity import version_changes
+from proxytune.scores import Metric, ScoreTable, read_scores
+from proxytune.search import GAUSSIAN_PROCESS, STUDY_ENGINES, Engine, engine_of, why_not_engine
+from proxytune.settings import nearest
+from proxytune.space import Theta
+from proxytune.study.family import code_of, load_family
+from proxytune.study.settings import LEARNING, StudySettings, read_study_settings, unnoticed
+from proxytune.usefulness import MEASURES, Measure, compare, start_of, starts_of
+
+
+def with_scores(settings: StudySettings) -> tuple[StudySettings, tuple[str, ...]]:
+    """The study of those agents that the target has scores of, and who is left out on either side, in a line each.
+
+    Raises:
+        InputError: If fewer than two are left.
+    """
+    scored = _read(settings, [metric.name for metric in settings.metrics]).agents
+    there = tuple(agent for agent in settings.agents if agent in scored)
+    missing = [agent for agent in settings.agents if agent not in scored]
+    beyond = [agent for agent in scored if agent not in settings.agents]
+    if len(there) < 2:
+        files = ", ".join(map(str, settings.targets))
+        raise InputError(f"{files}: has no scores of {', '.join(missing)}; {_remedy(missing, beyond)}")
+    lines = [f"the target has no scores of {', '.join(missing)}: left out"] if missing else []
+    lines += [f"the target has scores of {', '.join(beyond)}, no agents of this study: left out"] if beyond else []
+    return replace(settings, agents=there), tuple(lines)
+
+
+def _remedy(missing: Sequence[str], beyond: Sequence[str]) -> str:
+    if not beyond:
+        return "add them, or take them out of the study"
+    if len(missing) == 1:
+        return nearest(missing[0], beyond)
+    one = f"{beyond[0]} = '{missing[0]}'"
+    return f"its agents are {', '.join(beyond)[:80]}; give yours these names by a table [agents] in study.toml: {one}"
+
+
+def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTable, tuple[str, ...]]:
+    """The target's scores of the study's agents, from the study's own starts where it has all of these.
+
+    What else it has of them is left out then, which a line says.
+
+    Raises:
+        InputError: If the table lacks a metric, or has a value that is not finite.
+    """
+    compared = [metric.name for metric in settings.metrics]
+    table = _read(settings, [*compared, *_others(settings, family, compared)])
+    chosen = table.arrange(agents=settings.agents)
+    driven = [label for column, label in enumerate(chosen.episodes) if chosen.driven[:, column].any()]
+    wanted = {str(start) for start in range(settings.starts)}
+    own = [label for label in driven if start_of(label) in wanted]
+    if set(starts_of(own)) != wanted:
+        return chosen.arrange(agents=settings.agents, episodes=driven), ()
+    beyond = [label for label in driven if label not in own]
+    line = (
+        f"the target's episodes {own[0]} to {own[-1]} are taken for this study's starts, and {len(beyond)} of others "
+        "are left out; raise starts to use them, or label episodes otherwise if they are no starts"
+    )
+    return chosen.arrange(agents=settings.agents, episodes=own), (line,) if beyond else ()
+
+
+def _others(settings: StudySettings, family: DomainFamily, compared: Sequence[str]) -> list[str]:
+    """The metrics beside those compared that the table has in full: what a search can learn from at no cost."""
+    return [name for name in family.metrics if name not in compared and _in_full(settings, name)]
+
+
+def _in_full(settings: StudySettings, metric: str) -> bool:
+    try:
+        _read(settings, [metric])
+    except ScoresError:
+        return False
+    return True
+
+
+def _read(settings: StudySettings, metrics: Iterable[str]) -> ScoreTable:
+    return read_scores(settings.targets, metrics, columns=settings.target_columns)
+
+
+OfMeans = Callable[[Floats, Floats, Sequence[Metric]], Floats]
+"""A measure of mean scores in the proxy (…, agents, metrics) and on the target (agents, metrics): shape (…)."""
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A measure as the objective of a study.
+
+    Attributes:
+        name: What study.toml calls it.
+        label: What people call it.
+        maximise: Whether more of it is better.
+        of_means: The measure.
+    """
+
+    name: str
+    label: str
+    maximise: bool
+    of_means: OfMeans
+
+    @property
+    def sign(self) -> float:
+        """What turns the measure into something to be made small, and back."""
+        return -1.0 if self.maximise else 1.0
+
+    def measure(self, *, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> dict[str, float | None]:
+        """PRPV, PPV and this measure of a proxy, by name; None where one is undefined.
+
+        Raises:
+            ScoresError: If an agent is missing on one side, or a metric is unknown.
+        """
+        means = compare(proxy=proxy, target=target, metrics=metrics).means
+        kept = {self.name: self.of_means, **{name: one.of_means for name, one in KEPT.items()}}
+        values = {name: float(of_means(*means, metrics)) for name, of_means in kept.items()}
+        return {name: value if math.isfinite(value) else None for name, value in values.items()}
+
+
+TRIED = (4, 3, 2)
+"""Tables, agents and metrics that a user's own measure is tried on."""
+
+
+def objective_of(settings: StudySettings) -> Objective:
+    """The measure that the trials of a study are scored by; a study of learning value is narrowed by PRPV.
+
+    Raises:
+        SettingsError: If there is no such measure, or it is no single number of mean scores.
+    """
+    name = settings.objective
+    if name == LEARNING:
+        return PRPV
+    if name in KEPT:
+        return KEPT[name]
+    try:
+        if ":" not in name and name not in plugins("measure", KEPT):
+            known = (*KEPT, LEARNING)
+            raise InputError(f"unknown measure '{name}' (your own is written module:attribute); {nearest(name, known)}")
+        return _as_objective(name, measure_of(name, settings.folder))
+    except InputError as problem:
+        raise settings.error("objective", str(problem)) from None
+
+
+def measure_of(name: str, beside: Path | None = None) -> Measure:
+    """The measure that is not shipped: `module:attribute`, or the name of a plug-in.
+
+    Args:
+        name: Of the measure.
+        beside: The folder whose modules come before the installed ones.
+
+    Raises:
+        ExtensionError: If there is none.
+    """
+    measure = load(name, kind="measure", beside=beside)
+    if not isinstance(measure, Measure):
+        raise ExtensionError(f"measure '{name}' is a {type(measure).__name__}; make it a proxytune.Measure")
+    return measure
+
+
+def _as_objective(name: str, measure: Measure) -> Objective:
+    if measure.on_means is None or measure.per_metric:
+        raise ExtensionError(
+            f"measure '{name}' is no single number of mean scores: it needs on_means, without per_metric"
+        )
+    of_means = measure.on_means if measure in MEASURES else _outside(name, measure.on_means)
+    return Objective(name, measure.name, not measure.lower_is_better, of_means)
+
+
+@dataclass(frozen=True)
+class _Outside:
+    """A measure of mean scores that is not ours: what it does wrong is told in one line."""
+
+    name: str
+    on_means: OfMeans
+
+    def __call__(self, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
+        where = f" for means {proxy.shape} against {target.shape}"
+        values = ask(
+            f"measure '{self.name}'", lambda: np.asarray(self.on_means(proxy, target, metrics), dtype=float), where
+        )
+        if values.shape != proxy.shape[:-2]:
+            told = f"measure '{self.name}' gives values {values.shape} of means {proxy.shape}"
+            raise ExtensionError(f"{told}; give one for each table, {proxy.shape[:-2]}")
+        return values
+
+
+def _outside(name: str, on_means: OfMeans) -> OfMeans:
+    """The measure, tried as a search calls it: several proxies against one target, before any episode is run."""
+    checked = _Outside(name, on_means)
+    means = np.random.default_rng(0).uniform(1.0, 2.0, TRIED)
+    checked(means, means[0], [Metric("one"), Metric("other", "min")])
+    return checked
+
+
+KEPT = {one.key: _as_objective(one.key, one) for one in MEASURES if one.on_means is not None and not one.per_metric}
+"""PRPV and PPV: what may be an objective by name, and is kept with every trial."""
+PRPV = KEPT["prpv"]
+
+
+UNSAID = {"batch": 1, "engine": "gp"}
+"""What a study.db that names none of these was run with."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a trial is a function of, apart from θ.
+
+    Attributes:
+        settings: What study.toml says.
+        family: The proxy's domain family.
+        target: The target's scores of the study's agents, in the study's order: the metrics by which they are compared,
+            then every other one that the family has too.
+        identity: What determines the result of an episode in the proxy, apart from the episode.
+        truth: The θ that made the target, where study.toml names a model of it; nothing depends on it.
+        cautions: What of study.toml or of the target's table is left out, in one line each.
+        objective: The measure that its trials make small or large.
+        engine: What proposes its trials after the design.
+        code: A digest of what the user's own code means; failures of other code are not remembered.
+    """
+
+    settings: StudySettings
+    family: DomainFamily
+    target: ScoreTable
+    identity: str
+    truth: Theta | None = None
+    cautions: tuple[str, ...] = ()
+    objective: Objective = PRPV
+    engine: Engine = GAUSSIAN_PROCESS
+    code: str = ""
+
+
+def open_study(path: Path) -> Study:
+    """Read a study.toml, load the family it names and the target's scores.
+
+    Raises:
+        InputError: If anything in it cannot be used, with file, key and remedy.
+    """
+    return open_settings(read_study_settings(path))
+
+
+def open_settings(settings: StudySettings) -> Study:
+    """Load the family that a study.toml names and the target's scores.
+
+    Raises:
+        InputError: As open_study, and if they are of several families.
+    """
+    settings.check_single()
+    family = load_family(settings, settings.proxy)
+    known, left_out = with_scores(settings)
+    target, unused = read_target(known, family)
+    cautions, objective = (*left_out, *unused, *unnoticed(settings.folder)), objective_of(settings)
+    truth, engine, code = _truth(settings, family), _engine(settings), code_of(settings)
+    return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
+
+
+def _engine(settings: StudySettings) -> Engine:
+    """The engine that a study names, which is installed and may be named.
+
+    Raises:
+        SettingsError: If it is not.
+    """
+    try:
+        engine = engine_of(settings.engine, settings.folder)
+    except InputError as problem:
+        raise settings.error("engine", str(problem)) from None
+    if not engine.in_studies:
+        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, STUDY_ENGINES)}")
+    reason = why_not_engine(engine, composed=settings.objective != LEARNING)
+    if reason:
+        raise settings.error("engine", reason)
+    return engine
+
+
+def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:
+    if settings.truth is None:
+        return None
+    if not settings.truth.is_file():
+        raise settings.error("truth", f"no such file: {settings.truth}; check the path, or remove it")
+    # A family with parameters that are no effects reads them itself
+    own = getattr(family, "truth", None)
+    known = own(settings.truth) if own else read_model(settings.truth, Catalogue(settings.folder.resolve())).theta
+    return {name: known[name] for name in settings.space.names if name in known}
+
+
+def study_facts(study: Study) -> dict[str, Any]:
+    """All that a finished trial depends on, by its name in study.toml: if one changes, trials lose their meaning.
+
+    Budget, rules to stop, jobs and what to do on failure are not among them. The proxy's model is: the family's
+    identity covers it, and the versions of what simulates, which are here to be told. The engine `gp` goes without
+    saying, as it did when there was no other, and so do batches of one trial. An engine that learns from every output
+    depends on the whole of the target's table, and on the pre-flight's noise.
+    """
+    settings = study.settings
+    named: dict[str, Any] = {"batch": settings.batch, "engine": settings.engine}
+    said = {key: value for key, value in named.items() if value != UNSAID[key]}
+    compared = [metric.name for metric in settings.metrics]
+    learns = study.engine.learns_from == "outputs"
+    if learns:
+        said["preflight"] = settings.preflight
+    versions = getattr(study.family, "versions", None)
+    if versions:
+        said["versions"] = dict(versions)
+    return {
+        "family": settings.family,
+        "target": _table_digest(study.target if learns else study.target.select(compared)),
+        "objective": settings.objective,
+        "metrics": sorted(str(metric) for metric in settings.metrics),
+        "agents": sorted(settings.agents),
+        "starts": settings.starts,
+        "initial": settings.initial,
+        "seed": settings.seed,
+        **said,
+        "cut_off": settings.cut_off,
+        **{f"agents.{name}": settings.aliases[name] for name in settings.agents if name in settings.aliases},
+        **{f"parameters.{i.name}": [i.low, i.high] for i in settings.space.intervals},
+        **{f"domain.{key}": json.dumps(value, default=str) for key, value in settings.domain.values.items()},
+        "identity": study.identity,
+    }
+
+
+def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+    """Which facts differ, each as one phrase for the user."""
+    keys = [key for key in {**after, **before} if before.get(key) != after.get(key)]
+    # Other agents or metrics make it another part of the target's table, and what the family is told makes it another.
+    # Another engine may learn from another part of it, and from the pre-flight.
+    implied = {"target"} if {"agents", "metrics", "engine", "starts"} & set(keys) else set()
+    implied |= {"preflight"} if "engine" in keys else set()
+    told = any(key == "family" or key.startswith(("domain.", "agents.")) for key in keys)
+    named = [key for key in keys if key not in implied | {"identity", "versions"}]
+    both = "versions" in before and "versions" in after and not told
+    versions = version_changes(before["versions"], after["versions"]) if both else []
+    other = ["the domain family (its code, its robot or the proxy's model)"]
+    unnamed = "identity" in keys and not (told or versions)
+    return [*(_change(key, before.get(key), after.get(key)) for key in named), *versions, *(other if unnamed else ())]
+
+
+def _change(key: str, before: Any, after: Any) -> str:
+    if key == "target":
+        return "target (its contents)"
+    before = UNSAID.get(key) if before is None else before
+    shown = [("nothing" if value is None else json.dumps(value)) for value in (before, after)]
+    return f"{key} (was {shown[0]})" if max(map(len, shown)) < 60 else key
+
+
+def _table_digest(table: ScoreTable) -> str:
+    """A digest that the order of agents, episodes and metrics does not change."""
+    inner = table.select(sorted(table.metrics)).arrange(agents=sorted(table.agents), episodes=sorted(table.episodes))
+    text = json.dumps([inner.agents, inner.episodes, inner.metrics, inner.values.tolist()])
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

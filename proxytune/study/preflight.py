@@ -1,0 +1,450 @@
+"""Before a study: does each parameter of its box move the metrics beyond noise?
+
+The domain instance in the centre of the box is the base. Each parameter is moved to either end of its box, the others
+held, under the same seeds (common random numbers): a parameter that does nothing then changes no episode by a hair.
+What noise does is told by driving the base again under other seeds, one for each agent and start. Per metric and end, a
+one-sided Wilcoxon signed-rank test asks over agents and starts whether |change by the parameter| is larger than |change
+by noise|; were the parameter one more source of noise, either would be the larger as often as the other. P-values are
+multiplied by the number of tests (Bonferroni: metrics × ends × looks). A parameter that the first half of the starts
+already shows to matter is left out of the second look.
+
+What moving one parameter from the centre of the box to its ends does, against what placement noise does.
+Before a study: does an agent do the same again?
+
+What a trial comes to must not depend on which process drove which episode before. So one episode of each agent is
+driven twice more, by one process, one after the other: an agent that draws from what no episode seeds, or remembers
+earlier episodes, comes to other scores.
+Where every episode fails alike there is nothing to search: the study stops and says of what.
+How far chance alone puts proxy and target apart at the same θ: what a search has to forgive.
+
+Both sides drive from the same starts, so it is the placement noise that differs, not the starts. The pre-flight has
+driven the centre of the box under two placements, from which follows the variance of a difference of two episodes.
+Without shared starts, or without a pre-flight, there is the spread between episodes only, which is far larger: starts
+differ more than placements.
+"""
+
+import functools
+import re
+import warnings
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import wilcoxon
+
+from proxytune.arrays import Floats
+from proxytune.domain import DomainFamily, Episode, Outcome, make_episode
+from proxytune.errors import RunError
+from proxytune.running import Lost, Rescue, run_episode, working
+from proxytune.seeds import preflight_noise_seed, preflight_seed
+from proxytune.space import Interval, Theta
+from proxytune.storage import Store
+from proxytune.study.opening import Study
+from proxytune.study.settings import StudySettings
+from proxytune.study.study_run import StudyRun, needed_metrics
+from proxytune.usefulness import start_of
+
+LEVEL = 0.05
+"""Of all tests of one parameter together."""
+LOOKS = 2
+"""How often a parameter may be tested, each time on more starts."""
+
+
+@dataclass(frozen=True)
+class Movement:
+    """What moving one parameter across its box does to the metrics.
+
+    Attributes:
+        interval: The parameter and its box.
+        p_value: How likely noise alone is to change a metric as much, corrected for all tests; the lowest of them.
+        metric: The metric of that test.
+        change: Median over agents and starts of how much the parameter changes it.
+        noise: Median of how much noise does.
+        pairs: Over how many agents and starts; failed episodes are left out.
+        dead: Whether no metric of any of their episodes changed at all.
+    """
+
+    interval: Interval
+    p_value: float
+    metric: str
+    change: float
+    noise: float
+    pairs: int
+    dead: bool
+
+    @property
+    def moves(self) -> bool:
+        """Whether the parameter changes a metric beyond noise."""
+        return self.p_value < LEVEL
+
+    @property
+    def warning(self) -> str:
+        """What is wrong with the parameter and what to do, in one line; empty if nothing is."""
+        if self.moves:
+            return ""
+        name, box = self.interval.name, f"[{self.interval.low:g}, {self.interval.high:g}]"
+        if not self.pairs:
+            return f"pre-flight: '{name}' cannot be tested: every agent fails somewhere in {box}; narrow its box"
+        if self.dead:
+            remedy = "remove it from [parameters], add agents that depend on it, or widen its box"
+            return f"pre-flight: '{name}' changes nothing at all across {box}; {remedy}"
+        remedy = "add agents that depend on it, starts or metrics, or widen its box"
+        return f"pre-flight: '{name}' is not shown to change a metric across {box} by {self.pairs} pairs; {remedy}"
+
+
+def judge(interval: Interval, names: Sequence[str], values: Floats) -> Movement:
+    """What the test that tells most says of a parameter.
+
+    Args:
+        interval: The parameter.
+        names: The metrics.
+        values: Shape (agents × places, 4, metrics): the base again, the base, the lower and the upper end.
+    """
+    changes = np.abs(values[:, [0, 2, 3]] - values[:, [1]])
+    tests = [(_larger(changes[:, end, m], changes[:, 0, m]), end, m) for end in (1, 2) for m in range(len(names))]
+    p_value, end, m = min(tests)
+    middle = np.median(changes[:, [0, end], m], axis=0) if len(changes) else (0.0, 0.0)
+    return Movement(
+        interval=interval,
+        p_value=min(1.0, p_value * len(tests) * LOOKS),
+        metric=names[m],
+        change=float(middle[1]),
+        noise=float(middle[0]),
+        pairs=len(changes),
+        dead=not changes[:, 1:].any(),
+    )
+
+
+def _larger(changes: Floats, noise: Floats) -> float:
+    """How likely the signed ranks of |change| − |noise| are if neither is the larger."""
+    apart = changes - noise
+    # Left to itself scipy permutes where there are ties, which takes more than a second a test.
+    return float(wilcoxon(apart, alternative="greater", method="approx").pvalue) if apart.any() else 1.0
+
+
+FACT = "not_repeatable"
+"""What study.db keeps of it: a line for each such agent, in their order."""
+REMEDY = "draw from random or numpy.random, which each episode seeds, and keep nothing from one episode to the next"
+Scores = Mapping[str, float] | None
+
+
+class Twice(NamedTuple):
+    """What an episode came to when it was driven twice more; None where it failed."""
+
+    episode: Episode
+    scores: tuple[Scores, ...]
+
+
+def check_repeatable(run: StudyRun, episodes: Sequence[Episode]) -> None:
+    """Drive episodes twice more, and keep which agents come to other scores; once for each study.
+
+    Args:
+        run: The study.
+        episodes: One of each agent, driven once; those that failed can tell nothing.
+
+    Raises:
+        RunError: If the machine fails.
+    """
+    if FACT in run.store.facts():
+        return
+    known = {one: outcome.metrics for one, outcome in run.known(episodes).items() if outcome.metrics is not None}
+    run.watcher.begin("pre-flight: each agent twice", 0)
+    drive = functools.partial(_drive_twice, run.study.family, tuple(needed_metrics(run.settings, run.study.family)))
+    with run.watched() as watch:
+        timeout_s = watch.timeout_s and 2.0 * watch.timeout_s
+        rescue = Rescue(_lost, timeout_s, watch.suspect, watch.begins)
+        with working(drive, list(known), run.settings.jobs, rescue=rescue) as driven:
+            others = {one.episode.agent for one in driven if any(scores != known[one.episode] for scores in one.scores)}
+    told = [agent for agent in run.settings.agents if agent in others]
+    run.store.save_fact(
+        FACT, [f"pre-flight: agent '{agent}' scores otherwise in the same episode; {REMEDY}" for agent in told]
+    )
+
+
+def not_repeatable(store: Store) -> tuple[str, ...]:
+    """One line for each agent that came to other scores; none where that was not looked at."""
+    return tuple(store.facts().get(FACT, ()))
+
+
+def _drive_twice(family: DomainFamily, needed: Sequence[str], episode: Episode) -> Twice:
+    return Twice(episode, tuple(run_episode(family, episode, needed).metrics for _ in range(2)))
+
+
+def _lost(episode: Episode, lost: Lost) -> Twice:
+    return Twice(episode, (None,))
+
+
+def check_some_work(outcomes: Collection[Outcome], where: str) -> None:
+    """Refuse to go on if every episode has failed of the same.
+
+    Args:
+        outcomes: Of every agent.
+        where: Whose episodes these are, as "the pre-flight".
+
+    Raises:
+        RunError: With the first failure.
+    """
+    failures = [outcome for outcome in outcomes if outcome.metrics is None]
+    if failures and len(failures) == len(outcomes) and len(set(map(_kind, failures))) == 1:
+        raise RunError(
+            f"{failures[0].failure}; every agent fails so, in all {len(failures)} episodes of {where}: correct it and "
+            "run the same command again"
+        )
+
+
+def _kind(failed: Outcome) -> str:
+    """What failed, whichever the agent and whatever the numbers."""
+    return re.sub(r"\d+", "", failed.failure.replace(f"'{failed.episode.agent}'", ""))
+
+
+PAIRS = 24
+"""So many agents × places at least: with fewer, nothing short of a landslide would be beyond noise."""
+
+
+class Place(NamedTuple):
+    """Where every agent drives from: the start, and which time from there."""
+
+    start: int
+    turn: int
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """What a study has learnt of its parameters before its first trial.
+
+    Attributes:
+        base: The domain instance from which they were moved.
+        movements: One per parameter, in the order of the box.
+        episodes: How many episodes it took.
+        failure: Why the first of them failed, where all of them did; else empty.
+        not_repeatable: One line for each agent that scores otherwise when it drives the same episode again.
+    """
+
+    base: Theta
+    movements: tuple[Movement, ...]
+    episodes: int
+    failure: str = ""
+    not_repeatable: tuple[str, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One line for each agent that is not repeatable, and for each parameter that does nothing beyond noise.
+
+        A single one if every episode failed.
+        """
+        if self.failure:
+            return (f"pre-flight: every agent fails everywhere, first with: {self.failure}; correct it",)
+        return self.not_repeatable + tuple(one.warning for one in self.movements if not one.moves)
+
+
+def run_preflight(run: StudyRun) -> Preflight | None:
+    """The pre-flight of a study that has no finished trial yet; what is missing of it is simulated now.
+
+    Nothing of it enters a trial. A study whose trials have begun goes on without: None.
+
+    Raises:
+        EpisodeError: If an episode fails and the study is to stop then.
+        RunError: If every episode fails alike.
+    """
+    if run.finished_trials():
+        return None
+    learnt = _preflight(run, partial(_simulate, run))
+    if learnt is None or learnt.failure:
+        return learnt
+    first = _places(run.settings, 0)[0]
+    check_repeatable(run, [_episode(run.settings, learnt.base, agent, first) for agent in run.settings.agents])
+    return replace(learnt, not_repeatable=not_repeatable(run.store))
+
+
+def preflight_of(run: StudyRun) -> Preflight | None:
+    """The pre-flight from what has been simulated; None if it is off, or an episode is still missing."""
+    return _preflight(run, lambda look, added: None)
+
+
+def _simulate(run: StudyRun, look: int, added: Sequence[Episode]) -> None:
+    what = f"pre-flight {look + 1} of {LOOKS}"
+    run.watcher.begin(what, _most(run.settings, look) - len(added))
+    outcomes = run.outcomes(added, what)
+    run.watcher.finished(what)
+    if look == 0:
+        check_some_work(outcomes.values(), "the pre-flight")
+
+
+def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]) -> Preflight | None:
+    settings = run.settings
+    if not settings.preflight:
+        return None
+    movements: dict[str, Movement] = {}
+    driven: dict[Episode, Outcome] = {}
+    undecided = settings.space.intervals
+    for look in range(LOOKS):
+        before, now = (_plan(settings, _places(settings, n), undecided) for n in (look - 1, look))
+        simulate(look, now[len(before) :])
+        known = run.known(now)
+        if len(known) < len(now):
+            return None
+        driven |= known
+        movements |= {i.name: _movement(run.study, look, i, known) for i in undecided}
+        undecided = tuple(i for i in undecided if not movements[i.name].moves)
+    moved = tuple(movements[name] for name in settings.space.names)
+    return Preflight(_base(settings), moved, len(driven), _failure(driven), not_repeatable(run.store))
+
+
+def _failure(driven: Mapping[Episode, Outcome]) -> str:
+    """What the first episode failed of, if none succeeded."""
+    failures = [outcome.failure for outcome in driven.values() if outcome.metrics is None]
+    return failures[0] if failures and len(failures) == len(driven) else ""
+
+
+def placement_pairs(run: StudyRun) -> Floats:
+    """The base of the pre-flight under its own and another placement.
+
+    Returns:
+        Shape (places, 2, agents, metrics), in the order of the target's table; NaN where an episode failed or was not
+        driven; no places where there is no pre-flight.
+    """
+    study, settings, names = run.study, run.settings, run.study.target.metrics
+    known = run.store.outcomes(study.identity, _base(settings)) if settings.preflight else {}
+    found = np.full((len(_places(settings, LOOKS - 1)), 2, *study.target.means.shape), np.nan)
+    for row, place in enumerate(_places(settings, LOOKS - 1)):
+        for column, agent in enumerate(settings.agents):
+            both = (_episode(settings, _base(settings), agent, place), _again(settings, agent, place))
+            for side, episode in enumerate(both):
+                metrics = known[episode].metrics if episode in known else None
+                if metrics is not None:
+                    found[row, side, column] = [metrics.get(name, np.nan) for name in names]
+    return found[~np.isnan(found).all(axis=(1, 2, 3))]
+
+
+def most_preflight_episodes(settings: StudySettings) -> int:
+    """How many episodes a pre-flight takes at most."""
+    return sum(_most(settings, look) for look in range(LOOKS)) if settings.preflight else 0
+
+
+def _most(settings: StudySettings, look: int) -> int:
+    """How many episodes a look takes that the one before did not, if no parameter is decided."""
+    instances = 2 + 2 * len(settings.space.intervals)
+    return (len(_places(settings, look)) - len(_places(settings, look - 1))) * len(settings.agents) * instances
+
+
+def _places(settings: StudySettings, look: int) -> list[Place]:
+    """Where agents drive from up to this look: the study's starts in turn, until there are pairs enough."""
+    half = max(1, ceil(PAIRS / LOOKS / len(settings.agents)))
+    return [Place(k % settings.starts, k // settings.starts) for k in range(half * (look + 1))]
+
+
+def _base(settings: StudySettings) -> dict[str, float]:
+    return {i.name: 0.5 * (i.low + i.high) for i in settings.space.intervals}
+
+
+def _plan(settings: StudySettings, places: Sequence[Place], undecided: Sequence[Interval]) -> list[Episode]:
+    """Place by place: the base, the base under another seed, the ends of the undecided; nothing if there are none."""
+    if not undecided:
+        return []
+    base = _base(settings)
+    instances = [base, *({**base, i.name: end} for i in undecided for end in (i.low, i.high))]
+    return [
+        episode
+        for place in places
+        for agent in settings.agents
+        for episode in (
+            _again(settings, agent, place),
+            *(_episode(settings, theta, agent, place) for theta in instances),
+        )
+    ]
+
+
+def _episode(settings: StudySettings, theta: Theta, agent: str, place: Place) -> Episode:
+    return make_episode(theta, agent=agent, start=place.start, seed=preflight_seed(settings.seed, *place))
+
+
+def _again(settings: StudySettings, agent: str, place: Place) -> Episode:
+    """The base under a seed of its own: agents that shared it would share one draw of the noise."""
+    seed = preflight_noise_seed(settings.seed, *place, sorted(settings.agents).index(agent))
+    return make_episode(_base(settings), agent=agent, start=place.start, seed=seed)
+
+
+def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episode, Outcome]) -> Movement:
+    """Test one parameter on what is known at this look."""
+    settings = study.settings
+    base = _base(settings)
+    instances = [base, *({**base, interval.name: end} for end in (interval.low, interval.high))]
+    driven = [
+        [known[_again(settings, agent, place)], *(known[_episode(settings, t, agent, place)] for t in instances)]
+        for place in _places(settings, look)
+        for agent in settings.agents
+    ]
+    whole = [group for group in driven if all(outcome.metrics is not None for outcome in group)]
+    names = [metric.name for metric in settings.metrics]
+    values = np.array([[[(o.metrics or {})[name] for name in names] for o in group] for group in whole])
+    return judge(interval, names, values.reshape(-1, 4, len(names)))
+
+
+PRIOR_PAIRS = 2
+"""An agent's own pairs are few, so the median over the agents counts as so many more."""
+
+UNKNOWN = 0.1
+"""Where nothing tells: standard deviation of a mean, as a share of the spread over agents."""
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Chance between the mean scores of proxy and target at the same θ.
+
+    Attributes:
+        variance: Of the difference of the two means, shape (agents, metrics).
+        caution: What is lost, in one line; empty where both sides drive from the same starts and a pre-flight has told
+            what placement does.
+    """
+
+    variance: Floats
+    caution: str = ""
+
+
+def noise_of(run: StudyRun) -> Noise:
+    """What is known of noise before the first trial; a function of the pre-flight and the target's table."""
+    study = run.study
+    driven = study.settings.starts
+    measured = np.maximum(1, study.target.counts)[:, None]
+    pairs = placement_pairs(run)
+    if shares_starts(study) and pairs.size:
+        return Noise(_shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0 * (1.0 / driven + 1.0 / measured))
+    remedy = "to know θ better, measure the target from the study's own starts and leave the pre-flight on"
+    if study.target.counts.min() >= 2:
+        between = _shrunk(np.moveaxis(_apart(study.target.values), 1, 0))
+        caution = f"noise is estimated from the spread between the target's episodes, which is too large; {remedy}"
+        return Noise(between * (1.0 / driven + 1.0 / measured), caution)
+    spread = np.ptp(study.target.means, axis=0) * UNKNOWN
+    caution = f"noise is unknown and assumed to be {UNKNOWN:.0%} of the spread between agents; {remedy}"
+    return Noise(np.broadcast_to(spread**2, study.target.means.shape), caution)
+
+
+def shares_starts(study: Study) -> bool:
+    """Whether the target was driven from the study's own starts, each as often, by every agent."""
+    starts = [start_of(label) for label in study.target.episodes]
+    wanted = {str(start) for start in range(study.settings.starts)}
+    each = {start: starts.count(start) for start in starts}
+    return study.target.complete and set(each) == wanted and len(set(each.values())) == 1
+
+
+def _apart(values: Floats) -> Floats:
+    """Squared distances of an agent's episodes from its mean, scaled so that their mean is the variance."""
+    count = np.sum(~np.isnan(values), axis=1, keepdims=True)
+    return np.asarray((values - np.nanmean(values, axis=1, keepdims=True)) ** 2 * (count / (count - 1)))
+
+
+def _shrunk(squares: Floats) -> Floats:
+    """Mean squares per agent and metric of squares (pairs, agents, metrics), NaN where one is missing.
+
+    Drawn towards the median over agents, since few pairs tell little of one agent.
+    """
+    counts = np.sum(~np.isnan(squares), axis=0)
+    sums = np.nansum(squares, axis=0)
+    with warnings.catch_warnings():
+        # Of a metric that no pair has, nothing is known.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        middle = np.nanmedian(np.where(counts > 0, sums / np.maximum(1, counts), np.nan), axis=0)
+    return np.asarray((sums + PRIOR_PAIRS * middle) / (counts + PRIOR_PAIRS))

@@ -1,1 +1,0 @@
-"""What happens to a study in turn: pre-flight, cutting trials off, stopping, confirmation."""

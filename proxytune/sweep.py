@@ -1,0 +1,541 @@
+"""Usefulness along one parameter of the domain family, the others held.
+
+The answer of a study that has been run: what a sweep holds the other parameters at.
+POD as a domain family of its own: the same commands in proxy and target, and how unlike the two answer.
+A sweep's curve as one series per measure, each with its interval and direction.
+What a curve shows: where a measure is best, and whether it gets worse on both sides of where it was held.
+"""
+
+import functools
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from proxytune.domain import DomainFamily, Episode
+from proxytune.errors import InputError, SettingsError
+from proxytune.identity import meaning_of
+from proxytune.settings import nearest
+from proxytune.space import Interval, Parameter, Theta
+from proxytune.storage import FILE_NAME, Store, SweepRecord, is_begun
+from proxytune.study import LEARNING, Evaluation, Study, StudyRun, load_family, plan, result_of, stored_run
+from proxytune.usefulness import (
+    ALL,
+    MEASURES,
+    PODS,
+    Assessment,
+    Ends,
+    Measure,
+    Measured,
+    assess,
+    pod_of_images,
+    pod_of_poses,
+)
+from proxytune.usefulness import interval as central_interval
+
+
+def has_answer(study: Study) -> bool:
+    """Whether a trial of the study's search by predictivity is finished; a search for PLV has its answer elsewhere."""
+    if study.settings.objective == LEARNING or not is_begun(study.settings.home / FILE_NAME):
+        return False
+    with Store.read(study.settings.home) as store:
+        return any(trial.state == "finished" for trial in store.trials(study.objective.name))
+
+
+def best_theta(study: Study, option: str = "--at") -> Theta:
+    """The best θ that the study has found so far; the option that asks for it is named in complaints.
+
+    Raises:
+        InputError: If no trial is finished, or the study was changed since.
+    """
+    if not has_answer(study):
+        folder = study.settings.home
+        raise InputError(f"{folder}: has no finished trial; run it first (python -m proxytune study {folder})")
+    with Store.read(study.settings.home) as store:
+        try:
+            run = stored_run(study, store)
+        except SettingsError as problem:
+            raise InputError(f"{problem}; or hold other values: {option} nominal") from None
+        return dict(result_of(run).best.trial.theta)
+
+
+COMMANDS = 100
+"""At most so many commands are replayed, 5 s at 20 Hz: later, two domains are far apart whatever their difference."""
+
+METRICS = {"pod_pose": "m", "pod_image": "of full scale"}
+
+
+class Observed(Protocol):
+    """What commands lead to: poses (ticks + 1, 3), the start first; pictures (steps, rows, columns, channels)."""
+
+    @property
+    def poses(self) -> Any: ...  # noqa: D102 - described above
+    @property
+    def pictures(self) -> Any: ...  # noqa: D102
+
+
+class Replayable(DomainFamily, Protocol):
+    """A domain family that can also repeat commands, and be a key of a cache."""
+
+    def __hash__(self) -> int: ...
+
+    def drive(self, episode: Episode) -> Any:
+        """Drive an episode; the answer's `commands` (control steps, …) are what the agent issued."""
+        ...
+
+    def replay(self, episode: Episode, commands: Any) -> Observed:
+        """Drive commands in place of the episode's agent, from the episode's start and with its seed."""
+        ...
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """A domain family whose episodes are replays in two others, and whose metrics are their discrepancies.
+
+    Attributes:
+        proxy: Where θ holds.
+        target: Fixed; the agent of the episode drives here, and what it issued is replayed in both.
+    """
+
+    proxy: Replayable
+    target: Replayable
+
+    @property
+    def identity(self) -> str:
+        """A digest of both families and of how they are compared."""
+        parts = [self.proxy.identity, self.target.identity, meaning_of([Path(__file__)], Path(__file__).parent)]
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+    @property
+    def metrics(self) -> Mapping[str, str]:
+        """POD of poses and of images, with their units."""
+        return METRICS
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Those of the proxy."""
+        return self.proxy.parameters
+
+    @property
+    def starts(self) -> int:
+        """Those of the proxy."""
+        return self.proxy.starts
+
+    def check_agent(self, name: str) -> None:
+        """Refuse an agent that the target cannot run.
+
+        Raises:
+            InputError: If there is no such agent.
+        """
+        self.target.check_agent(name)
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        """Replay in both domains and compare, eq. (1), over the time until the first of them ends.
+
+        Raises:
+            EpisodeError: If the agent fails on the target.
+        """
+        commands, there = _on_target(self.target, replace(episode, theta=()))
+        here = self.proxy.replay(episode, commands)
+        poses, pictures = (min(map(len, both)) for both in ((here.poses, there.poses), (here.pictures, there.pictures)))
+        # The start is the same by construction, so it is no observation.
+        pose = pod_of_poses(proxy=here.poses[1:poses], target=there.poses[1:poses])
+        image = pod_of_images(proxy=here.pictures[:pictures], target=there.pictures[:pictures])
+        return {"pod_pose": pose.value, "pod_image": image.value}
+
+
+@functools.lru_cache(maxsize=64)
+def _on_target(target: Replayable, episode: Episode) -> tuple[Any, Observed]:
+    """What the agent issued and what it led to; the same at every point of a sweep."""
+    commands = np.asarray(target.drive(episode).commands)[:COMMANDS]
+    return commands, target.replay(episode, commands)
+
+
+def discrepancy_study(study: Study, model: Path) -> Study:
+    """The study whose episodes are replays of its first agent's commands on the target that a model describes.
+
+    Raises:
+        InputError: If there is no such model, or the study's domain family cannot replay commands.
+    """
+    if not model.is_file():
+        raise InputError(f"--target-model {model}: no such file; check the path")
+    proxy: Any = study.family
+    if not (hasattr(proxy, "drive") and hasattr(proxy, "replay")):
+        raise InputError(
+            f"--target-model: family {study.settings.family} has no `drive` and `replay`, without which there is"
+            " no POD; leave the option out"
+        )
+    target: Any = load_family(study.settings, model)
+    both = Discrepancy(proxy, target)
+    settings = replace(study.settings, agents=study.settings.agents[:1])
+    return Study(settings, both, study.target, both.identity)
+
+
+RESAMPLES = 1000
+DECIMALS = 12
+"""Grid values are rounded to so many, that 0.1 is 0.1 and not a hair less."""
+
+
+@dataclass(frozen=True)
+class PodMean:
+    """A POD averaged over the starts.
+
+    Attributes:
+        value: In its own unit.
+        interval: Its bootstrap interval over the starts; None for a single start.
+        starts: How many starts worked.
+    """
+
+    value: float
+    interval: tuple[float, float] | None
+    starts: int
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One point of a curve.
+
+    Attributes:
+        value: The parameter, in its unit.
+        evaluation: What the agents scored there.
+        assessment: How useful the proxy is there; None if an agent has no episode that worked.
+        pod: "pod_pose" [m] and "pod_image" [of full scale]; empty where POD was not asked for or every replay failed.
+    """
+
+    value: float
+    evaluation: Evaluation
+    assessment: Assessment | None
+    pod: Mapping[str, PodMean] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Usefulness along one parameter.
+
+    Attributes:
+        parameter: Its name.
+        unit: Its unit.
+        base: What the other parameters are held at; those not named are nominal.
+        metrics: How agents are compared.
+        points: In rising order of the parameter.
+        has_pod: Whether POD was asked for.
+    """
+
+    parameter: str
+    unit: str
+    base: Theta
+    metrics: tuple[str, ...]
+    points: tuple[SweepPoint, ...]
+    has_pod: bool = False
+
+    @property
+    def label(self) -> str:
+        """The parameter with its unit, as axes and columns name it."""
+        return f"{self.parameter} [{self.unit}]" if self.unit else self.parameter
+
+
+def sweep_interval(study: Study, parameter: str) -> Interval:
+    """Where a parameter is swept: over the study's box, or over all it may be where the study does not search it.
+
+    Raises:
+        InputError: If the family has no such parameter.
+    """
+    boxes = {interval.name: interval for interval in study.settings.space.intervals}
+    if parameter in boxes:
+        return boxes[parameter]
+    known = _parameter(study, parameter)
+    return Interval(parameter, known.low, known.high)
+
+
+def check_base(study: Study, base: Theta) -> None:
+    """Refuse values that the family cannot take.
+
+    Raises:
+        InputError: With the parameter's name.
+    """
+    for name, value in base.items():
+        known = _parameter(study, name)
+        if not known.low <= value <= known.high:
+            raise InputError(f"parameter '{name}': must lie within [{known.low:g}, {known.high:g}], got {value:g}")
+
+
+def _parameter(study: Study, name: str) -> Parameter:
+    known = study.family.parameters
+    if name not in known:
+        raise InputError(f"no parameter '{name}' in this study's domain family; {nearest(name, known)}")
+    return known[name]
+
+
+def plan_sweep(interval: Interval, base: Theta, points: int) -> SweepRecord:
+    """An even grid over the interval, both ends included, and the parameter's own value in the base if it has one."""
+    grid = np.linspace(interval.low, interval.high, points).round(DECIMALS).tolist()
+    own = [base[interval.name]] if interval.name in base else []
+    return SweepRecord(interval.name, dict(base), tuple(sorted({*grid, *own})))
+
+
+def with_target(sweep: SweepRecord, model: Path, discrepancy: Study) -> SweepRecord:
+    """The sweep with POD besides, against the target of this model (discrepancy.discrepancy_study)."""
+    return replace(sweep, target_model=model.read_text(encoding="utf-8"), replays=discrepancy.identity)
+
+
+def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = None) -> None:
+    """Simulate what is missing of a sweep; episodes are shared with the study's trials and other sweeps.
+
+    With the study of the discrepancy that the sweep names (with_target), POD is simulated too.
+    """
+    run.store.save_sweep(run.study.identity, sweep)
+    replays = run.of(discrepancy) if discrepancy is not None else None
+    for number, value in enumerate(sweep.points, start=1):
+        what = f"{sweep.parameter} {number} of {len(sweep.points)}"
+        scored = run.evaluate(_theta(sweep, value), what)
+        if replays is not None:
+            planned = plan(replays.settings, _theta(sweep, value), replays.settings.seed)
+            replays.outcomes(planned, f"POD, {what}")
+        came = "failed" if scored.prpv is None else f"PRPV {scored.prpv:g}"
+        run.watcher.finished(f"{what}, at {value:g}: {came}")
+    if replays is not None:
+        run.spent += replays.spent
+
+
+def curve_of(run: StudyRun, sweep: SweepRecord) -> Curve | None:
+    """The curve of a sweep from what has been simulated; None if an episode is still missing."""
+    points = [point for value in sweep.points if (point := _point(run, sweep, value))]
+    if len(points) < len(sweep.points):
+        return None
+    unit = run.study.family.parameters[sweep.parameter].unit
+    metrics = tuple(metric.name for metric in run.settings.metrics)
+    return Curve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
+
+
+def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
+    """Average a POD over starts, with the percentile bootstrap interval of the mean."""
+    found = np.asarray(values, dtype=np.float64)
+    if len(found) < 2:
+        return PodMean(float(found.mean()), None, len(found))
+    draws = np.random.default_rng(seed).integers(len(found), size=(RESAMPLES, len(found)))
+    return PodMean(float(found.mean()), central_interval(found[draws].mean(axis=1)), len(found))
+
+
+def all_curves(run: StudyRun) -> Sequence[Curve]:
+    """The curves of every sweep that has been finished, the last one last, each in the domain family of then."""
+    study = run.study
+    known = [(identity, sweep) for identity, sweep in run.store.sweeps() if sweep.parameter in study.family.parameters]
+    curves = [curve_of(run.of(replace(study, identity=identity)), sweep) for identity, sweep in known]
+    return [curve for curve in curves if curve is not None]
+
+
+def _theta(sweep: SweepRecord, value: float) -> dict[str, float]:
+    return {**sweep.base, sweep.parameter: value}
+
+
+def _point(run: StudyRun, sweep: SweepRecord, value: float) -> SweepPoint | None:
+    """One point from what has been simulated; None if an episode or a replay is still missing."""
+    known = run.evaluation(_theta(sweep, value))
+    pod = _pod(run, sweep, value) if sweep.replays else {}
+    if known is None or pod is None:
+        return None
+    assessment = None
+    if known.proxy is not None:
+        assessment = assess(proxy=known.proxy, target=run.study.target, metrics=run.settings.metrics)
+    return SweepPoint(value, known, assessment, pod)
+
+
+def _pod(run: StudyRun, sweep: SweepRecord, value: float) -> dict[str, PodMean] | None:
+    # Its first agent's commands are replayed, as discrepancy_study has it.
+    replayed = replace(run.settings, agents=run.settings.agents[:1])
+    planned = plan(replayed, _theta(sweep, value), replayed.seed)
+    known = run.store.outcomes(sweep.replays, _theta(sweep, value))
+    if not all(episode in known for episode in planned):
+        return None
+    worked = [metrics for episode in planned if (metrics := known[episode].metrics) is not None]
+    return {name: pod_mean([one[name] for one in worked]) for name in METRICS} if worked else {}
+
+
+UNKNOWN = Measured(None, None)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A measure at one value of the parameter; None where it is undefined or has no interval."""
+
+    value: float
+    score: float | None
+    interval: Ends | None
+
+
+@dataclass(frozen=True)
+class Series:
+    """One measure along the parameter.
+
+    Attributes:
+        measure: What is measured.
+        metric: Of which metric; ALL where there is one value for all metrics.
+        estimates: One per point, in rising order of the parameter.
+    """
+
+    measure: Measure
+    metric: str
+    estimates: tuple[Estimate, ...]
+
+    @property
+    def key(self) -> str:
+        """Its name in files: prpv, ppv, srcc_<metric>, kendall_tau_<metric>, mmrv_<metric>, pod_pose, pod_image."""
+        return self.measure.key_for(self.metric)
+
+    @property
+    def name(self) -> str:
+        """Its name for people."""
+        return self.measure.name_for(self.metric)
+
+    @property
+    def higher_is_better(self) -> bool:
+        """Its direction."""
+        return not self.measure.lower_is_better
+
+
+def series_of(curve: Curve) -> tuple[Series, ...]:
+    """Every measure of a curve; POD only where it was asked for."""
+    on_scores = [one for measure in MEASURES for one in _of_measure(curve, measure)]
+    pods = [_of_pod(curve, measure) for measure in PODS] if curve.has_pod else []
+    return (*on_scores, *pods)
+
+
+def _of_measure(curve: Curve, measure: Measure) -> list[Series]:
+    """One series, or one per metric."""
+    found = [measure.measured(point.assessment) if point.assessment else {} for point in curve.points]
+    metrics = curve.metrics if measure.per_metric else (ALL,)
+    return [_series(curve, measure, metric, [one.get(metric, UNKNOWN) for one in found]) for metric in metrics]
+
+
+def _of_pod(curve: Curve, measure: Measure) -> Series:
+    return _series(curve, measure, ALL, [_pod_mean(point, measure) for point in curve.points])
+
+
+def _pod_mean(point: SweepPoint, measure: Measure) -> Measured:
+    found = point.pod.get(measure.key)
+    return Measured(found.value, found.interval) if found else UNKNOWN
+
+
+def _series(curve: Curve, measure: Measure, metric: str, found: list[Measured]) -> Series:
+    pairs = zip(curve.points, found, strict=True)
+    return Series(measure, metric, tuple(Estimate(point.value, *one) for point, one in pairs))
+
+
+Side = Literal["worsens", "flat", "turns", "unknown", "unseen"]
+
+OUTWARDS: dict[Side, str] = {
+    "worsens": "worsens monotonically within noise",
+    "flat": "does not end up worse beyond noise",
+    "turns": "turns: gets better again beyond noise",
+    "unknown": "cannot be judged without intervals",
+    "unseen": "was not looked at",
+}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The shape of one measure along a parameter.
+
+    Noise is told by the points' own 95 % intervals: one point is beyond noise of another where the two do not meet.
+    That is cautious, since the points share their starts. A point without interval is beyond noise of none.
+
+    Attributes:
+        best: The values of the parameter where the measure is best; empty if it is defined nowhere.
+        score: Its score there.
+        near_best: The values where it is not worse than the best beyond noise.
+        held: Where the parameter is held when others are swept; None if that was not said.
+        below: What the measure does from there downwards: "worsens" if it never gets better again beyond noise and
+            ends up worse beyond noise, "flat" if neither, "turns" if it gets better again beyond noise, "unknown"
+            where there is no interval at an end, "unseen" without a point.
+        above: The same upwards.
+    """
+
+    best: tuple[float, ...]
+    score: float | None
+    near_best: tuple[float, ...]
+    held: float | None
+    below: Side
+    above: Side
+
+    @property
+    def monotone(self) -> bool | None:
+        """Whether it worsens on every side that was seen, without a turn; None where that cannot be told."""
+        seen = {self.below, self.above} - {"unseen"}
+        if seen & {"flat", "turns"}:
+            return False
+        return True if seen == {"worsens"} else None
+
+
+@dataclass(frozen=True)
+class _Cost:
+    """A point whose scores are turned such that lower is better."""
+
+    value: float
+    cost: float
+    low: float
+    high: float
+
+
+def shape_of(series: Series, held: float | None) -> Shape:
+    """Describe one measure round the value at which its parameter is held, as a pure function."""
+    sign = -1.0 if series.higher_is_better else 1.0
+    costs = [cost for estimate in series.estimates if (cost := _cost(estimate, sign))]
+    if not costs:
+        return Shape((), None, (), held, "unseen", "unseen")
+    least = min(cost.cost for cost in costs)
+    best = [cost for cost in costs if cost.cost == least]
+    margin = max(cost.high for cost in best)
+    near = tuple(cost.value for cost in costs if cost.low <= margin)
+    sides = (_side(costs[::-1], held, -1), _side(costs, held, 1))
+    return Shape(tuple(cost.value for cost in best), sign * least + 0.0, near, held, *sides)
+
+
+def describe(series: Series, held: float | None) -> str:
+    """The shape in one line."""
+    shape = shape_of(series, held)
+    if shape.score is None:
+        return f"{series.name}: undefined at every point"
+    extreme = "highest" if series.higher_is_better else "lowest"
+    best, near = ", ".join(f"{value:.4g}" for value in shape.best), _listed(shape.near_best, series)
+    line = f"{series.name}: {extreme} ({shape.score:.3g}) at {best}; not worse beyond noise: {near}"
+    if held is None:
+        return line
+    if "unseen" == shape.below == shape.above:
+        return line
+    return f"{line}; from {held:.4g} downwards it {OUTWARDS[shape.below]}, upwards it {OUTWARDS[shape.above]}"
+
+
+def _listed(chosen: Sequence[float], series: Series) -> str:
+    """The values as a range where they are one, by name where there are gaps."""
+    between = [one.value for one in series.estimates if chosen[0] <= one.value <= chosen[-1] and one.score is not None]
+    if len(chosen) > 1 and len(between) == len(chosen):
+        return f"{chosen[0]:.4g} to {chosen[-1]:.4g}"
+    return ", ".join(f"{value:.4g}" for value in chosen)
+
+
+def _cost(estimate: Estimate, sign: float) -> _Cost | None:
+    if estimate.score is None:
+        return None
+    cost = sign * estimate.score
+    if estimate.interval is None:
+        return _Cost(estimate.value, cost, -math.inf, math.inf)
+    low, high = sorted(sign * end for end in estimate.interval)
+    return _Cost(estimate.value, cost, min(low, cost), max(high, cost))
+
+
+def _side(costs: Sequence[_Cost], held: float | None, direction: int) -> Side:
+    """What happens outwards of the held value; the points come in outward order."""
+    if held is None or not any(cost.value == held for cost in costs):
+        return "unseen"
+    path = [cost for cost in costs if direction * (cost.value - held) >= 0]
+    if len(path) < 2:
+        return "unseen"
+    if any(later.high < earlier.low for place, earlier in enumerate(path) for later in path[place + 1 :]):
+        return "turns"
+    if math.inf in (path[0].high, path[-1].high):
+        return "unknown"
+    return "worsens" if path[-1].low > path[0].high else "flat"

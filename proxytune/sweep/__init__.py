@@ -1,1 +1,0 @@
-"""Usefulness along one parameter: the curves and what they show."""

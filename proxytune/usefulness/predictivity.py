@@ -1,0 +1,373 @@
+"""PPV, the proxy predictivity value: how far the proxy's scores are from the target's.
+
+MMRV, the mean maximum rank violation of SIMPLER: what a wrong order costs on the target.
+Correlation of the agents' scores in two domains: SRCC (Pearson) and Kendall's τ, metric by metric.
+POD, the proxy observation discrepancy: how unlike two domains answer the same commands.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from proxytune.arrays import Floats
+from proxytune.errors import InputError
+from proxytune.scores import ROUNDING, Metric, ScoreTable, varies
+from proxytune.settings import nearest
+from proxytune.usefulness.pairs import FEW_AGENTS, Comparison, by_table, compare, kendall_of_table, violations_of_table
+
+SMALLEST_SPREAD = 1e-150
+
+
+@dataclass(frozen=True)
+class Ppv:
+    """A proxy predictivity value.
+
+    Attributes:
+        value: Weighted error of an agent's scores, 0 (every score foretold) or more; None if no metric has a weight.
+        beta: Weight of each metric; None where the target's agents all score alike, so that there is no spread.
+        inputs: What was compared, with its sample sizes.
+    """
+
+    value: float | None
+    beta: Mapping[str, float | None]
+    inputs: Comparison
+    better: ClassVar[str] = "lower"
+    range: ClassVar[tuple[int, None]] = (0, None)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What had to be left out, in one line each."""
+        return tuple(
+            f"{name}: left out of PPV, since all agents score alike on the target and no weight is given"
+            for name, weight in self.beta.items()
+            if weight is None
+        )
+
+
+def ppv_of_means(proxy: Floats, target: Floats, weights: Floats) -> Floats:
+    """PPV, eq. (2), of many pairs of tables at once.
+
+    Args:
+        proxy: Mean scores in the proxy, shape (…, agents, metrics).
+        target: Mean scores on the target, broadcastable to the same shape.
+        weights: β, one per metric, shape (…, metrics).
+
+    Returns:
+        Shape (…).
+    """
+    return np.asarray((np.abs(proxy - target) @ weights[..., None])[..., 0].mean(axis=-1), dtype=np.float64)
+
+
+def ppv(
+    *,
+    proxy: ScoreTable,
+    target: ScoreTable,
+    metrics: Sequence[Metric],
+    beta: Mapping[str, float] | None = None,
+) -> Ppv:
+    """Weigh how far the proxy's scores are from the target's, eq. (2) of the paper.
+
+    The definition taken: Σ_m β_m |M_m(proxy) − M_m(target)|, averaged over the agents. Without β each metric weighs
+    one over its spread on the target (standard deviation of the agents' means), so that PPV counts standard deviations.
+
+    Args:
+        proxy: Scores in the proxy.
+        target: Scores on the target.
+        metrics: Which metrics count; direction and tolerance play no part.
+        beta: A weight for every metric, in one over its unit.
+
+    Raises:
+        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
+        InputError: If a weight is missing, unknown, negative or not finite.
+    """
+    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    weights = _given(inputs, beta) if beta is not None else weights_of_spread(inputs.target.means)
+    named = {m.name: float(weight) if weight > 0 or beta else None for m, weight in zip(metrics, weights, strict=True)}
+    value = float(ppv_of_means(*inputs.means, weights)) if any(w is not None for w in named.values()) else None
+    return Ppv(value, named, inputs)
+
+
+def weights_of_spread(target: Floats) -> Floats:
+    """One over the spread of the agents' mean scores on the target.
+
+    Args:
+        target: Mean scores, shape (…, agents, metrics).
+
+    Returns:
+        Shape (…, metrics), 0 where all agents score alike, or so nearly that squares of it are none.
+    """
+    spreads = target.std(axis=-2, ddof=1)
+    varied = varies(target) & (spreads > SMALLEST_SPREAD)
+    return np.where(varied, 1.0 / np.where(varied, spreads, 1.0), 0.0)
+
+
+def _given(inputs: Comparison, beta: Mapping[str, float]) -> Floats:
+    names = [metric.name for metric in inputs.metrics]
+    for name, weight in beta.items():
+        if name not in names:
+            raise InputError(f"weight of '{name}': no such metric; {nearest(name, names)}")
+        if not (np.isfinite(weight) and weight >= 0):
+            raise InputError(f"weight of '{name}': must be zero or more, got {weight}")
+    missing = [name for name in names if name not in beta]
+    if missing:
+        raise InputError(f"no weight is given for {', '.join(missing)}; give one for every metric or none at all")
+    return np.array([beta[name] for name in names])
+
+
+@dataclass(frozen=True)
+class Mmrv:
+    """A mean maximum rank violation per metric.
+
+    Attributes:
+        value: Metric to violation, in the metric's unit: 0 (same order) up to the largest difference on the target.
+        inputs: What was compared, with its sample sizes.
+    """
+
+    value: Mapping[str, float]
+    inputs: Comparison
+    better: ClassVar[str] = "lower"
+
+    @property
+    def range(self) -> Mapping[str, tuple[float, float]]:
+        """Smallest and largest possible value per metric."""
+        spreads = np.ptp(self.inputs.target.means, axis=0)
+        return {m.name: (0.0, float(spread)) for m, spread in zip(self.inputs.metrics, spreads, strict=True)}
+
+
+def mmrv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
+    """MMRV of many pairs of tables at once.
+
+    Args:
+        proxy: Mean scores in the proxy, shape (…, agents, metrics).
+        target: Mean scores on the target, broadcastable to the same shape.
+        metrics: Which direction is better; tolerances play no part.
+
+    Returns:
+        Shape (…, metrics).
+    """
+    signs = np.array([1.0 if metric.direction == "max" else -1.0 for metric in metrics])
+    if proxy.shape[-2] > FEW_AGENTS:
+        return np.asarray(by_table(violations_of_table, proxy * signs, target * signs).mean(axis=-2), dtype=np.float64)
+    violated = _above(proxy * signs) != _above(target * signs)
+    costs = np.abs(target[..., :, None, :] - target[..., None, :, :]) * violated
+    return np.asarray(costs.max(axis=-2).mean(axis=-2), dtype=np.float64)
+
+
+def mmrv(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Mmrv:
+    """Average over agents the largest target difference among the pairs that the proxy orders wrongly.
+
+    Of two agents that the proxy ties and the target does not, the better one counts as violated, as in SIMPLER's code.
+    Source: Li et al., Evaluating Real-World Robot Manipulation Policies in Simulation (2024).
+
+    Raises:
+        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
+    """
+    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    values = mmrv_of_means(*inputs.means, inputs.metrics)
+    return Mmrv({m.name: float(value) for m, value in zip(inputs.metrics, values, strict=True)}, inputs)
+
+
+def _above(scores: Floats) -> NDArray[np.bool_]:
+    """Whether row scores above column, shape (…, agents, agents, metrics)."""
+    tie = ROUNDING * np.abs(scores).max(axis=-2)[..., None, None, :]
+    return np.asarray(scores[..., :, None, :] - scores[..., None, :, :] > tie, dtype=np.bool_)
+
+
+SIMPLER_EPSILON = 1e-8
+"""SIMPLER adds this to Pearson's denominator unless both sides are equal; so do we, for its published figures to come
+out to every digit. Elsewhere it is below notice, as long as scores are not of the order of 1e-4 or less."""
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """A correlation of proxy and target per metric.
+
+    Attributes:
+        name: Which correlation.
+        value: Metric to coefficient, −1 to 1; None where it is undefined.
+        notes: Why it is undefined or means little, in one line each.
+        inputs: What was compared, with its sample sizes.
+    """
+
+    name: str
+    value: Mapping[str, float | None]
+    notes: tuple[str, ...]
+    inputs: Comparison
+    better: ClassVar[str] = "higher"
+    range: ClassVar[tuple[int, int]] = (-1, 1)
+
+
+def pearson_of_means(proxy: Floats, target: Floats) -> Floats:
+    """Pearson's coefficient between two domains.
+
+    Args:
+        proxy: Mean scores in the proxy, shape (…, agents, metrics).
+        target: Mean scores on the target, broadcastable to the same shape.
+
+    Returns:
+        Shape (…, metrics), from −1 to 1; NaN where all agents score alike in one of the domains.
+    """
+    one = proxy - proxy.mean(axis=-2, keepdims=True)
+    other = target - target.mean(axis=-2, keepdims=True)
+    norms = np.sqrt((one**2).sum(axis=-2) * (other**2).sum(axis=-2))
+    coefficients = np.where((one == other).all(axis=-2), 1.0, (one * other).sum(axis=-2) / (norms + SIMPLER_EPSILON))
+    return np.where(varies(proxy) & varies(target), np.clip(coefficients, -1, 1), np.nan)
+
+
+def kendall_of_means(proxy: Floats, target: Floats) -> Floats:
+    """Kendall's τ-b between two domains, shapes as in pearson_of_means."""
+    if proxy.shape[-2] > FEW_AGENTS:
+        return by_table(kendall_of_table, proxy, target)
+    one, other = _orders(proxy), _orders(target)
+    concordant = (one * other).sum(axis=(-2, -3))
+    pairs = np.abs(one).sum(axis=(-2, -3)) * np.abs(other).sum(axis=(-2, -3))
+    return np.asarray(concordant / np.sqrt(np.where(pairs > 0, pairs, np.nan)), dtype=np.float64)
+
+
+def srcc(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Correlation:
+    """Pearson's correlation of mean scores, the sim-to-real correlation coefficient of Kadian et al. (2020).
+
+    Raises:
+        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown.
+    """
+    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    return _correlation("SRCC", pearson_of_means(*inputs.means), inputs)
+
+
+def kendall_tau(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Correlation:
+    """Kendall's τ-b of mean scores: how far the orders of the agents agree; tolerances play no part.
+
+    Raises:
+        ScoresError: As in srcc.
+    """
+    inputs = compare(proxy=proxy, target=target, metrics=metrics)
+    return _correlation("Kendall's τ", kendall_of_means(*inputs.means), inputs)
+
+
+def _orders(means: Floats) -> Floats:
+    """Sign of the difference of every two agents, shape (…, agents, agents, metrics), zero for ties."""
+    differences = means[..., :, None, :] - means[..., None, :, :]
+    tie = ROUNDING * np.abs(means).max(axis=-2)[..., None, None, :]
+    return np.where(np.abs(differences) > tie, np.sign(differences), 0.0)
+
+
+def _correlation(name: str, values: Floats, inputs: Comparison) -> Correlation:
+    named = {m.name: None if np.isnan(v) else float(v) for m, v in zip(inputs.metrics, values, strict=True)}
+    notes = []
+    for column, metric in enumerate(inputs.metrics):
+        for where, table in (("in the proxy", inputs.proxy), ("on the target", inputs.target)):
+            if not varies(table.means)[column]:
+                notes.append(f"{metric.name}: {name} is undefined, since all agents score alike {where}")
+    if len(inputs.agents) == 2:
+        notes.append(f"{name} of two agents is always 1, −1 or undefined; score more agents")
+    return Correlation(name, named, tuple(notes), inputs)
+
+
+Reduction = Literal["mean", "sum"]
+
+
+@dataclass(frozen=True)
+class Pod:
+    """A proxy observation discrepancy.
+
+    Attributes:
+        value: Mean or sum over time of the discrepancy of the observations, 0 or more.
+        unit: Its unit.
+        kind: What was observed, "pose" or "image".
+        norm: How two observations were compared.
+        reduction: Whether the discrepancies were averaged or added over time.
+        discrepancies: The discrepancy at each time, shape (…, time).
+    """
+
+    value: float
+    unit: str
+    kind: Literal["pose", "image"]
+    norm: str
+    reduction: Reduction
+    discrepancies: Floats
+    better: ClassVar[str] = "lower"
+
+    @property
+    def range(self) -> tuple[float, float | None]:
+        """Smallest and largest possible value; None where there is no bound."""
+        if self.kind == "pose":
+            return 0.0, None
+        return 0.0, 1.0 if self.reduction == "mean" else float(self.discrepancies.size)
+
+    @property
+    def observations(self) -> int:
+        """How many pairs of observations were compared."""
+        return self.discrepancies.size
+
+
+def pod_of_poses(
+    *, proxy: ArrayLike, target: ArrayLike, reduction: Reduction = "mean", metres_per_radian: float = 0.0
+) -> Pod:
+    """Compare poses under the same commands, eq. (1) of the paper: ‖(Δx, Δy, a·Δheading)‖₂ at each time.
+
+    Args:
+        proxy: Poses in the proxy, shape (…, time, 3): x [m], y [m], heading [rad].
+        target: Poses on the target at the same times, same shape.
+        reduction: Average over time, or add up as in the paper.
+        metres_per_radian: The weight a of the heading; 0 compares positions alone. Headings differ by π at most.
+
+    Raises:
+        InputError: If the shapes differ or are none of poses, or a value is missing.
+    """
+    one, other = _pair(proxy, target)
+    if one.ndim < 2 or one.shape[-1] != 3:
+        raise InputError(f"poses are arrays of shape (…, time, 3): x, y, heading; got {one.shape}")
+    difference = one - other
+    turned = np.angle(np.exp(1j * difference[..., 2]))
+    discrepancies = np.sqrt(difference[..., 0] ** 2 + difference[..., 1] ** 2 + (metres_per_radian * turned) ** 2)
+    norm = (
+        f"Euclidean norm of (x, y, {metres_per_radian:g} m/rad · heading)" if metres_per_radian else "distance (x, y)"
+    )
+    return Pod(_reduce(discrepancies, reduction), "m", "pose", norm, reduction, discrepancies)
+
+
+def pod_of_images(*, proxy: ArrayLike, target: ArrayLike, reduction: Reduction = "mean") -> Pod:
+    """Compare camera images under the same commands, eq. (1): root mean square over pixels and channels at each time.
+
+    That is the Euclidean norm of the paper divided by the square root of the number of pixels, as a fraction of
+    full scale, so that it does not depend on the resolution.
+
+    Args:
+        proxy: Images in the proxy, shape (time, height, width) or (time, height, width, channels): whole numbers of
+            0 to 255 or fractions of 0 to 1.
+        target: Images on the target at the same times, same shape and type.
+        reduction: Average over time, or add up as in the paper.
+
+    Raises:
+        InputError: If shapes or types differ or are none of images, or a value is missing or beyond full scale.
+    """
+    if (np.asarray(proxy).dtype.kind in "iu") != (np.asarray(target).dtype.kind in "iu"):
+        raise InputError("images of proxy and target must both be whole numbers (0 to 255) or both fractions (0 to 1)")
+    full_scale = 255.0 if np.asarray(proxy).dtype.kind in "iu" else 1.0
+    one, other = _pair(proxy, target)
+    if one.ndim not in (3, 4):
+        raise InputError(f"images are arrays of shape (time, height, width) or with channels last; got {one.shape}")
+    if min(one.min(), other.min()) < 0 or max(one.max(), other.max()) > full_scale:
+        raise InputError(f"images must be within 0 and {full_scale:g}")
+    squares = ((one - other) / full_scale) ** 2
+    discrepancies = np.sqrt(squares.reshape(len(squares), -1).mean(axis=1))
+    norm = "root mean square over pixels and channels"
+    return Pod(_reduce(discrepancies, reduction), "of full scale", "image", norm, reduction, discrepancies)
+
+
+def _pair(proxy: ArrayLike, target: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    one, other = np.asarray(proxy, dtype=np.float64), np.asarray(target, dtype=np.float64)
+    if one.shape != other.shape:
+        raise InputError(f"proxy and target must be observed at the same times: shapes {one.shape} and {other.shape}")
+    if one.size == 0:
+        raise InputError("there is no observation to compare")
+    if not (np.isfinite(one).all() and np.isfinite(other).all()):
+        raise InputError("an observation is missing (NaN); leave out times at which either domain was not observed")
+    return one, other
+
+
+def _reduce(discrepancies: Floats, reduction: Reduction) -> float:
+    return float(discrepancies.mean() if reduction == "mean" else discrepancies.sum())

@@ -1,0 +1,332 @@
+"""How often the diagnosis of a camera is right, on frames that another renderer drew of lanes laid by hand.
+
+Verdicts on planted cameras, from a log's files to the last line.
+How a map was laid is told: a line beside its place, wider lines, and a whole map that is off.
+"""
+
+import functools
+import tempfile
+from collections import defaultdict
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from camera_truth.answers import diagnosed
+from camera_truth.rates import confusion, coverage, rates
+from joblib import Parallel, delayed
+from pictured import PICTURES, ROAD, ROBOT, lane_poses, pictures, write_pictures, write_still_frames
+from scipy.ndimage import map_coordinates
+from viewed import NEUTRAL, at_truth, driven, everything, stood, tracked
+
+from proxytune.diagnosis import camera_effects, project
+from proxytune.diagnosis.camera.diagnose import _verdict, declared_camera_effects, describe_map, diagnose_camera
+from proxytune.diagnosis.camera.fitting import fit_camera
+from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
+from proxytune.diagnosis.camera.selection import NEAR
+from proxytune.driving import LINES, robot_from_geometry
+from proxytune.errors import LogError, SettingsError
+from proxytune.logs import Frames, Log, LogEpisode, read_log
+
+SETS = (
+    ("none still small_loop", 500),
+    ("none drive horseshoe 20mm_tape", 501),
+    ("camera_roll", 502),
+    ("lens_distortion 20mm_tape", 503),
+    ("camera_latency", 504),
+    ("vignetting", 505),
+    ("camera_height+field_of_view", 506),
+    ("dirt", 507),
+    ("bumper", 508),
+    ("bent_lens", 509),
+)
+"""Sets whose seeds nothing was developed on: half a minute of processor time each."""
+
+
+@pytest.mark.slow
+def test_what_a_camera_lacks_is_named_and_what_no_name_explains_is_flagged(capsys):
+    answers = Parallel(n_jobs=2)(delayed(diagnosed)(case, seed) for case, seed in SETS)
+    counted = rates(answers)
+    held = coverage(answers)
+    with capsys.disabled():
+        print()
+        print("\n".join(f"{name}: {rate}" for name, rate in counted.items()))
+        print("\n".join(f"{name}: {rate}" for name, rate in held.items()))
+        print(confusion(answers))
+    assert counted["failed"].hits == 0
+    assert counted["geometric: named"].hits == counted["geometric: named"].of == 2
+    assert counted["timed: named"].hits == 1
+    assert counted["light: named"].hits == 1
+    assert counted["pairs: both named"].hits == 1
+    assert counted["nothing missing: false alarms"].hits == 0
+    assert counted["outside: flagged"].hits >= 2
+    assert sum(rate.hits for rate in held.values()) >= 0.8 * sum(rate.of for rate in held.values())
+
+
+COUNT, COLUMNS = 30, 96
+DECLARED = ("camera_pitch", "blur")
+ROLLED = {"camera_roll": 4.0}
+SCATTER = (0.002, np.radians(0.3))
+STEPS = defaultdict(list)
+"""The lines that each diagnosis reported."""
+
+
+@functools.cache
+def folder():
+    return tempfile.TemporaryDirectory()
+
+
+def write(name, shown, rectified=False):
+    """A log of frames standing still, whose poses scatter as it states."""
+    home = Path(folder().name) / name
+    write_still_frames(home, {}, tracked(lane_poses(COUNT), scatter=SCATTER), columns=32)
+    for path in (home / "frames").iterdir():
+        path.unlink()
+    (home / "frames").rmdir()
+    write_pictures(home, shown)
+    if rectified:
+        with (home / "log.toml").open("a") as file:
+            file.write("rectified = true\n")
+    return read_log(home)
+
+
+@functools.cache
+def shown(theta=()):
+    return pictures(dict(theta), lane_poses(COUNT), COLUMNS)
+
+
+@functools.cache
+def diagnosed_of_diagnose_camera(name):
+    return diagnose_camera(LOGS[name](), ROBOT, DECLARED, report=lambda line: STEPS[name].append(line))
+
+
+@functools.cache
+def nominal():
+    return write("nominal", shown())
+
+
+def waved():
+    """What a lens shows that bends as none of the catalogue does."""
+    down, right = np.mgrid[:72, :96].astype(float)
+    at = (down + 1.5 * np.sin(right / 12.0), right)
+    colours = [[map_coordinates(one[..., c], at, order=1, mode="nearest") for c in range(3)] for one in shown()]
+    return np.moveaxis(np.array(colours), 1, -1)
+
+
+LOGS = {
+    "nominal": nominal,
+    "rolled": lambda: write("rolled", shown(tuple(ROLLED.items()))),
+    "waved": lambda: write("waved", waved()),
+    "rectified": lambda: write("rectified", shown((("lens_distortion", -0.25),)), rectified=True),
+    "bent": lambda: write("bent", shown((("lens_distortion", -0.25),))),
+}
+
+
+def test_nothing_is_missing_of_a_nominal_camera():
+    found = diagnosed_of_diagnose_camera("nominal")
+    assert (found.verdict, found.effects) == ("nothing missing", ())
+    low, high = found.declared["camera_pitch"].interval
+    assert low < 19.15 < high
+    assert set(found.declared) == set(found.theta) == {"camera_pitch"}
+    assert found.matched > 0.9
+    assert found.notes == ()
+
+
+def test_a_rolled_camera_is_explained_by_its_roll():
+    found = diagnosed_of_diagnose_camera("rolled")
+    (effect,) = found.effects
+    assert (found.verdict, effect.effect, effect.names) == ("explained", "camera_roll", ("camera_roll",))
+    assert found.theta["camera_roll"].interval[0] < 4.0 < found.theta["camera_roll"].interval[1]
+    assert effect.nats > 6.0
+    assert effect.error_without > 1.5
+    assert found.pixels.after.value < 0.6 * found.pixels.before.value
+    assert [gate.open for gate in found.gates] == [True, False]
+    assert found.candidates[0].effects == ("camera_roll",)
+
+
+@pytest.mark.slow
+def test_a_lens_that_the_catalogue_does_not_have_is_not_explained():
+    found = diagnosed_of_diagnose_camera("waved")
+    assert found.verdict in ("partly explained", "unexplained")
+    assert found.gates[1].open
+    assert (found.verdict == "partly explained") == bool(found.effects)
+
+
+@pytest.mark.parametrize(
+    ("left_over", "blemishes", "named", "verdict"),
+    [
+        (False, (), False, "nothing missing"),
+        (False, (), True, "explained"),
+        (True, (), True, "partly explained"),
+        (True, (), False, "unexplained"),
+        (False, ("dirt",), False, "unexplained"),
+        (False, ("dirt",), True, "partly explained"),
+    ],
+)
+def test_what_is_left_over_and_what_covers_the_picture_make_the_verdict(left_over, blemishes, named, verdict):
+    assert _verdict(SimpleNamespace(open=left_over), SimpleNamespace(blemishes=blemishes), named=named) == verdict
+
+
+@pytest.mark.slow
+def test_frames_whose_distortion_was_taken_out_never_name_it():
+    bent, rectified = diagnosed_of_diagnose_camera("bent"), diagnosed_of_diagnose_camera("rectified")
+    assert [effect.effect for effect in bent.effects] == ["lens_distortion"]
+    assert "lens_distortion" not in rectified.named.full.names
+    assert "lens_distortion" not in {effect.effect for effect in rectified.effects}
+    assert "lens_distortion" not in {effect for one in rectified.candidates for effect in one.effects}
+
+
+def test_frames_standing_still_say_what_they_hide_and_what_to_take():
+    found = diagnosed_of_diagnose_camera("nominal")
+    assert {"camera_latency", "rolling_shutter"} <= set(found.could_not_be_seen)
+    assert any("driving bends" in view for view in found.next_views)
+
+
+def drive_log(home, readout_s=None):
+    """A drive by a camera whose rows take 0.06 s to read."""
+    count = 30
+    views = driven({"rolling_shutter": 0.06}, count)
+    tracks = views.tracks
+    home.mkdir()
+    write_pictures(home, _shown_on(count))
+    drive = LogEpisode("drive", tracks.times, np.zeros((len(tracks.times), 2)), tracks.poses, None)
+    paths = tuple(home / (PICTURES % number) for number in range(count))
+    frames = Frames(paths, np.zeros(count, dtype=int), tracks.instants, "small_loop", 0.002, 0.3, readout_s=readout_s)
+    return Log("drive", "duckiebot", "duty", 20.0, {}, (drive,), replace(frames, fixed_exposure=True))
+
+
+@functools.cache
+def _shown_on(count):
+    views = driven({"rolling_shutter": 0.06}, count)
+    state = neutral_state(views, {**NEUTRAL, "rolling_shutter": 0.06})
+    return np.rint(draw_pictures(views, state, {}, np.arange(count))).astype(np.uint8)
+
+
+@pytest.mark.slow
+def test_a_stated_readout_is_used_and_not_named(tmp_path):
+    stated, open_ = (
+        diagnose_camera(drive_log(tmp_path / name, readout), ROBOT, DECLARED)
+        for name, readout in (("stated", 0.06), ("open", None))
+    )
+    assert stated.named.full.theta["rolling_shutter"] == stated.named.model.theta["rolling_shutter"] == 0.06
+    assert "rolling_shutter" not in stated.named.full.names
+    assert "rolling_shutter" not in {effect.effect for effect in stated.effects}
+    assert "rolling_shutter" not in stated.could_not_be_seen
+    assert "rolling_shutter" in open_.named.full.names
+
+
+def test_steps_are_reported_as_they_begin():
+    diagnosed_of_diagnose_camera("nominal")
+    assert STEPS["nominal"] == [
+        "reading frames",
+        "fitting the camera",
+        "looking for what the camera lacks",
+        "testing on frames kept aside",
+        "looking at brightness and sharpness",
+    ]
+
+
+def test_a_log_without_frames_is_refused_in_one_line():
+    log = replace(nominal(), frames=None)
+    with pytest.raises(LogError, match=r"^pictured: has no frames; add \[camera\] to log.toml$"):
+        diagnose_camera(log, ROBOT, DECLARED)
+
+
+def test_a_robot_without_a_camera_is_refused():
+    geometry = {"wheel_radius": 0.03, "effective_baseline": 0.16, "full_speed": 0.6}
+    with pytest.raises(SettingsError, match="camera"):
+        diagnose_camera(nominal(), robot_from_geometry("cart", geometry, 20.0), DECLARED)
+
+
+def test_effects_of_the_camera_are_those_on_camera_and_pictures():
+    effects = camera_effects(ROBOT.catalogue)
+    assert {"camera_pitch", "blur", "exposure", "camera_latency"} <= set(effects)
+    assert not {"trim", "delay", "yaw_scrub"} & set(effects)
+    assert set(declared_camera_effects(ROBOT)) == {"camera_pitch", "blur"}
+
+
+STRETCH = 2
+
+
+def fitted(views):
+    return fit_camera(views, at_truth(views), ["camera_pitch"], NEAR)
+
+
+def moved(line, by_m):
+    """Views in which one line of one stretch lies so far to the right, seen driving counter-clockwise."""
+    views = replace(stood(noisy=False), tape_m=0.01)
+    there = project(views, at_truth(views))
+    own = (there.marks.line == LINES.index(line)) & (there.marks.stretch == STRETCH)
+    # The edge moves by side · by against the distance's slope; normals point into the marking, so with it
+    size = np.where(own & there.near, there.marks.side * by_m / there.metres, 0.0)
+    edges = views.edges
+    return replace(
+        views,
+        edges=edges._replace(
+            column=edges.column + size * edges.normal[:, 0], row=edges.row + size * edges.normal[:, 1]
+        ),
+    )
+
+
+@pytest.mark.parametrize("line", ["left white line", "right white line", "yellow line"])
+@pytest.mark.parametrize("by_m", [0.01, -0.01])
+def test_a_line_ten_millimetres_beside_its_place_is_told_first(line, by_m):
+    laid = describe_map(fitted(moved(line, by_m)))
+    first = laid.lines[0]
+    assert (first.line, first.stretch) == (line, STRETCH)
+    assert first.right_m == pytest.approx(by_m, abs=0.0035)
+    low, high = first.interval
+    assert low < first.right_m < high
+    assert low > 0.0 or high < 0.0
+
+
+def test_little_is_told_of_a_map_that_lies_where_it_should():
+    laid = describe_map(everything())
+    assert all(abs(line.right_m) < 0.004 for line in laid.lines)
+    for name, within in (("x_m", 0.004), ("y_m", 0.004), ("heading_deg", 0.5)):
+        assert laid.offset[name].value == pytest.approx(0.0, abs=within)
+
+
+def test_a_whole_map_fifteen_millimetres_and_a_degree_off_is_told():
+    """Poses are those of a tracker whose frame has the map 15 mm to the right, 10 mm down and 1° turned."""
+    views = stood()
+    middle, by, turn = np.array(ROAD.size) / 2.0, np.array((0.015, -0.01)), np.radians(1.0)
+    poses = views.tracks.poses
+    rotation = np.array(((np.cos(turn), -np.sin(turn)), (np.sin(turn), np.cos(turn))))
+    places = (poses[:, :2] - middle) @ rotation.T + middle + by
+    off = replace(views, tracks=replace(views.tracks, poses=np.column_stack((places, poses[:, 2] + turn))))
+    laid = describe_map(fitted(off))
+    assert [laid.offset[name].value for name in ("x_m", "y_m")] == pytest.approx([0.015, -0.01], abs=0.002)
+    assert laid.offset["heading_deg"].value == pytest.approx(1.0, abs=0.2)
+    for name, truth in (("x_m", 0.015), ("y_m", -0.01), ("heading_deg", 1.0)):
+        low, high = laid.offset[name].interval
+        assert low < truth < high
+    assert [laid.offset[name].unit for name in ("x_m", "y_m", "heading_deg")] == ["m", "m", "deg"]
+
+
+def test_wider_white_lines_are_told_as_such():
+    views = replace(stood(noisy=False), tape_m=0.005)
+    there = project(views, at_truth(views))
+    out = np.where(views.edges.white & there.near, -0.002 / there.metres, 0.0)
+    wider = replace(
+        views,
+        edges=views.edges._replace(
+            column=views.edges.column + out * views.edges.normal[:, 0],
+            row=views.edges.row + out * views.edges.normal[:, 1],
+        ),
+    )
+    before, after = (describe_map(fitted(each)).widths["white lines"].value for each in (views, wider))
+    assert after - before == pytest.approx(0.004, abs=0.001)
+
+
+def test_the_farthest_line_comes_first():
+    fit = everything()
+    tape = np.zeros_like(fit.state.tape)
+    tape[[0, 1, 2]] = 0.03, -0.06, 0.04
+    laid = describe_map(replace(fit, state=replace(fit.state, tape=tape)))
+    assert [(line.line, line.right_m) for line in laid.lines] == [
+        ("right white line", -0.06),
+        ("yellow line", 0.04),
+        ("left white line", 0.03),
+    ]

@@ -1,0 +1,439 @@
+"""Edges of markings are found to a tenth of a pixel, with the marking's side, and nowhere else.
+
+Where the robot was: smoothed where it moves, exact where it stands, left out where nobody knows.
+A camera in θ: its own effects set it, all others leave it alone, and parameters stay within their bounds.
+The tape's errors each have one place, and no scatter is trusted below its least.
+A log's frames become views: spread over the log, thinned, and refused where too few show markings.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pictured import PICTURES, ROBOT, lane_poses, pictures, write_pictures, write_still_frames
+from viewed import NEUTRAL, OPTICS, stood
+
+from proxytune.diagnosis import effects_of
+from proxytune.diagnosis.camera import edges as gathering
+from proxytune.diagnosis.camera.edges import (
+    BORDER,
+    EVERY,
+    LEAST_SCATTER,
+    LEAST_TAPE_M,
+    LONGEST_GAP_S,
+    SKY_MARGIN,
+    TILTED,
+    Tape,
+    find_edges,
+    gather_views,
+    read_road,
+    track_frames,
+)
+from proxytune.driving import COLOURS, LINES, robot_from_geometry
+from proxytune.driving.optics import SKY
+from proxytune.errors import LogError, SettingsError
+from proxytune.files import shipped
+from proxytune.logs import Frames, Log, LogEpisode, read_log
+
+ROWS, COLUMNS, FINE = 60, 80, 6
+FLOOR, WHITE, YELLOW = (np.array(COLOURS[name], dtype=float) for name in ("asphalt", "white", "yellow"))
+
+
+def striped(angle, offset, paint=WHITE, half_width=6.0):
+    """Floor with a stripe of paint across: its normal's direction [rad], its middle beside the picture's [pixel]."""
+    normal = np.array((np.cos(angle), np.sin(angle)))
+    down, right = np.mgrid[: ROWS * FINE, : COLUMNS * FINE] / FINE + 0.5 / FINE
+    away = (right - COLUMNS / 2.0) * normal[0] + (down - ROWS / 2.0) * normal[1] - offset
+    fine = np.clip(0.5 + (half_width - np.abs(away)) * FINE, 0.0, 1.0)
+    cover = fine.reshape(ROWS, FINE, COLUMNS, FINE).mean(axis=(1, 3))
+    return np.rint(FLOOR + cover[..., None] * (paint - FLOOR)).astype(np.uint8)[None]
+
+
+def yellow_striped(angle, offset):
+    """A yellow stripe, and something white in a corner: whiteness is what yellow is measured by."""
+    shown = striped(angle, offset, YELLOW)
+    shown[:, :9, :9] = WHITE
+    return shown
+
+
+def along_normal(edges, angle, offset):
+    """How far each edge point lies from the stripe's middle, and how much its normal points away from there."""
+    normal = np.array((np.cos(angle), np.sin(angle)))
+    place = np.stack((edges.column - COLUMNS / 2.0, edges.row - ROWS / 2.0), axis=-1)
+    return place @ normal - offset, edges.normal @ normal
+
+
+ANGLES, OFFSETS = st.floats(0.0, 2.0 * np.pi), st.floats(-4.0, 4.0)
+
+
+@settings(deadline=None, max_examples=15)
+@given(ANGLES, OFFSETS)
+def test_a_straight_edge_is_found_within_a_tenth_of_a_pixel_at_any_angle(angle, offset):
+    """Standard deviation, largest at 45°; the whole edge lies within a twentieth, single points within a fifth."""
+    edges = find_edges(striped(angle, offset))
+    away, _ = along_normal(edges, angle, offset)
+    off = np.abs(away) - 6.0
+    assert edges.white.all()
+    assert len(away) > 80
+    assert abs(off.mean()) < 0.06
+    assert off.std() < 0.125
+    assert np.abs(off).max() < 0.2
+
+
+@settings(deadline=None, max_examples=15)
+@given(ANGLES, OFFSETS, st.booleans())
+def test_normals_are_unit_vectors_from_the_floor_into_the_marking(angle, offset, white):
+    edges = find_edges(striped(angle, offset) if white else yellow_striped(angle, offset))
+    edges = edges.only((edges.white == white) & (np.maximum(edges.column, edges.row) > 12.0))
+    away, outward = along_normal(edges, angle, offset)
+    assert len(away) > 80
+    np.testing.assert_allclose(np.linalg.norm(edges.normal, axis=1), 1.0, atol=1e-6)
+    assert (-np.sign(away) * outward > np.cos(np.radians(8.0))).all()
+
+
+def test_a_yellow_stripe_has_yellow_edges_as_far_out_on_either_side():
+    """Strong yellow is not clipped, which would move its edges outwards by 0.2 pixels and make the tape look wider."""
+    edges = find_edges(yellow_striped(0.3, 1.0))
+    yellow = edges.only(~edges.white)
+    away, _ = along_normal(yellow, 0.3, 1.0)
+    assert len(away) > 80
+    sides = [np.abs(away[way * away > 0.0]).mean() - 6.0 for way in (-1.0, 1.0)]
+    assert sides == pytest.approx([0.0, 0.0], abs=0.03)
+    assert sides[0] == pytest.approx(sides[1], abs=0.03)
+
+
+@pytest.mark.parametrize("level", [0, 20, 128, 255])
+def test_nothing_is_found_in_a_flat_picture(level):
+    edges = find_edges(np.full((2, ROWS, COLUMNS, 3), level, dtype=np.uint8))
+    assert [len(field) for field in edges] == [0] * 5
+
+
+def test_faint_noise_is_no_edge():
+    noise = np.random.default_rng(1).normal(0.0, 2.0, (1, ROWS, COLUMNS, 3))
+    shown = np.clip(striped(0.3, 0.0) + noise, 0, 255).astype(np.uint8)
+    away, _ = along_normal(find_edges(shown), 0.3, 0.0)
+    assert np.abs(np.abs(away) - 6.0).max() < 0.4
+
+
+def test_edges_of_the_sky_are_left_out():
+    shown = striped(0.0, 0.0)
+    shown[:, :20] = SKY
+    edges = find_edges(shown)
+    assert len(edges.row) > 60
+    assert edges.row.min() > 20 + SKY_MARGIN
+    away, outward = along_normal(edges, 0.0, 0.0)
+    assert np.abs(np.abs(away) - 6.0).max() < 0.1
+    assert (np.abs(outward) > 0.99).all()
+
+
+def test_a_picture_of_nothing_but_sky_has_no_edges():
+    assert len(find_edges(np.full((1, ROWS, COLUMNS, 3), SKY, dtype=np.uint8)).row) == 0
+
+
+def test_edges_at_the_picture_s_border_are_left_out():
+    edges = find_edges(striped(np.pi / 2.0, -27.0, half_width=2.5))
+    assert edges.row.min() >= BORDER
+    assert len(find_edges(striped(0.0, -COLUMNS / 2.0, half_width=1.0)).row) == 0
+
+
+def test_points_are_sorted_by_picture_and_each_picture_counts_for_itself():
+    shown = pictures({}, lane_poses(4), columns=96)
+    edges = find_edges(shown)
+    assert (np.diff(edges.frame) >= 0).all()
+    assert set(edges.frame) == {0, 1, 2, 3}
+    alone, own = find_edges(shown[2:3]), edges.only(edges.frame == 2)
+    np.testing.assert_array_equal(alone.column, own.column)
+    np.testing.assert_array_equal(alone.white, own.white)
+
+
+def test_pictures_with_red_and_blue_swapped_keep_the_white_edges_and_lose_the_yellow_ones():
+    shown = pictures({}, lane_poses(6))
+    right, swapped = find_edges(shown), find_edges(np.ascontiguousarray(shown[..., ::-1]))
+    floor_only = swapped.only(swapped.row > 50)
+    assert (~right.only(right.row > 50).white).sum() > 100
+    assert (~floor_only.white).sum() == 0
+    white = right.only(right.white & (right.row > 50))
+    known = {(int(f), round(float(c), 1), round(float(r), 1)) for f, _, c, r, _ in zip(*white, strict=True)}
+    again = {(int(f), round(float(c), 1), round(float(r), 1)) for f, _, c, r, _ in zip(*floor_only, strict=True)}
+    assert len(known & again) > 0.6 * len(known)
+
+
+def test_brightness_does_not_move_edges():
+    shown = striped(0.4, 1.0)
+    dark = (shown * 0.4).astype(np.uint8)
+    away, _ = along_normal(find_edges(dark), 0.4, 1.0)
+    assert len(away) > 80
+    assert np.abs(np.abs(away) - 6.0).max() < 0.2
+
+
+RATE, RADIUS, SPEED = 20.0, 0.8, 0.3
+
+
+def circle(times, turn=SPEED / RADIUS):
+    angle = turn * np.asarray(times)
+    return np.column_stack((RADIUS * np.cos(angle), RADIUS * np.sin(angle), angle + np.pi / 2.0))
+
+
+def episode(seconds=10.0, begin=0.0, noise=0.0, seed=0):
+    times = begin + np.arange(0.0, seconds, 1.0 / RATE)
+    poses = circle(times) + np.random.default_rng(seed).normal(0.0, 1.0, (len(times), 3)) * noise
+    return LogEpisode("drive", times, np.zeros((len(times), 2)), poses, None)
+
+
+def log_of(*episodes, rate=RATE):
+    return Log("log", "duckiebot", "duty" if rate else "none", rate, {}, episodes)
+
+
+def frames_at(times, drives=None):
+    times = np.asarray(times, dtype=float)
+    return Frames((), np.zeros(len(times), dtype=int) if drives is None else np.array(drives), times, "small_loop")
+
+
+def test_a_drive_round_a_circle_has_its_poses_and_rates():
+    times = np.linspace(1.0, 8.0, 30)
+    tracks, numbers = track_frames(log_of(episode()), frames_at(times))
+    poses, rates = tracks.at(0.0)
+    np.testing.assert_array_equal(numbers, np.arange(30))
+    np.testing.assert_allclose(poses, circle(times), atol=5e-4)
+    heading = circle(times)[:, 2]
+    course = np.column_stack((SPEED * np.cos(heading), SPEED * np.sin(heading), np.full(30, SPEED / RADIUS)))
+    np.testing.assert_allclose(rates, course, atol=2e-3)
+    assert tracks.moving
+
+
+def test_smoothing_leaves_the_share_of_the_scatter_that_it_says():
+    times = np.arange(1.0, 9.0, 0.5)
+    errors = [
+        track_frames(log_of(episode(noise=0.01, seed=seed)), frames_at(times))[0].at(0.0)[0] - circle(times)
+        for seed in range(40)
+    ]
+    share = track_frames(log_of(episode()), frames_at(times))[0].share
+    assert share < 0.6
+    assert np.std(errors) == pytest.approx(0.01 * share, rel=0.1)
+
+
+def test_a_latency_looks_up_the_pose_of_so_long_before():
+    times = np.linspace(2.0, 8.0, 20)
+    tracks, _ = track_frames(log_of(episode()), frames_at(times))
+    np.testing.assert_allclose(tracks.at(0.13)[0], circle(times - 0.13), atol=6e-4)
+    late, now = tracks.at(0.13)[0], tracks.at(0.0)[0]
+    np.testing.assert_allclose(np.linalg.norm((now - late)[:, :2], axis=1), SPEED * 0.13, rtol=0.02)
+
+
+def test_frames_standing_still_keep_their_poses_to_the_last_digit():
+    times = np.arange(25.0)
+    poses = np.random.default_rng(3).normal(size=(25, 3))
+    still = LogEpisode("stills", times, np.zeros((25, 0)), poses, None)
+    tracks, numbers = track_frames(log_of(still, rate=0.0), frames_at(times[::2]))
+    np.testing.assert_array_equal(tracks.at(0.0)[0], poses[::2])
+    assert (tracks.share, tracks.moving, len(numbers)) == (1.0, False, 13)
+
+
+def test_frames_standing_still_between_two_poses_are_left_out():
+    """However close they are in time: the robot was moved in between."""
+    times = 0.1 * np.arange(25.0)
+    still = LogEpisode("stills", times, np.zeros((25, 0)), circle(times), None)
+    _, numbers = track_frames(log_of(still, rate=0.0), frames_at([0.3, 0.35, 0.4]))
+    np.testing.assert_array_equal(numbers, [0, 2])
+
+
+def test_frames_within_a_long_gap_between_poses_are_left_out():
+    drive = episode()
+    gap = (drive.times > 4.0) & (drive.times < 4.0 + 2.0 * LONGEST_GAP_S)
+    drive.poses[gap] = np.nan
+    _, numbers = track_frames(log_of(drive), frames_at([3.9, 4.2, 4.3, 4.6, -0.2, 12.0]))
+    np.testing.assert_array_equal(numbers, [0, 3])
+
+
+def test_a_missing_pose_is_bridged():
+    drive = episode()
+    drive.poses[80] = np.nan
+    tracks, numbers = track_frames(log_of(drive), frames_at([4.0]))
+    assert len(numbers) == 1
+    np.testing.assert_allclose(tracks.at(0.0)[0], circle([4.0]), atol=1e-3)
+
+
+def test_each_frame_is_looked_up_in_its_own_drive():
+    first, second = episode(), episode(begin=100.0)
+    tracks, _ = track_frames(log_of(first, second), frames_at([5.0, 105.0, 5.5], [0, 1, 0]))
+    np.testing.assert_allclose(tracks.at(0.0)[0], circle([5.0, 105.0, 5.5]), atol=1e-3)
+
+
+def test_a_drive_without_a_pose_is_passed_over():
+    empty = episode()
+    empty.poses[:] = np.nan
+    tracks, numbers = track_frames(log_of(empty, episode()), frames_at([5.0, 5.0], [0, 1]))
+    np.testing.assert_array_equal(numbers, [1])
+    np.testing.assert_allclose(tracks.at(0.0)[0], circle([5.0]), atol=1e-3)
+
+
+def test_frames_of_another_clock_are_refused_in_one_line():
+    with pytest.raises(LogError, match="no frame has a pose near its time; check that times are on the poses' clock"):
+        track_frames(log_of(episode()), frames_at([1000.0, 1001.0]))
+
+
+def test_some_frames_of_a_track_are_those_frames():
+    tracks, _ = track_frames(log_of(episode()), frames_at([2.0, 3.0, 4.0]))
+    np.testing.assert_array_equal(tracks.only(np.array([2, 0])).at(0.0)[0], tracks.at(0.0)[0][[2, 0]])
+
+
+PARAMETERS = OPTICS.robot.catalogue.parameters
+MOUNTING = st.sampled_from(OPTICS.mounting)
+
+
+def test_neutral_values_are_the_nominal_camera_in_the_log_s_size():
+    figures = OPTICS.figures(NEUTRAL)
+    nominal = OPTICS.robot.camera_figures()
+    assert (figures.rows, figures.columns) == (120, 160)
+    assert figures.channels().tolist() == nominal.channels().tolist()
+
+
+@given(MOUNTING, st.floats(0.05, 0.95))
+def test_every_parameter_of_the_mounting_changes_the_camera(name, share):
+    parameter = PARAMETERS[name]
+    value = parameter.low + share * (parameter.high - parameter.low)
+    changed = OPTICS.figures({**NEUTRAL, name: value})
+    assert (changed == OPTICS.figures(NEUTRAL)) == (value == OPTICS.neutral(name))
+
+
+@given(st.floats(0.0, 0.5), st.floats(0.0, 0.2))
+def test_what_is_not_of_the_mounting_leaves_the_camera_alone(latency, blur):
+    assert OPTICS.figures({**NEUTRAL, "camera_latency": latency, "blur": blur}) == OPTICS.figures(NEUTRAL)
+    assert not {"camera_latency", "rolling_shutter", "blur", "trim"} & set(OPTICS.mounting)
+
+
+@given(MOUNTING, st.floats(-1e3, 1e3))
+def test_values_are_clipped_to_the_nearest_bound(name, value):
+    parameter = PARAMETERS[name]
+    clipped = OPTICS.clipped(name, value)
+    assert parameter.low <= clipped <= parameter.high
+    assert clipped == value or clipped in (parameter.low, parameter.high)
+
+
+@given(MOUNTING)
+def test_a_step_is_a_small_part_of_a_spread_and_a_spread_lies_within_the_range(name):
+    parameter = PARAMETERS[name]
+    assert 0.0 < OPTICS.step(name, OPTICS.neutral(name)) < 0.01 * OPTICS.spread(name)
+    assert OPTICS.spread(name) < parameter.high - parameter.low
+
+
+@given(MOUNTING, st.floats(0.0, 1.0))
+def test_a_step_never_leaves_the_bounds(name, share):
+    """A camera cannot be made beyond them."""
+    parameter = PARAMETERS[name]
+    value = OPTICS.clipped(name, parameter.low + share * (parameter.high - parameter.low))
+    assert parameter.low <= value + OPTICS.step(name, value) <= parameter.high
+
+
+def test_parameters_of_one_effect_are_one_effect():
+    names = ("lens_centre.right", "camera_roll", "lens_centre.down", "exposure.gain")
+    assert effects_of(names) == ("lens_centre", "camera_roll", "exposure")
+
+
+def test_a_robot_without_such_a_parameter_is_a_key_error():
+    with pytest.raises(KeyError):
+        OPTICS.neutral("camera_nothing")
+
+
+@given(st.integers(1, 40))
+def test_every_error_of_the_tape_has_a_place_of_its_own(stretches):
+    tape = Tape(stretches)
+    stretch, line = (each.ravel() for each in np.meshgrid(np.arange(stretches), np.arange(len(LINES))))
+    shifts = tape.shift(stretch, line)
+    tilts = tape.tilt(stretch[line < TILTED], line[line < TILTED])
+    white, yellow = np.array([True, False, False]), np.array([0, 2, 3])
+    widths = tape.width(white, yellow)
+    places = np.concatenate((shifts, tilts, widths))
+    assert sorted(places.tolist()) == list(range(tape.size))
+
+
+def test_both_white_lines_have_one_width():
+    tape = Tape(8)
+    assert tape.width(np.array([True]), np.array([0])) == tape.width(np.array([True]), np.array([1]))
+
+
+def test_a_tracker_and_a_map_are_never_trusted_beyond_their_least():
+    views = stood(count=1).with_scatter(0.0, 0.0)
+    np.testing.assert_allclose(views.pose_scatter, (LEAST_SCATTER[0], *LEAST_SCATTER))
+    assert (views.tape_scatter >= LEAST_TAPE_M).all()
+    np.testing.assert_allclose(views.with_scatter(0.01, 0.02).pose_scatter, (0.01, 0.01, 0.02))
+
+
+def test_another_scatter_leaves_all_else_alone():
+    views = stood(count=1)
+    assert views.with_scatter(0.01, 0.02).edges is views.edges
+    assert len(views.tape_scatter) == Tape(views.markings.stretches).size
+    assert views.count == 1
+
+
+COUNT = 24
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_still_frames(tmp_path_factory.mktemp("stills") / "log", {}, lane_poses(COUNT), columns=96)
+
+
+@pytest.fixture(scope="module")
+def log(folder):
+    return read_log(folder)
+
+
+def test_views_hold_what_the_log_says(log):
+    gathered = gather_views(log, log.frames, ROBOT)
+    views = gathered.views
+    np.testing.assert_array_equal(gathered.numbers, np.arange(COUNT))
+    np.testing.assert_allclose(views.tracks.at(0.0)[0][:, :2], lane_poses(COUNT)[:, :2], atol=1e-9)
+    assert gathered.pictures.shape == (COUNT, 72, 96, 3)
+    assert (views.optics.rows, views.optics.columns) == (72, 96)
+    assert (views.position_m, views.heading_rad) == pytest.approx((0.002, np.radians(0.3)))
+    assert views.tape_m == views.markings.road.paint.tape_m == 0.005
+
+
+def test_every_second_edge_point_is_used_in_the_order_of_frames(log):
+    gathered = gather_views(log, log.frames, ROBOT)
+    edges, every = gathered.views.edges, find_edges(gathered.pictures)
+    assert len(edges.row) == -(-len(every.row) // EVERY)
+    np.testing.assert_array_equal(edges.column, every.column[::EVERY])
+    assert (np.diff(edges.frame) >= 0).all()
+
+
+def test_a_tracker_that_states_nothing_is_assumed_to_scatter_by_millimetres(log):
+    frames = replace(log.frames, position_m=None, heading_deg=None)
+    views = gather_views(log, frames, ROBOT).views
+    assert (views.position_m, views.heading_rad) == pytest.approx((0.005, np.radians(1.0)))
+
+
+def test_of_a_long_log_frames_are_spread_evenly(log, monkeypatch):
+    monkeypatch.setattr(gathering, "MOST_FRAMES", 21)
+    numbers = gather_views(log, log.frames, ROBOT).numbers
+    assert (len(numbers), numbers[0], numbers[-1]) == (21, 0, COUNT - 1)
+    assert set(np.diff(numbers)) <= {1, 2}
+
+
+def test_too_few_markings_are_refused_in_one_line_with_the_count(log, tmp_path):
+    pictures = gather_views(log, log.frames, ROBOT).pictures.copy()
+    pictures[3:10] = 60
+    write_pictures(tmp_path, pictures)
+    frames = replace(log.frames, paths=tuple(tmp_path / (PICTURES % number) for number in range(COUNT)))
+    with pytest.raises(LogError) as refusal:
+        gather_views(log, frames, ROBOT)
+    problem = "17 of 24 frames show markings; the camera needs 20: drive nearer to the lines, or check the map"
+    assert str(refusal.value) == f"{log.name}: frames: {problem}"
+
+
+def test_a_robot_without_a_camera_is_refused_before_pictures_are_read(log):
+    geometry = {"wheel_radius": 0.03, "effective_baseline": 0.16, "full_speed": 0.6}
+    frames = replace(log.frames, paths=(Path("nowhere.png"),) * COUNT)
+    with pytest.raises(SettingsError, match="camera"):
+        gather_views(log, frames, robot_from_geometry("cart", geometry, 20.0))
+
+
+def test_a_map_is_one_of_the_package_s_or_a_file():
+    file = shipped("robots") / "maps" / "horseshoe.toml"
+    assert read_road(str(file)).segments == read_road("horseshoe").segments
+    with pytest.raises(SettingsError):
+        read_road("nowhere")

@@ -1,0 +1,265 @@
+"""Pictures of a model are those of its camera, and each effect changes them as it should.
+
+Residuals vanish at the truth, and every slope agrees with finite differences.
+"""
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pictured import ROAD, ROBOT, lane_poses, pictures
+from viewed import NEUTRAL, OPTICS, at_truth, drive, driven, still, stood
+
+from proxytune.diagnosis import project
+from proxytune.diagnosis.camera.edges import MOVING, Tape
+from proxytune.diagnosis.camera.model import camera_slopes, draw_pictures, map_slopes, pose_slopes, tape_slopes
+from proxytune.domain import make_episode
+from proxytune.driving import LINES, LaneFollowing, read_robot
+
+FRAMES = np.arange(4)
+
+
+@functools.cache
+def scenes():
+    """Exact views standing still, and of a drive."""
+    still_ = stood(count=4, noisy=False)
+    return still_, replace(still_, tracks=drive(4))
+
+
+def drawn(moving=False, look=None, theta=None, frames=FRAMES):
+    views = scenes()[moving]
+    return draw_pictures(views, at_truth(views, theta), look or {}, frames)
+
+
+def sharpness(shown):
+    return (np.diff(shown[:, 70:], axis=2) ** 2).mean()
+
+
+def test_without_effects_pictures_are_those_of_the_domain_s_camera(tmp_path):
+    """Of LaneFollowing, at exact poses, in the robot's own size."""
+    family = LaneFollowing("duckiebot", "planar", "ground_plane", ROAD, 4.0, 0.0, 0.0, (), tmp_path)
+    robot = read_robot("duckiebot")
+    poses = lane_poses(4)
+    theta = {"camera_roll": 3.0, "camera_pitch": 21.0}
+    instance = family.instance(theta)
+    figures = robot.camera_figures()
+    views = replace(
+        scenes()[0], tracks=still(poses), optics=replace(scenes()[0].optics, rows=figures.rows, columns=figures.columns)
+    )
+    mine = draw_pictures(views, at_truth(views, theta), {}, FRAMES)
+    np.testing.assert_array_equal(mine, instance.camera.render(poses))
+    assert make_episode(theta, agent="none", start=0, seed=1).theta
+
+
+def test_what_is_added_to_a_tracked_pose_moves_the_camera():
+    views, by = scenes()[0], np.array((0.01, -0.02, 0.05))
+    state = replace(at_truth(views), poses=np.tile(by, (4, 1)))
+    np.testing.assert_array_equal(draw_pictures(views, state, {}, FRAMES), pictures({}, lane_poses(4) + by))
+
+
+def test_frames_are_drawn_in_the_order_asked_for():
+    np.testing.assert_array_equal(drawn(frames=np.array([2, 0])), drawn()[[2, 0]])
+
+
+def test_effects_of_time_leave_frames_standing_still_alone():
+    np.testing.assert_array_equal(drawn(look={"blur": 0.1, "rolling_shutter": 0.03}), drawn())
+
+
+def test_a_latency_shows_what_was_there_so_long_before():
+    views = scenes()[True]
+    tracks = views.tracks
+    before = replace(views, tracks=replace(tracks, instants=tracks.instants - 0.2))
+    np.testing.assert_array_equal(
+        drawn(True, theta={"camera_latency": 0.2}), draw_pictures(before, at_truth(before), {}, FRAMES)
+    )
+    assert np.abs(drawn(True, theta={"camera_latency": 0.2}) - drawn(True)).mean() > 1.0
+
+
+def test_blur_softens_a_drive_s_pictures_and_does_not_shift_them():
+    sharp, soft, softer = (drawn(True, {"blur": seconds}) for seconds in (0.0, 0.05, 0.15))
+    assert sharpness(sharp) > sharpness(soft) > sharpness(softer)
+    assert soft.mean() == pytest.approx(sharp.mean(), rel=0.01)
+    offsets = [np.abs(softer - drawn(True, theta={"camera_latency": late})).mean() for late in (-0.05, 0.0, 0.05)]
+    assert offsets[1] == min(offsets)
+
+
+def test_a_rolling_shutter_shows_each_row_at_its_own_time():
+    """The middle row is on time; the last is half the readout late, the first as early."""
+    rolled = drawn(True, {"rolling_shutter": 0.1})
+    late, now = (drawn(True, theta={"camera_latency": by}) for by in (-0.05, 0.0))
+    last, middle = slice(116, 120), slice(59, 61)
+    assert np.abs(rolled - late)[:, last].mean() < 0.3 * np.abs(rolled - now)[:, last].mean()
+    assert np.abs(rolled - now)[:, middle].mean() < 0.2 * np.abs(now - late)[:, middle].mean()
+
+
+def test_a_readout_of_the_camera_counts_where_the_look_has_none():
+    np.testing.assert_array_equal(
+        drawn(True, theta={"rolling_shutter": 0.1}), drawn(True, look={"rolling_shutter": 0.1})
+    )
+    np.testing.assert_array_equal(
+        drawn(True, {"rolling_shutter": 0.0}, {"rolling_shutter": 0.1}), drawn(True, {"rolling_shutter": 0.0})
+    )
+
+
+def test_defocus_softens_all_over_and_keeps_the_brightness():
+    sharp, soft = drawn(), drawn(look={"defocus": 0.02})
+    assert sharpness(soft) < 0.7 * sharpness(sharp)
+    assert soft.mean() == pytest.approx(sharp.mean(), rel=0.02)
+
+
+def test_vignetting_darkens_the_corners_by_its_strength_and_not_the_middle():
+    ratio = (drawn(look={"vignetting": 0.4}) / np.maximum(drawn(), 1.0)).mean(axis=(0, 3))
+    assert ratio[-1, 0] == pytest.approx(0.6, abs=0.02)
+    assert ratio[59:61, 79:81].mean() == pytest.approx(1.0, abs=0.01)
+
+
+def test_exposure_brightens_by_gain_and_bends_by_gamma():
+    before = drawn()
+    after = drawn(look={"exposure.gain": 1.2, "exposure.gamma": 1.5})
+    np.testing.assert_allclose(after, np.clip(255.0 * 1.2 * (before / 255.0) ** 1.5, 0.0, 255.0), atol=0.01)
+
+
+def test_noise_is_left_out():
+    np.testing.assert_array_equal(drawn(look={"image_noise": 10.0}), drawn())
+
+
+def test_pictures_stay_within_0_and_255():
+    bright = drawn(look={"exposure.gain": 4.0, "exposure.gamma": 1.0})
+    assert bright.max() == 255.0
+    assert bright.dtype == np.float32
+    assert set(NEUTRAL) >= set(ROBOT.catalogue.theta_names("lens_centre"))
+
+
+FAULTS = {"camera_roll": 3.0, "lens_distortion": -0.1, "camera_yaw": 2.0}
+
+
+def scene(moving=False):
+    """Views, and a state that is off in every respect."""
+    views = driven(count=12) if moving else stood(count=12, noisy=False)
+    random = np.random.default_rng(5)
+    state = at_truth(views, {**FAULTS, "camera_latency": 0.08, "rolling_shutter": 0.02} if moving else FAULTS)
+    # Slopes leave out that a line askew lies elsewhere farther on: a hundredth of them
+    tape = random.normal(0.0, 0.003, state.tape.shape)
+    tape[len(LINES) * views.markings.stretches :] = 0.0
+    poses = random.normal(0.0, 1.0, state.poses.shape) * (0.003, 0.003, 0.01)
+    return views, replace(state, tape=tape, offset=np.array((0.01, -0.02, 0.01)), poses=poses)
+
+
+def check(views, state, one, other, step, slope):
+    """The change of the distance [m] in pixels of the middle state, where the nearest edge stays the same."""
+    here, after, before = project(views, state), project(views, one), project(views, other)
+    same = here.valid.copy()
+    for there in (after, before):
+        same &= there.near & (there.marks.stretch == here.marks.stretch) & (there.marks.line == here.marks.line)
+        same &= there.marks.side == here.marks.side
+    same &= here.marks.line != 3  # The way to a dash's end is measured along the centre line
+    change = (after.residual * after.metres - before.residual * before.metres) / here.metres / (2.0 * step)
+    scale = np.abs(slope[same]).max()
+    off = np.abs(change - slope)[same]
+    assert same.sum() > 500
+    assert scale > 0.0
+    assert np.quantile(off, 0.99) < 2e-3 * scale
+
+
+@pytest.mark.parametrize("name", OPTICS.mounting)
+def test_slopes_by_the_camera_are_true(name):
+    views, state = scene()
+    step = OPTICS.step(name, state.theta[name])
+    moved = [replace(state, theta={**state.theta, name: state.theta[name] + way * step}) for way in (1.0, -1.0)]
+    check(views, state, *moved, step, camera_slopes(views, state, project(views, state), [name])[:, 0])
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_slopes_by_latency_and_readout_are_true(name):
+    """Nearly: rates are the tracker's, and poses between two of its samples lie on a line."""
+    views, state = scene(moving=True)
+    there, step = project(views, state), 1e-4
+    moved = [replace(state, theta={**state.theta, name: state.theta[name] + way * step}) for way in (1.0, -1.0)]
+    one, other = (project(views, each) for each in moved)
+    same = there.valid & (one.marks.line == other.marks.line) & (one.marks.side == other.marks.side)
+    same &= (there.marks.line != 3) & (one.marks.stretch == other.marks.stretch)
+    change = (one.residual * one.metres - other.residual * other.metres) / there.metres / (2.0 * step)
+    slope = camera_slopes(views, state, there, [name])[:, 0]
+    assert np.quantile(np.abs(change - slope)[same], 0.95) < 0.1 * np.abs(slope[same]).max()
+    assert np.corrcoef(change[same], slope[same])[0, 1] > 0.98
+
+
+@pytest.mark.parametrize("column", range(3))
+def test_slopes_by_the_pose_are_true(column):
+    views, state = scene()
+    by = 1e-6 * np.eye(3)[column]
+    moved = [replace(state, poses=state.poses + way * by) for way in (1.0, -1.0)]
+    check(views, state, *moved, 1e-6, pose_slopes(project(views, state))[:, column])
+
+
+@pytest.mark.parametrize("column", range(3))
+def test_slopes_by_the_whole_map_are_true(column):
+    views, state = scene()
+    by = 1e-6 * np.eye(3)[column]
+    moved = [replace(state, offset=state.offset + way * by) for way in (1.0, -1.0)]
+    check(views, state, *moved, 1e-6, map_slopes(views, state, project(views, state))[:, column])
+
+
+def test_slopes_by_the_tape_are_exact():
+    views, state = scene()
+    there = project(views, state)
+    dense = np.zeros((len(there.residual), Tape(views.markings.stretches).size))
+    for place, slope in tape_slopes(views, there):
+        dense[np.arange(len(place)), place] += slope
+    by = np.random.default_rng(1).normal(0.0, 0.002, state.tape.shape)
+    change = project(views, replace(state, tape=state.tape + by)).residual - there.residual
+    np.testing.assert_allclose(change, dense @ by, atol=1e-9)
+
+
+def test_no_parameter_has_no_slope():
+    views, state = scene()
+    assert camera_slopes(views, state, project(views, state), []).shape == (len(views.edges.row), 0)
+
+
+@pytest.mark.parametrize("theta", [{}, FAULTS], ids=["nominal", "faulty"])
+def test_residuals_vanish_at_the_truth_and_not_beside_it(theta):
+    views = stood(theta, count=30, noisy=False)
+    there, wrong = (project(views, at_truth(views, told)) for told in (theta, {**theta, "camera_pitch": 17.0}))
+    assert there.valid.sum() > 0.5 * there.near.sum()
+    assert np.median(np.abs(there.residual[there.valid])) < 0.15
+    assert abs(np.median(there.residual[there.valid & views.edges.white])) < 0.1
+    assert np.median(np.abs(wrong.residual[wrong.valid])) > 1.0
+
+
+def test_a_drive_s_residuals_vanish_at_its_latency_and_readout():
+    truth = {"camera_latency": 0.12, "rolling_shutter": 0.04}
+    views = driven(truth, count=12)
+    medians = [
+        np.median(np.abs(there.residual[there.valid]))
+        for there in (project(views, at_truth(views, told)) for told in (truth, {}, {**truth, "rolling_shutter": 0.0}))
+    ]
+    assert medians[0] < 0.2
+    assert medians[1] > 3.0 * medians[0]
+    assert medians[2] > 1.05 * medians[0]
+
+
+def test_what_lies_above_the_horizon_is_never_near():
+    views = stood(count=6, noisy=False)
+    sky = views.edges._replace(row=np.full_like(views.edges.row, 5.0))
+    there = project(replace(views, edges=sky), at_truth(views))
+    assert not there.near.any()
+    assert np.isfinite(there.residual).all()
+    assert np.isfinite(there.slope).all()
+
+
+def test_an_edge_of_the_other_polarity_is_not_valid():
+    views = stood(count=6, noisy=False)
+    flipped = replace(views, edges=views.edges._replace(normal=-views.edges.normal))
+    right, wrong = project(views, at_truth(views)), project(flipped, at_truth(views))
+    close = right.valid & (np.abs(right.residual) < 0.5)
+    assert close.sum() > 300
+    assert not wrong.valid[close].any()
+
+
+def test_the_neutral_camera_is_not_moved_by_names_that_are_not_its_own():
+    views = stood(count=6, noisy=False)
+    there = project(views, at_truth(views))
+    again = project(views, at_truth(views, {"blur": 0.05}))
+    np.testing.assert_array_equal(there.residual, again.residual)
+    assert set(NEUTRAL) >= {"camera_pitch", "camera_latency"}

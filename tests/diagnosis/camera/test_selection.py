@@ -1,0 +1,452 @@
+"""Frames that do not belong to their poses are refused in one line that names the mistake.
+
+What leaving effects out costs is what refitting would cost, for the sets that a caller may choose.
+The gate is closed for the right camera, and for tape beside its place, and open for a lens that nobody has.
+Planted effects are named, alone and in pairs, and nothing is named of a nominal camera.
+What frames cannot show is said, and what to take to see it.
+"""
+
+import functools
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pictured import ROBOT, lane_poses, pictures
+from viewed import OPTICS, at_truth, driven, everything, still, stood, tracked, views_of
+
+from proxytune.diagnosis import Edges, Leftover, project, rank_subsets
+from proxytune.diagnosis.camera.fitting import fit_camera
+from proxytune.diagnosis.camera.selection import (
+    ALWAYS,
+    FEWEST_MATCHED,
+    NEAR,
+    USUAL_MATCHED,
+    check_match,
+    cost_of,
+    find_leftover,
+    fit_everything,
+    fit_set,
+    hidden_effects,
+    matched_share,
+    name_camera_effects,
+    next_views,
+)
+from proxytune.driving import GroundPlaneCamera, Markings, draw_floor, lane_length, lane_point, shipped_map
+from proxytune.errors import LogError
+
+COUNT = 30
+ROLLED = {"camera_roll": 3.0}
+
+
+def shown():
+    return pictures(ROLLED, lane_poses(COUNT))
+
+
+MISTAKES = {
+    "the pictures are mirrored": lambda p, s: (s[:, :, ::-1], p),
+    "the pictures are upside down": lambda p, s: (s[:, ::-1, ::-1], p),
+    "heading is clockwise": lambda p, s: (s, p * (1.0, 1.0, -1.0)),
+    "headings are in degrees": lambda p, s: (s, p * (1.0, 1.0, np.degrees(1.0))),
+    "x and y are swapped": lambda p, s: (s, p[:, (1, 0, 2)]),
+    "each frame belongs to the next row": lambda p, s: (s, np.roll(p, 1, axis=0)),
+    "each frame belongs to the row before": lambda p, s: (s, np.roll(p, -1, axis=0)),
+}
+
+
+def fitted(poses, pictures_):
+    views = views_of(np.ascontiguousarray(pictures_), still(poses))
+    return fit_everything(views, OPTICS.mounting, {}, learn_scatter=False)
+
+
+OFTEN = ("heading is clockwise",)
+"""What every run tries; the others are undone in the same way."""
+
+
+@pytest.mark.parametrize(
+    "mistake", [name if name in OFTEN else pytest.param(name, marks=pytest.mark.slow) for name in MISTAKES]
+)
+def test_a_mistake_is_refused_in_one_line_that_names_it(mistake):
+    pictures_, poses = MISTAKES[mistake](tracked(lane_poses(COUNT)), shown())
+    with pytest.raises(LogError) as refusal:
+        check_match("log", fitted(poses, pictures_))
+    line = str(refusal.value)
+    assert line.startswith("log: frames do not fit the poses: ")
+    assert f"match if {mistake}; correct that" in line
+    assert "\n" not in line
+
+
+@pytest.mark.slow
+def test_a_mistake_is_named_where_few_frames_match_a_little_by_chance():
+    """With 30 frames one row off, a camera with everything free matches 22 %."""
+    poses = lane_poses(30)
+    full = fitted(np.roll(tracked(poses), 1, axis=0), pictures(ROLLED, poses))
+    assert FEWEST_MATCHED < matched_share(full) < USUAL_MATCHED
+    with pytest.raises(LogError, match="98 % match if each frame belongs to the next row; correct that"):
+        check_match("log", full)
+
+
+@pytest.mark.slow
+def test_frames_of_somewhere_else_are_refused_with_what_to_check():
+    poses = np.random.default_rng(7).permutation(lane_poses(COUNT))
+    with pytest.raises(LogError, match="check that frames and rows are the same instants, the map is the right one"):
+        check_match("log", fitted(poses, shown()))
+
+
+@pytest.mark.slow
+def test_poses_three_centimetres_off_are_told():
+    off = np.random.default_rng(3).normal(0.0, (0.03, 0.03, 0.0), (COUNT, 3))
+    (note,) = check_match("log", fitted(lane_poses(COUNT) + off, shown()))
+    assert note.endswith("% of the markings' edges match (60 % or more is usual): poses or map are off by centimetres")
+
+
+def test_nothing_is_said_of_frames_that_belong_to_their_poses():
+    full = everything(ROLLED)
+    assert check_match("log", full) == ()
+    assert matched_share(full) > USUAL_MATCHED
+
+
+def test_the_share_counts_edges_near_markings_only():
+    full = everything(ROLLED)
+    edges = full.views.edges
+    above = edges._replace(row=np.where(edges.frame == 0, 3.0, edges.row))
+    assert matched_share(replace(full, views=replace(full.views, edges=above))) == pytest.approx(
+        matched_share(full), abs=0.03
+    )
+    nothing = replace(full, views=replace(full.views, edges=edges._replace(row=np.full_like(edges.row, 3.0))))
+    assert matched_share(nothing) == 0.0
+    assert stood(ROLLED).count == len(full.state.poses)
+
+
+NAMES = ("camera_pitch", "camera_roll", "lens_centre.right", "lens_centre.down", "pixel_aspect")
+
+
+def linear(seed, rows=40):
+    """A linear problem y = A θ + noise that stands in for a fit, A, y, and the sum of squares over 2."""
+    random = np.random.default_rng(seed)
+    slopes = random.normal(size=(rows, len(NAMES)))
+    measured = slopes @ random.normal(size=len(NAMES)) + 0.3 * random.normal(size=rows)
+    best = np.linalg.lstsq(slopes, measured)[0]
+    views = SimpleNamespace(optics=SimpleNamespace(neutral=lambda name: 0.0))
+    fit = SimpleNamespace(
+        names=NAMES, theta=dict(zip(NAMES, best, strict=True)), views=views, information=slopes.T @ slopes
+    )
+
+    def cost(effects):
+        kept = [number for number, name in enumerate(NAMES) if name.split(".")[0] in effects]
+        held = slopes[:, kept]
+        left = measured - (held @ np.linalg.lstsq(held, measured)[0] if kept else 0.0)
+        return 0.5 * float(left @ left)
+
+    return fit, cost
+
+
+EFFECTS = ("camera_pitch", "camera_roll", "lens_centre", "pixel_aspect")
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 3))
+def test_the_loss_is_what_refitting_costs_where_the_problem_is_linear(seed, size):
+    fit, cost = linear(seed)
+    for one in rank_subsets(fit, ["camera_pitch"], size):
+        refitted = cost(("camera_pitch", *one.effects)) - cost(EFFECTS)
+        assert one.loss == pytest.approx(refitted, rel=1e-6, abs=1e-6)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.integers(0, 4))
+def test_sets_come_with_the_best_first(seed, size):
+    losses = [one.loss for one in rank_subsets(linear(seed)[0], (), size)]
+    assert losses == sorted(losses)
+    assert min(losses) >= -1e-9
+
+
+@given(st.integers(0, 3))
+def test_what_is_declared_is_never_dropped_nor_named(size):
+    sets = rank_subsets(linear(0)[0], ["camera_pitch"], size)
+    assert all("camera_pitch" not in one.effects for one in sets)
+    assert len({one.effects for one in sets}) == len(sets) == (1, 3, 3, 1)[size]
+
+
+def test_parameters_of_one_effect_stay_together():
+    chosen = {effect for one in rank_subsets(linear(0)[0], (), 2) for effect in one.effects}
+    assert chosen == set(EFFECTS)
+
+
+def test_all_effects_together_lose_nothing():
+    assert rank_subsets(linear(3)[0], (), len(EFFECTS))[0].loss == 0.0
+
+
+def test_more_effects_than_there_are_make_no_set():
+    assert rank_subsets(linear(3)[0], (), len(EFFECTS) + 1) == []
+
+
+def test_the_best_single_effect_of_a_rolled_camera_is_its_roll():
+    best, second = rank_subsets(everything({"camera_roll": 4.0}), ["camera_pitch"], 1)[:2]
+    assert best.effects == ("camera_roll",)
+    assert second.loss > 10.0 * best.loss
+
+
+GATE_COUNT = 60
+
+
+def places(views):
+    return 2.0 * views.edges.column / 160.0 - 1.0, 2.0 * views.edges.row / 120.0 - 1.0
+
+
+def bend(views):
+    """A wave of 1.5 pixels up and down across the picture, as no lens of the catalogue has it."""
+    right, _ = places(views)
+    return 0.0 * right, 1.5 * np.sin(3.0 * right)
+
+
+def displaced(views, by):
+    right, down = by
+    edges = views.edges
+    return replace(views, edges=edges._replace(column=edges.column + right, row=edges.row + down))
+
+
+@functools.cache
+def bent():
+    views = stood(count=GATE_COUNT)
+    return fit_everything(displaced(views, bend(views)), OPTICS.mounting, {}, learn_scatter=False)
+
+
+@pytest.mark.parametrize("theta", [{}, {"camera_roll": 4.0}, {"lens_distortion": -0.25}], ids=str)
+def test_nothing_is_left_over_of_the_right_camera(theta):
+    full = everything(theta, count=GATE_COUNT)
+    leftover = find_leftover(fit_set(full, ("camera_pitch", *theta)))
+    assert not leftover.open
+    assert leftover.share < 0.035
+
+
+def test_a_missing_effect_is_left_over():
+    leftover = find_leftover(fit_set(everything({"camera_roll": 4.0}, count=GATE_COUNT), ("camera_pitch",)))
+    assert leftover.open
+    assert leftover.share > 0.1
+
+
+def test_a_bend_that_the_catalogue_does_not_have_is_left_over_with_everything_free():
+    leftover = find_leftover(bent())
+    assert leftover.open
+    assert leftover.nats > 5.0
+    assert leftover.share > 0.1
+
+
+@pytest.mark.parametrize("axis", [0, 1], ids=["right", "down"])
+def test_the_field_says_how_far_markings_lie_from_where_the_model_has_them(axis):
+    """Markings are moved to one side on the right and to the other on the left; nothing of the camera is free."""
+    views = stood(count=GATE_COUNT)
+    by = 0.8 * places(views)[0]
+    moved = displaced(views, np.eye(2)[axis][:, None] * by)
+    fit = fit_camera(moved, at_truth(moved), [], NEAR)
+    leftover = find_leftover(fit)
+    assert leftover.open
+    valid = project(moved, fit.state).valid
+    found = leftover.displacement(*places(moved))[valid, axis]
+    assert np.corrcoef(found, by[valid])[0, 1] > 0.9
+    assert leftover.rms_px == pytest.approx(np.sqrt((by[valid] ** 2).mean()), rel=0.7)
+
+
+def test_tape_beside_its_place_is_nothing_of_the_camera_s():
+    """Each line of each tile is moved by 5 mm along its edges' normals, in pixels of its place."""
+    views = replace(stood(count=GATE_COUNT), tape_m=0.005)
+    shift = np.random.default_rng(1).normal(0.0, 0.005, (4, 40))
+    there = project(views, at_truth(views))
+    by = shift[there.marks.line, there.marks.stretch] * there.marks.side / there.metres
+    moved = displaced(views, (views.edges.normal * by[:, None]).T)
+    fit = fit_everything(moved, OPTICS.mounting, {}, learn_scatter=False)
+    assert not find_leftover(fit_set(fit, ("camera_pitch",))).open
+
+
+def test_the_gate_opens_for_evidence_share_and_size_together():
+    field = np.zeros((10, 2))
+    assert Leftover(10.0, 0.1, 0.3, field).open
+    assert not Leftover(2.0, 0.1, 0.3, field).open
+    assert not Leftover(10.0, 0.02, 0.3, field).open
+    assert not Leftover(10.0, 0.1, 0.05, field).open
+
+
+def test_a_field_of_nought_displaces_nothing():
+    leftover = Leftover(0.0, 0.0, 0.0, np.zeros((10, 2)))
+    np.testing.assert_array_equal(leftover.displacement(np.array([0.3]), np.array([-0.2])), np.zeros((1, 2)))
+
+
+DECLARED = ("camera_pitch",)
+PLANTED = {
+    "camera_roll": {"camera_roll": 4.0},
+    "camera_yaw": {"camera_yaw": 5.0},
+    "lens_distortion": {"lens_distortion": -0.25},
+    "camera_height": {"camera_height": 0.125},
+    "camera_forward": {"camera_forward": 0.1},
+}
+
+
+def on(name, theta, count=30, seed=3):
+    """Views of a shipped map from both lanes, each driven its own way."""
+    road, random = shipped_map(name), np.random.default_rng(seed)
+    outer = np.arange(count) % 2 == 0
+    along, step = random.random(count) * lane_length(road, outer), 0.005
+    places = lane_point(road, outer, along)
+    way = lane_point(road, outer, along + step) - lane_point(road, outer, along - step)
+    poses = np.column_stack((places, np.arctan2(way[:, 1], way[:, 0])))
+    poses = poses + random.normal(0.0, (0.03, 0.03, 0.2), poses.shape)
+    figures = OPTICS.figures({**{each: OPTICS.neutral(each) for each in OPTICS.mounting}, **theta})
+    shown = GroundPlaneCamera(figures, draw_floor(road)).render(poses)
+    return views_of(shown, still(tracked(poses)), markings=Markings(road))
+
+
+SEARCH_OFTEN = ("camera_roll", "lens_distortion")
+
+
+@pytest.mark.parametrize(
+    "effect", [name if name in SEARCH_OFTEN else pytest.param(name, marks=pytest.mark.slow) for name in PLANTED]
+)
+def test_a_planted_effect_is_named(effect):
+    named = name_camera_effects(everything(PLANTED[effect]), DECLARED)
+    assert named.effects == (effect,)
+    for name, value in PLANTED[effect].items():
+        place = named.model.names.index(name)
+        assert abs(named.model.theta[name] - value) < 3.0 * named.model.sd[place] + 0.01 * abs(value)
+
+
+@pytest.mark.slow
+def test_a_pair_is_named():
+    named = name_camera_effects(everything({"camera_roll": -4.0, "lens_distortion": -0.25}), DECLARED)
+    assert set(named.effects) == {"camera_roll", "lens_distortion"}
+    assert [len(one.effects) for one in named.losses] == [0, 1, 2]
+    assert named.losses[0].loss > named.losses[1].loss > named.losses[2].loss
+
+
+@pytest.mark.parametrize("name", ["small_loop", pytest.param("horseshoe", marks=pytest.mark.slow)])
+def test_nothing_is_named_of_a_nominal_camera(name):
+    full = fit_everything(on(name, {}), OPTICS.mounting, {}, learn_scatter=False)
+    named = name_camera_effects(full, DECLARED)
+    assert named.effects == ()
+    assert named.model.theta["camera_pitch"] == pytest.approx(19.15, abs=0.3)
+    assert named.model.names == DECLARED
+
+
+def test_an_effect_is_named_on_another_map():
+    full = fit_everything(on("horseshoe", {"camera_roll": 4.0}), OPTICS.mounting, {}, learn_scatter=False)
+    assert name_camera_effects(full, DECLARED).effects == ("camera_roll",)
+
+
+def test_a_declared_effect_is_tuned_and_not_named():
+    named = name_camera_effects(everything({"camera_roll": 4.0}), ("camera_pitch", "camera_roll"))
+    assert named.effects == ()
+    assert named.declared.theta["camera_roll"] == pytest.approx(4.0, abs=0.3)
+
+
+def test_an_effect_that_needs_motion_is_named_from_a_drive():
+    named = name_camera_effects(everything({"camera_latency": 0.12}, count=40, moving=True), DECLARED)
+    assert named.effects == ("camera_latency",)
+    assert named.model.theta["camera_latency"] == pytest.approx(0.12, abs=0.01)
+
+
+def test_an_effect_is_named_by_a_tracker_that_states_no_scatter():
+    views = replace(on("small_loop", {"camera_roll": 4.0}), position_m=0.005, heading_rad=np.radians(1.0))
+    full = fit_everything(views, OPTICS.mounting, {}, learn_scatter=True)
+    assert full.views.position_m < 0.0045
+    assert full.views.heading_rad < np.radians(0.8)
+    assert name_camera_effects(full, DECLARED).effects == ("camera_roll",)
+
+
+def test_what_is_known_is_held():
+    views = on("small_loop", {}, count=20)
+    names = [name for name in OPTICS.mounting if name != "lens_distortion"]
+    full = fit_everything(views, names, {"rolling_shutter": 0.03, "lens_distortion": -0.01}, learn_scatter=False)
+    assert (full.theta["rolling_shutter"], full.theta["lens_distortion"]) == (0.03, -0.01)
+    held = fit_set(full, DECLARED)
+    assert (held.theta["rolling_shutter"], held.theta["lens_distortion"]) == (0.03, -0.01)
+
+
+def test_a_set_of_effects_leaves_all_others_neutral():
+    fit = fit_set(everything({"camera_roll": 4.0}), ("camera_pitch", "lens_centre"))
+    assert fit.names == ("camera_pitch", "lens_centre.right", "lens_centre.down")
+    assert fit.theta["camera_roll"] == 0.0
+    assert fit.theta["camera_height"] == ROBOT.camera_figures().height_m
+
+
+def test_the_cost_is_least_with_everything_free():
+    full = everything({"camera_roll": 4.0})
+    assert cost_of(full) < cost_of(fit_set(full, DECLARED))
+    assert cost_of(full) == pytest.approx(cost_of(fit_set(full, (*DECLARED, "camera_roll"))), rel=0.05)
+
+
+MOTION = ("camera_latency", "rolling_shutter")
+
+
+def only(views, chosen):
+    return replace(views, edges=Edges(*(field[chosen] for field in views.edges)))
+
+
+def test_frames_standing_still_hide_latency_and_shutter():
+    hidden = hidden_effects(everything(), ("camera_pitch",))
+    assert set(MOTION) <= set(hidden)
+    assert not {"camera_pitch", "camera_roll", "camera_yaw", "lens_distortion"} & set(hidden)
+
+
+def test_a_drive_shows_latency():
+    assert "camera_latency" not in hidden_effects(everything(count=40, moving=True), ("camera_pitch",))
+
+
+def test_a_readout_that_is_stated_is_not_hidden():
+    full = fit_everything(
+        driven(), (*OPTICS.mounting, "camera_latency"), {"rolling_shutter": 0.02}, learn_scatter=False
+    )
+    assert "rolling_shutter" not in hidden_effects(full, ("camera_pitch",))
+
+
+def test_markings_far_away_alone_hide_where_the_lens_is():
+    full = everything(count=30)
+    there = project(full.views, full.state)
+    far = only(full.views, np.linalg.norm(there.lever, axis=1) > 0.7)
+    assert len(far.edges.row) > 300
+    few = fit_everything(far, OPTICS.mounting, {}, learn_scatter=False)
+    hidden, shown = hidden_effects(few, ("camera_pitch",)), hidden_effects(full, ("camera_pitch",))
+    assert {"camera_height", "camera_forward"} <= set(hidden)
+    assert not {"camera_height", "camera_forward"} & set(shown)
+
+
+def test_no_edges_hide_everything():
+    views = stood(count=3)
+    full = fit_everything(only(views, np.zeros(len(views.edges.row), bool)), OPTICS.mounting, {}, learn_scatter=False)
+    effects = {name.split(".")[0] for name in (*OPTICS.mounting, *MOTION)}
+    assert set(hidden_effects(full, ())) == effects
+
+
+def test_effects_of_the_model_are_not_hidden():
+    full = everything(count=30)
+    model = ("camera_pitch", "field_of_view", "camera_height")
+    assert not set(model) & set(hidden_effects(full, model))
+
+
+@pytest.mark.parametrize(
+    ("hidden", "words"),
+    [
+        ("camera_latency", "driving bends"),
+        ("blur", "driving bends"),
+        ("camera_forward", "nearer than 0.4 m"),
+        ("camera_yaw", "both lanes"),
+        ("image_noise", "ten frames standing still"),
+    ],
+)
+def test_the_next_views_are_those_that_show_what_was_hidden(hidden, words):
+    (view,) = next_views((hidden,), repeated=False)
+    assert words in view
+
+
+def test_there_is_nothing_to_take_where_nothing_was_hidden():
+    assert next_views((), repeated=False) == ()
+    assert next_views(("image_noise",), repeated=True) == ()
+
+
+def test_what_a_tracker_does_is_always_a_rival():
+    assert ALWAYS == {
+        "camera_yaw": "heading_offset",
+        "camera_forward": "marker_offset",
+        "camera_latency": "clock offset",
+    }

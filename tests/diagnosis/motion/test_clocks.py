@@ -1,0 +1,360 @@
+"""Clocks that are apart are told and put right; clocks that are not are left alone.
+
+Long rests are cut out of drives; what is driven stays as it was.
+Drives are kept aside to test on, and blocks never reach over them.
+Long drives are made short, in the same blocks, without a pose that was not measured.
+"""
+
+from dataclasses import replace
+
+import hidden
+import numpy as np
+import pytest
+from clock_rates import planted
+from planted import ROBOT, TRUTH, driven_log, planted_drives, planted_log, with_poses
+from project import ROOT
+
+from proxytune.diagnosis import cut, increments
+from proxytune.diagnosis.motion import clocks as splitting
+from proxytune.diagnosis.motion import clocks as thinning
+from proxytune.diagnosis.motion.clocks import (
+    BLOCKS,
+    TEST_BLOCK_S,
+    cut_into_blocks,
+    cut_out_long_rests,
+    join_increments,
+    put_in_step,
+    read_clocks,
+    split,
+    thin,
+)
+from proxytune.diagnosis.motion.drives import gather
+from proxytune.diagnosis.motion.latency import Blocks, stretches
+from proxytune.errors import LogError
+from proxytune.logs import Log, LogEpisode, Measured, read_log
+
+LOGS = ROOT / "../shared/data/logs"
+CASE = hidden.CLEAN[2]
+SHORT = {"episodes": 6, "seconds": 40.0}
+SHAPE = (6, 800)
+
+
+def clocks(late_s, case=CASE):
+    return read_clocks(hidden.make_log(case, late_s=late_s, **SHORT), ROBOT)
+
+
+def in_one_drive(by, drive=3, after=0):
+    late = np.zeros(SHAPE)
+    late[drive, after:] = by
+    return late
+
+
+@pytest.mark.parametrize("late", [-0.2, -0.5, -3.0, 2.0])
+def test_motion_that_no_delay_accounts_for_is_told_with_its_offset_for_the_nominal_delay(late):
+    found = clocks(late)
+    assert found.differ
+    assert found.latency.value == pytest.approx(CASE.delay + late, abs=0.02)
+    assert found.offset.value == pytest.approx(CASE.delay + late - 0.15, abs=0.02)
+    assert found.offset.interval[0] < found.offset.value < found.offset.interval[1]
+    assert found.left_s == pytest.approx(0.15)
+    assert (found.drives, found.jumps) == ({}, ())
+
+
+def test_an_offset_that_a_log_asks_to_fit_is_what_the_latency_has_beside_the_nominal_delay():
+    log = replace(hidden.make_log(CASE, late_s=0.1, **SHORT), fit_clock_offset=True)
+    found = read_clocks(log, ROBOT)
+    assert found.offset.value == pytest.approx(CASE.delay + 0.1 - 0.15, abs=0.02)
+    assert found.left_s == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.1, 0.3, -0.05])
+def test_an_offset_that_a_delay_accounts_for_is_no_proof(late):
+    found = clocks(late)
+    assert not found.differ
+    assert found.latency.value == pytest.approx(CASE.delay + late, abs=0.02)
+    assert not found.later_s.any()
+
+
+@pytest.mark.parametrize("by", [-0.3, 0.1, 0.5])
+def test_a_drive_with_a_clock_of_its_own_is_named(by):
+    found = clocks(in_one_drive(by))
+    assert list(found.drives) == ["03"]
+    assert found.drives["03"].value == pytest.approx(by, abs=0.02)
+    np.testing.assert_allclose(found.later_s, -np.eye(6)[3] * found.drives["03"].value)
+    assert (found.offset.value, found.jumps) == (0.0, ())
+
+
+@pytest.mark.parametrize("by", [-0.3, 0.2])
+def test_a_clock_that_jumps_is_named_with_its_time_and_the_longer_stretch_is_kept(by):
+    found = clocks(in_one_drive(by, after=500))
+    (jump,) = found.jumps
+    assert jump.drive == "03"
+    assert jump.time_s == pytest.approx(25.0, abs=2.0)
+    assert jump.by_s == pytest.approx(by, abs=0.03)
+    low, high = found.kept_s[3]
+    assert (low, high <= 25.0) == (0.0, True)
+    assert np.isinf(found.kept_s[[0, 1, 2, 4, 5], 1]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [22, 23])
+def test_a_jump_that_leaves_little_of_a_drive_is_clear_beside_what_the_others_say(number):
+    one = planted("jump", number, hidden=False)
+    (jump,) = read_clocks(hidden.make_log(one.case, late_s=one.late_s), ROBOT).jumps
+    assert jump.drive == f"{one.drive:02d}"
+    assert jump.time_s == pytest.approx(one.at_s, abs=4.0)
+    assert jump.by_s == pytest.approx(one.by_s, abs=0.02)
+
+
+@pytest.mark.parametrize("effect", [0, 12, 17, 21, 24])
+def test_hidden_effects_are_no_clock_problem(effect):
+    assert not clocks(0.0, hidden.IN_FORM[effect]).differ
+
+
+@pytest.mark.parametrize("theta", [{"delay": 0.3}, {"delay": 0.5, "motor_lag.time_constant": 0.8}, {"delay": 0.0}])
+def test_a_slow_or_late_robot_is_no_clock_problem(theta):
+    assert not read_clocks(planted_log({"trim": 0.03, **theta}, episodes=4, seconds=40.0), ROBOT).differ
+
+
+@pytest.mark.parametrize("name", ["slew_rate rise 0.4", "slew_rate rise 0.8", "yaw_lag time_constant 0.25"])
+def test_a_lag_that_is_another_in_every_manoeuvre_is_no_clock_problem(name):
+    (case,) = (case for case in hidden.IN_FORM if case.name == name)
+    assert not clocks(0.0, case).differ
+
+
+def test_a_drive_that_repeats_itself_is_no_clock_problem():
+    times = np.arange(1200) / 20.0
+    turn = 0.2 * np.sin(2.0 * np.pi * times / 6.0)
+    duties = np.tile(np.stack((0.5 - turn, 0.5 + turn), axis=1), (4, 1, 1))
+    assert not read_clocks(driven_log({}, duties, np.zeros((4, 3))), ROBOT).differ
+
+
+def test_a_robot_that_is_stuck_at_first_is_no_clock_problem():
+    latencies = np.arange(-40, 41) * 0.25
+    moving = np.minimum((latencies - 0.25) ** 2, 4.0)
+    stuck = np.minimum((10.0 - latencies) ** 2, 1.0) * 4.0
+    log = planted_log({}, episodes=1, seconds=60.0)
+    squares = np.concatenate((np.tile(stuck, (11, 1)), np.tile(moving, (19, 1))))
+    blocks = Blocks(np.zeros(30, dtype=int), np.arange(30), squares)
+    assert stretches(log, blocks, latencies) == ([(0.0, np.inf)], ())
+
+
+def test_drives_put_in_step_are_those_of_one_clock():
+    late = in_one_drive(-0.3)
+    found = clocks(late)
+    apart, right = (hidden.make_log(CASE, late_s=late_s, noiseless=True, **SHORT) for late_s in (late, 0.0))
+    moved = put_in_step(gather(apart, ROBOT, apart.episodes), found, range(6))
+    drives = gather(right, ROBOT, right.episodes)
+    shift = found.later_s[3] * drives.tick_hz
+    own, other = moved.episode == 3, drives.episode == 3
+    assert moved.first[own][0] == np.ceil(shift)
+    np.testing.assert_array_equal(moved.first[~own], drives.first[~other])
+    np.testing.assert_array_equal(moved.duties[0, :2400], drives.duties[0])
+    part = np.ceil(shift) - shift
+    expected = (1.0 - part) * drives.duties[3, 1:] + part * drives.duties[3, :-1]
+    np.testing.assert_allclose(moved.duties[3, 1:2400], expected)
+    np.testing.assert_allclose(moved.headings[3, moved.first[own]], moved.poses[own, 0, 2], atol=1e-9)
+
+
+def test_poses_put_before_the_first_command_are_left_out_and_so_is_what_lies_beyond_a_jump():
+    found = clocks(in_one_drive(0.5, after=500))
+    log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
+    moved = put_in_step(gather(log, ROBOT, log.episodes), found, range(6))
+    assert moved.last[moved.episode == 3].max() <= found.kept_s[3, 1] * 60.0
+    late = clocks(2.0)
+    log = hidden.make_log(CASE, late_s=2.0, **SHORT)
+    moved = put_in_step(gather(log, ROBOT, log.episodes), late, range(6))
+    assert moved.first.min() >= 0
+    assert not moved.linked[0]
+
+
+def test_another_log_of_the_same_robot_is_put_on_the_same_latency():
+    one, other = (hidden.make_log(CASE, late_s=late, **SHORT) for late in (0.0, 0.2))
+    found = read_clocks(other, ROBOT, read_clocks(one, ROBOT))
+    assert found.offset.value == pytest.approx(0.2, abs=0.02)
+    assert not read_clocks(one, ROBOT, read_clocks(one, ROBOT)).differ
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["drive_husky", "gym_duckietown", "mrclam6_robot1", "mrclam6_robot4"])
+def test_measured_logs_are_on_one_clock(name):
+    if not (LOGS / name).is_dir():
+        pytest.skip(f"the measured log {name} is not here: it is not part of the project")
+    from proxytune.diagnosis import robot_of
+
+    log = read_log(LOGS / name)
+    assert not read_clocks(log, robot_of(log)).differ
+
+
+def log(*told, rows=4000, **more):
+    """One drive of 200 s at 20 rows a second, told to move between these times [s]."""
+    times = 5.0 + np.arange(rows) / 20.0
+    commands = np.zeros((rows, 2))
+    for begin, end in told:
+        commands[round(begin * 20) : round(end * 20)] = (0.3, 0.2)
+    poses = np.stack((times, times, times), axis=1)
+    return Log("yard", "duckiebot", "duty", 20.0, {}, (LogEpisode("a", times, commands, poses, commands, **more),))
+
+
+def test_each_stretch_between_long_rests_is_a_drive_of_its_own():
+    whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
+    first, second = cut_out_long_rests(whole).episodes
+    assert (first.name, second.name) == ("a from 34 s", "a from 124 s")
+    assert (first.times[0], first.times[-1]) == pytest.approx((34.0, 77.95))
+    assert (second.times[0], second.times[-1]) == pytest.approx((124.0, 157.95))
+    np.testing.assert_array_equal(first.poses[:, 0], first.times)
+    np.testing.assert_array_equal(second.commands, second.wheels)
+    np.testing.assert_array_equal(second.commands, whole.episodes[0].commands[2380:3060])
+
+
+def test_short_rests_are_kept():
+    whole = log((10.0, 80.0), (95.0, 190.0))
+    assert cut_out_long_rests(whole) is whole
+
+
+def test_drives_without_commands_to_move_or_without_any_are_left_to_others():
+    still, frames = log(), replace(log(), command="none")
+    assert cut_out_long_rests(still) is still
+    assert cut_out_long_rests(frames) is frames
+
+
+def test_commands_at_times_of_their_own_go_with_their_stretch():
+    whole = log()
+    issued = np.array([0.0, 50.0, 60.0, 150.0, 170.0])
+    commands = np.array([[0, 0], [0.5, 0.5], [0, 0], [0.2, 0.2], [0, 0]])
+    own = replace(whole.episodes[0], issued=issued, commands=commands)
+    first, second = cut_out_long_rests(replace(whole, episodes=(own,))).episodes
+    np.testing.assert_array_equal(first.issued, [0.0, 50.0, 60.0])
+    np.testing.assert_array_equal(second.issued, [60.0, 150.0, 170.0])
+    np.testing.assert_array_equal(second.held[[0, -1]], [[0, 0], [0, 0]])
+    np.testing.assert_array_equal(second.commands, commands[2:])
+
+
+def test_poses_at_times_of_their_own_go_with_their_stretch():
+    whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
+    (episode,) = whole.episodes
+    rows = np.arange(0, 4000, 3)
+    measured = Measured(episode.times[rows] + 0.01, episode.poses[rows], rows)
+    own = replace(whole, episodes=(replace(episode, measured=measured),))
+    for piece in cut_out_long_rests(own).episodes:
+        np.testing.assert_allclose(piece.times[piece.measured.rows] + 0.01, piece.measured.times)
+        assert len(piece.measured.times) == pytest.approx(len(piece.times) / 3, abs=1)
+
+
+def test_every_third_of_many_episodes_is_tested_and_not_fitted():
+    log = planted_log(TRUTH, episodes=7, seconds=15.0)
+    fitted, tested = split(log, ROBOT, None)
+    assert fitted.duties.shape[0] == 5
+    assert tested.duties.shape[0] == 2
+    np.testing.assert_array_equal(tested.duties[0, ::3], log.episodes[2].commands)
+    for row, episode in enumerate((0, 1, 3, 4, 6)):
+        np.testing.assert_array_equal(fitted.duties[row, ::3], log.episodes[episode].commands)
+
+
+@pytest.mark.parametrize("episodes", [1, 2, 5])
+def test_few_episodes_are_split_by_time(episodes):
+    fitted, tested = split(planted_log(TRUTH, episodes=episodes, seconds=60.0), ROBOT, None)
+    assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2 * episodes)
+    for episode in range(episodes):
+        assert fitted.last[fitted.episode == episode].max() <= tested.first[tested.episode == episode].min()
+        assert not tested.linked[tested.episode == episode][0]
+
+
+def test_another_log_may_be_tested_on():
+    log, other = (planted_log(TRUTH, seed=seed, episodes=2, seconds=15.0) for seed in (1, 2))
+    fitted, tested = split(log, ROBOT, other)
+    assert (fitted.duties.shape[0], tested.duties.shape[0]) == (2, 2)
+    np.testing.assert_array_equal(tested.duties[1, ::3], other.episodes[1].commands)
+
+
+@pytest.mark.parametrize(("episodes", "seconds"), [(1, 30.0), (3, 10.0), (6, 6.0)])
+def test_too_little_motion_is_refused_with_how_much_is_needed(episodes, seconds):
+    with pytest.raises(LogError, match=r"^planted: only [0-9.]+ s of measured motion to .*at least 20 s"):
+        split(planted_log(TRUTH, episodes=episodes, seconds=seconds), ROBOT, None)
+
+
+@pytest.mark.parametrize(("episodes", "seconds"), [(1, 60.0), (6, 30.0), (12, 60.0)])
+def test_there_are_enough_blocks_to_leave_out_and_none_is_tiny(episodes, seconds):
+    for drives in split(planted_log(TRUTH, episodes=episodes, seconds=seconds), ROBOT, None):
+        numbers = np.unique(drives.block)
+        np.testing.assert_array_equal(numbers, np.arange(len(numbers)))
+        assert len(numbers) >= min(BLOCKS, drives.seconds / TEST_BLOCK_S) * 0.6
+        for block in numbers:
+            own = drives.block == block
+            assert len(np.unique(drives.episode[own])) == 1
+            assert (drives.last[own].max() - drives.first[own].min()) / drives.tick_hz > 0.9 * TEST_BLOCK_S
+            assert not drives.linked[own][0]
+
+
+def test_half_of_the_measured_motion_not_of_the_time_is_fitted():
+    def lost(poses):
+        poses = poses.copy()
+        poses[400:1400] = np.nan
+        return poses
+
+    fitted, tested = split(with_poses(planted_log(TRUTH, episodes=1, seconds=120.0), lost), ROBOT, None)
+    assert fitted.seconds == pytest.approx(tested.seconds, abs=0.2)
+    assert len(np.unique(fitted.block)) >= 6
+
+
+def test_of_very_many_drives_no_more_are_tested_on_than_needed_spread_over_all(monkeypatch):
+    log = planted_log(TRUTH, episodes=36, seconds=10.0)
+    whole = split(log, ROBOT, None).tested
+    monkeypatch.setattr(splitting, "MOST_TESTED_S", 60.0)
+    some = split(log, ROBOT, None).tested
+    assert (len(whole.duties), len(some.duties)) == (12, 7)
+    kept = [int(np.flatnonzero((whole.headings == own).all(axis=1))[0]) for own in some.headings]
+    assert kept == [0, 1, 3, 5, 6, 8, 10]
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return cut_into_blocks(planted_drives(TRUTH, episodes=4, seconds=20.0, noise=None))
+
+
+def test_short_drives_stay_as_they_are(drives):
+    assert thin(drives) is drives
+    assert join_increments(drives, 1) is drives
+
+
+@pytest.mark.parametrize("times", [2, 3, 7])
+def test_joined_increments_lead_from_the_first_pose_to_the_last(drives, times):
+    few = join_increments(drives, times)
+    assert (few.last - few.first).sum() == (drives.last - drives.first).sum()
+    assert set(map(tuple, few.poses.reshape(-1, 3))) <= set(map(tuple, drives.poses.reshape(-1, 3)))
+    assert few.travel.sum(axis=0) == pytest.approx(drives.travel.sum(axis=0))
+    assert set(few.block) == set(drives.block)
+    assert (~few.linked).sum() == (~drives.linked).sum()
+
+
+def test_a_right_model_predicts_joined_increments_too(drives):
+    few = join_increments(drives, 3)
+    assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9
+
+
+def test_a_block_is_shortened_and_none_is_lost(drives, monkeypatch):
+    monkeypatch.setattr(thinning, "MOST", 300)
+    monkeypatch.setattr(thinning, "STRETCH_S", 1.0)
+    few = thin(drives)
+    assert 250 <= len(few.episode) <= 300 + len(set(drives.block))
+    assert set(few.block) == set(drives.block)
+    usual = float(np.median(few.last - few.first)) / few.tick_hz
+    assert usual == pytest.approx(thinning.JOINED_S)
+    sizes = np.bincount(few.block)
+    assert sizes.max() <= 2 * sizes.min()
+    assert len(set(few.first[~few.linked])) > 1, "not always a block's beginning"
+
+
+def test_drives_of_two_seconds_stay_whole_and_fewer_are_taken(monkeypatch):
+    monkeypatch.setattr(thinning, "MOST", 300)
+    drives = cut_into_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None))
+    few = thin(drives)
+    assert thinning.FEWEST_BLOCKS <= len(set(few.block)) < 60
+    assert len(cut(few, 2.0).begin) == len(set(few.block))
+
+
+def test_poses_that_are_missing_stay_missing(drives):
+    gaps = drives.only(np.arange(len(drives.episode)) % 50 > 4)
+    few = join_increments(gaps, 4)
+    assert (few.last - few.first).max() <= 4 * (drives.last - drives.first).max()
+    assert np.abs(few.measured - increments(few, TRUTH)).max() < 1e-9

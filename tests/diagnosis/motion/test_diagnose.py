@@ -1,0 +1,266 @@
+"""A diagnosis holds what was found, tests it on drives kept aside, and refuses what it cannot bear.
+
+Six robots with a secret: the effect is named, what has no name is flagged, and nothing is found where nothing is.
+"""
+
+from dataclasses import FrozenInstanceError, replace
+
+import hidden
+import numpy as np
+import pytest
+import rates
+from planted import CALM, ROBOT, TRUTH, driven_log, drives_of, fitted, planted_log, with_poses
+
+from proxytune.diagnosis import RULES, AdoptedEffect, Estimate, Findings
+from proxytune.diagnosis.answer import KeptAside, horizon_error
+from proxytune.diagnosis.motion.diagnose import declared_effects, declared_parameters, diagnose
+from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S, PoseNoise
+from proxytune.driving import read_robot
+from proxytune.effects import PARAMETERS
+from proxytune.errors import LogError
+
+SCRUBBING = {**TRUTH, "yaw_scrub": 0.12}
+
+
+@pytest.fixture(scope="module")
+def told():
+    return []
+
+
+def scrubbing_log():
+    return planted_log(SCRUBBING, episodes=6, seconds=12.0, noise=CALM)
+
+
+@pytest.fixture(scope="module")
+def diagnosis(told):
+    return diagnose(scrubbing_log(), ROBOT, ("trim", "delay"), report=told.append)
+
+
+def test_the_planted_effect_is_found_with_its_value(diagnosis):
+    assert diagnosis.verdict == "explained"
+    assert [effect.effect for effect in diagnosis.effects] == ["yaw_scrub"]
+    estimate = diagnosis.theta["yaw_scrub"]
+    assert abs(estimate.value - 0.12) < np.ptp(estimate.interval)
+    assert estimate.unit == "m"
+    assert np.ptp(estimate.interval) < 0.02
+
+
+def test_declared_values_are_those_before_the_effect_and_all_values_those_after(diagnosis):
+    assert set(diagnosis.declared) == {"trim", "delay"}
+    assert set(diagnosis.theta) == {"trim", "delay", "yaw_scrub"}
+    for name, true in TRUTH.items():
+        estimate = diagnosis.theta[name]
+        assert estimate.interval[0] < estimate.value < estimate.interval[1]
+        assert abs(estimate.value - true) < np.ptp(estimate.interval)
+
+
+def test_errors_are_told_at_every_horizon_and_fall_to_the_floor(diagnosis):
+    assert [error.horizon_s for error in diagnosis.errors] == list(HORIZONS_S)
+    for error in diagnosis.errors:
+        assert error.before.interval[0] < error.before.value < error.before.interval[1]
+        assert error.ratio.value == pytest.approx(error.after.value / error.before.value)
+        assert error.after.value < error.before.value
+        assert 0.85 * error.floor.lower < error.after.value < 1.15 * error.floor.lower
+        assert error.floor.lower <= error.floor.upper <= RULES.lowest_by_chance * error.after.value + 1e-12
+    error = diagnosis.errors[1]
+    assert error.ratio.interval[1] < 1.0
+    assert error.removable_left < 0.3
+    assert error.heading_after.value < error.heading_before.value
+
+
+def test_nothing_removable_is_left_to_speak_of_where_nothing_was(diagnosis):
+    error = diagnosis.errors[1]
+    at_floor = error.before._replace(value=error.floor.lower)
+    assert replace(error, before=at_floor).removable_left is None
+    assert replace(error, after=error.before).removable_left == 1.0
+
+
+def test_the_test_drives_are_not_fitted(diagnosis):
+    assert diagnosis.parts.fitted.duties.shape[0] == 4
+    assert diagnosis.parts.tested.duties.shape[0] == 2
+    assert diagnosis.found.model.drives is diagnosis.parts.fitted
+
+
+def test_progress_is_told(diagnosis, told):
+    assert told[0] == "fitting what is declared"
+    assert any("round 2" in line for line in told)
+
+
+def test_a_diagnosis_cannot_be_changed(diagnosis):
+    with pytest.raises(FrozenInstanceError):
+        diagnosis.verdict = "nothing missing"
+
+
+def test_the_best_candidate_is_the_one_adopted(diagnosis):
+    gains = [tried.gain for tried in diagnosis.found.tried]
+    assert gains == sorted(gains, reverse=True)
+    assert diagnosis.found.tried[0].effect == "yaw_scrub"
+    assert 0.0 < diagnosis.found.tried[0].p_value <= 0.01
+
+
+@pytest.mark.parametrize(("robot", "effects"), [("duckiebot", ("trim", "delay")), ("husky", ()), ("irobot_create", ())])
+def test_declared_is_what_a_robot_has_of_theta_that_acts_on_motion(robot, effects):
+    assert declared_effects(read_robot(robot)) == effects
+
+
+def test_declared_effects_are_read_into_their_parameters():
+    assert declared_parameters(("trim", "wheel_gain", "trim")) == ("trim", "wheel_gain.left", "wheel_gain.right")
+    assert declared_parameters(("dead_band",)) == ("dead_band.width",)
+    assert declared_parameters(()) == ()
+
+
+@pytest.mark.parametrize(("name", "nearest"), [("trimm", "trim"), ("blur", ""), ("camera_pitch", "")])
+def test_what_does_not_act_on_motion_cannot_be_declared(name, nearest):
+    with pytest.raises(LogError, match=f"^--declared {name}: no effect on motion has this name.*{nearest}"):
+        declared_parameters((name,))
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_diagnosis(diagnosis):
+    again = diagnose(scrubbing_log(), ROBOT, ("trim", "delay"))
+    assert again.theta == diagnosis.theta
+    assert again.found.tried == diagnosis.found.tried
+    assert again.errors == diagnosis.errors
+    assert again.worth == diagnosis.worth
+
+
+def test_every_effect_says_what_it_is_worth_on_drives_that_were_not_fitted(diagnosis):
+    assert set(diagnosis.worth) == {"yaw_scrub"}
+    assert set(diagnosis.worth["yaw_scrub"]) == set(HORIZONS_S)
+    assert diagnosis.worth["yaw_scrub"][2.0].interval[0] > 1.5
+    assert (diagnosis.immaterial, diagnosis.dropped_values) == ((), {})
+
+
+@pytest.mark.parametrize("level", [1e-6, 0.002])
+def test_a_stationary_robot_gets_no_answer(level):
+    random = np.random.default_rng(1)
+    case = hidden.CLEAN[0]
+    log = with_poses(
+        hidden.make_log(case, episodes=6, seconds=12.0), lambda poses: random.normal(0.0, level, poses.shape)
+    )
+    with pytest.raises(LogError, match="stands still"):
+        diagnose(log, ROBOT, ("trim", "delay"))
+
+
+def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
+    short, long = planted_log(TRUTH, episodes=70, seconds=2.0), planted_log(TRUTH, episodes=1, seconds=9.0)
+    log = replace(short, episodes=(*short.episodes, replace(long.episodes[0], name="long")))
+    drives = drives_of(log)
+    model = fitted(drives)
+    tested = KeptAside(drives, drives, PoseNoise(0.002, 0.005))
+    error = horizon_error(Findings(model, model, (), (), (), ()), tested, 5.0, {})
+    assert error is None or np.isfinite((*error.before.interval, *error.ratio.interval)).all()
+
+
+@pytest.mark.slow
+def test_one_drive_is_enough_if_it_is_long():
+    found = diagnose(planted_log(SCRUBBING, episodes=1, seconds=70.0), ROBOT, ("trim", "delay"))
+    assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
+    assert found.unlike is None
+
+
+@pytest.mark.slow
+def test_drives_that_all_begin_at_the_origin_and_stubs_among_them_give_a_result():
+    log = planted_log(SCRUBBING, episodes=6, seconds=12.0)
+    at_origin = driven_log(SCRUBBING, np.stack([e.commands for e in log.episodes]), np.zeros((6, 3)))
+    stubs = [
+        replace(e, name=f"stub {e.name}", times=e.times[:3], commands=e.commands[:3], poses=e.poses[:3])
+        for e in log.episodes
+    ]
+    found = diagnose(replace(at_origin, episodes=(*at_origin.episodes, *stubs)), ROBOT, ("trim", "delay"))
+    assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
+    assert not found.clocks[0].differ
+
+
+@pytest.mark.slow
+def test_an_hour_of_standing_with_a_minute_of_driving_gives_what_the_minute_gives():
+    duties = np.zeros((1, 20 * 3600, 2))
+    duties[0, 36000:37400] = planted_log(SCRUBBING, episodes=1, seconds=70.0).episodes[0].commands
+    found = diagnose(driven_log(SCRUBBING, duties, np.zeros((1, 3))), ROBOT, ("trim", "delay"))
+    assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
+    assert found.parts.fitted.seconds == pytest.approx(37.0, abs=1.0)
+    assert found.drive_names == ("00 from 1799 s",)
+
+
+@pytest.mark.slow
+def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
+    log = hidden.make_log(hidden.CLEAN[1], episodes=6, seconds=20.0, late_s=-0.25)
+    found = diagnose(log, ROBOT, ("trim", "delay"))
+    assert found.clocks[0].offset.value == pytest.approx(hidden.CLEAN[1].delay - 0.25 - 0.15, abs=0.03)
+    assert found.effects == ()
+    assert found.theta["delay"].value == pytest.approx(0.15, abs=0.03)
+
+
+def test_a_value_at_the_end_of_its_range_is_told_of_effects_that_draw_too(diagnosis):
+    jitter = AdoptedEffect("delay_jitter", "", ("delay_jitter",), (), 50.0, 0.01, ())
+    highest = Estimate(PARAMETERS["delay_jitter"].high, (0.2, 0.3), "s")
+    there = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": highest})
+    assert there.at_edge(jitter) == ("delay_jitter",)
+    inside = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": replace(highest, value=0.1)})
+    assert inside.at_edge(jitter) == ()
+
+
+CASES = {case.name: case for case in (*hidden.IN_FORM, *hidden.OUTSIDE, *hidden.CLEAN)}
+
+
+def said_of(name, kind):
+    row = rates.diagnosed(rates.Job(kind, CASES[name]), episodes=6, seconds=30.0)
+    assert not row.problem, row.text
+    return row
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        "dead_band width 0.12",
+        "turn_slip gain 0.15",
+        "yaw_scrub baseline 0.13",
+        "dropped_commands probability 0.4",
+    ],
+)
+def test_a_hidden_effect_is_named_and_nothing_else(name):
+    row = said_of(name, "in form")
+    assert row.right, row.text
+    assert not row.wrong, row.text
+    assert row.evidence > rates.CLEAR
+    assert row.verdict in ("explained", "cannot be told"), "drives so short may not tell how loud their noise is"
+    if row.true == row.true:
+        assert row.after < 1.15 * row.true < 0.9 * row.before
+
+
+LATER = [
+    "command_quantisation step 0.137",
+    "slew_rate rise 0.8",
+    "thermal_fade loss 0.6",
+    "cross_coupling forward 0.02",
+    "cross_coupling turn 0.8",
+    "understeer gain 0.5",
+    "yaw_lag time_constant 0.1",
+    "wheel_ripple left 0.25",
+    "slippery_patch loss 0.6",
+    "fading_with_time rate 0.4",
+    "sliding_slope x -0.04",
+    "stiction breakaway 0.2",
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LATER)
+def test_an_effect_that_joined_the_catalogue_later_is_named(name):
+    row = said_of(name, "in form")
+    assert row.right, row.text
+    assert row.evidence > rates.CLEAR
+
+
+@pytest.mark.slow
+def test_what_no_catalogue_has_is_flagged():
+    row = said_of("carpet", "outside")
+    assert row.flagged, row.text
+    assert "position" in row.depends_on
+
+
+def test_nothing_is_found_in_a_clean_log():
+    row = said_of("clean 0 normal", "clean")
+    assert (row.verdict, row.adopted, row.depends_on) == ("nothing missing", (), ())
+    assert row.after == row.before

@@ -1,0 +1,206 @@
+"""Groups are chosen if they pay on parts that they were not fitted to.
+
+What may be learnt has its knots where the drives have been.
+What has no name is learnt, and used only where it is shown to help.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from learnt_truth import TURNING
+from planted import TRUTH, planted_drives
+
+from proxytune.diagnosis import RULES, Ratio, cut, pose_errors
+from proxytune.diagnosis.motion.discrepancy import (
+    FIRMEST_ONLY,
+    RIDGES,
+    Remainder,
+    _helps,
+    choose,
+    offer_curves,
+    remainder,
+    sums,
+)
+from proxytune.diagnosis.motion.innovations import twists_of
+from proxytune.diagnosis.motion.prediction import Slopes
+from proxytune.effects import GROUPS, learnt_effect, learnt_theta
+
+PARTS = 12
+GROUP_CHOICE_GROUPS = {"one": np.arange(3), "other": np.arange(3, 7), "speed_and_turn": np.arange(7, 15)}
+
+
+def slopes(truth, *, seed=1, noise=0.1, odd=0):
+    """Errors that the true weights (15,) make, and white noise; some of them are wild."""
+    random = np.random.default_rng(seed)
+    columns = random.standard_normal((PARTS * 40, 3, 15))
+    left = columns @ truth + noise * random.standard_normal(columns.shape[:2])
+    left[:odd] += 50.0
+    return Slopes(left, columns, np.repeat(np.arange(PARTS), 40))
+
+
+def summed(given, weights=None):
+    return sums(given, np.zeros(15) if weights is None else weights, given.block, PARTS)
+
+
+GROUP_CHOICE_TRUTH = np.concatenate((np.zeros(3), (0.5, -0.3, 0.2, 0.4), np.zeros(8)))
+
+
+def test_the_group_that_is_there_is_chosen_alone_with_its_weights():
+    chosen = choose(summed(slopes(GROUP_CHOICE_TRUTH)), GROUP_CHOICE_GROUPS)
+    assert list(chosen.gains) == ["other"]
+    np.testing.assert_allclose(chosen.weights, GROUP_CHOICE_TRUTH, atol=0.02)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_nothing_is_chosen_of_noise(seed):
+    chosen = choose(summed(slopes(np.zeros(15), seed=seed)), GROUP_CHOICE_GROUPS)
+    assert not chosen.gains
+    assert not chosen.weights.any()
+
+
+def test_the_group_that_gains_most_is_chosen_first():
+    chosen = choose(summed(slopes(GROUP_CHOICE_TRUTH + np.eye(15)[0] * 0.2)), GROUP_CHOICE_GROUPS)
+    assert list(chosen.gains) == ["other", "one"]
+    assert chosen.gains["other"] > chosen.gains["one"] > 0.0
+
+
+def test_a_few_wild_errors_hardly_move_the_weights():
+    np.testing.assert_allclose(
+        choose(summed(slopes(GROUP_CHOICE_TRUTH, odd=12)), GROUP_CHOICE_GROUPS).weights, GROUP_CHOICE_TRUTH, atol=0.05
+    )
+
+
+def test_errors_are_counted_from_no_weights_wherever_they_were_linearised():
+    plain = slopes(GROUP_CHOICE_TRUTH)
+    moved = plain._replace(left=plain.left - plain.columns @ GROUP_CHOICE_TRUTH)
+    np.testing.assert_allclose(
+        summed(moved, GROUP_CHOICE_TRUTH).pull / PARTS, summed(plain).pull / PARTS, rtol=1.0, atol=8.0
+    )
+    np.testing.assert_allclose(
+        choose(summed(moved, GROUP_CHOICE_TRUTH), GROUP_CHOICE_GROUPS).weights, GROUP_CHOICE_TRUTH, atol=0.02
+    )
+
+
+def test_curves_over_two_signals_are_always_pulled_firmly():
+    assert min(RIDGES) < FIRMEST_ONLY["speed_and_turn"] <= max(RIDGES)
+    truth = np.concatenate((np.zeros(7), 0.3 * np.ones(8)))
+    weights = choose(summed(slopes(truth, noise=0.0)), GROUP_CHOICE_GROUPS).weights
+    assert np.all(np.abs(weights[7:]) < 0.95 * 0.3)
+
+
+def test_the_level_is_always_there_and_never_a_gain():
+    groups = {"level": GROUP_CHOICE_GROUPS["one"], "other": GROUP_CHOICE_GROUPS["other"]}
+    truth = GROUP_CHOICE_TRUTH + np.concatenate(((0.6, -0.4, 0.5), np.zeros(12)))
+    chosen = choose(summed(slopes(truth)), groups)
+    assert list(chosen.gains) == ["other"]
+    np.testing.assert_allclose(chosen.weights[:7], truth[:7], atol=0.02)
+    assert not choose(summed(slopes(truth - GROUP_CHOICE_TRUTH)), groups).gains
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives(TRUTH, episodes=3, seconds=20.0, noise=None)
+
+
+def test_every_group_is_offered_in_the_order_of_its_weights_and_makes_an_effect(drives):
+    offer = offer_curves(drives, TRUTH)
+    assert {curve.group for curve in offer.curves} == set(GROUPS)
+    assert learnt_effect(learnt_theta(offer)) == offer
+    assert not any(any(curve.weights) for curve in offer.curves)
+
+
+def test_knots_lie_within_what_was_seen(drives):
+    offer, asked = offer_curves(drives, TRUTH), twists_of(drives, TRUTH)
+    for bounds, signal in zip(offer.seen, (asked[..., 0], asked[..., 2]), strict=True):
+        assert signal.min() <= bounds[0] < 0.0 < bounds[1] <= 1.01 * signal.max()
+    knots = {curve.group: np.array(curve.knots) for curve in offer.curves}
+    assert offer.seen.yaw[0] <= knots["turn_rate"].min() < 0.0 < knots["turn_rate"].max() <= offer.seen.yaw[1]
+    assert knots["time"].max() <= 20.1
+
+
+def test_what_was_never_driven_is_not_offered(drives):
+    ahead = replace(drives, duties=np.abs(drives.duties[..., :1]).repeat(2, axis=-1))
+    groups = {curve.group for curve in offer_curves(ahead, {**TRUTH, "trim": 0.0}).curves}
+    assert "direction" not in groups
+    assert "turn_rate" not in groups
+    assert "wheel_speed" in groups
+
+
+@pytest.fixture(scope="module")
+def found():
+    drives = planted_drives({**TRUTH, **TURNING}, episodes=6, seconds=20.0)
+    return drives, remainder(drives, TRUTH)
+
+
+def test_drives_too_short_for_a_window_teach_nothing():
+    drives = planted_drives(TRUTH, episodes=8, seconds=1.5)
+    learnt = remainder(drives, TRUTH)
+    assert (learnt.used, dict(learnt.theta), len(learnt.held_out)) == (False, {}, 0)
+
+
+def test_a_hidden_curve_is_learnt_by_its_signal_and_lowers_the_error_of_other_drives(found):
+    _, learnt = found
+    assert learnt.used
+    assert max(learnt.share, key=lambda title: learnt.share[title]) == "turn rate"
+    assert sum(learnt.share.values()) == pytest.approx(1.0)
+    others = planted_drives({**TRUTH, **TURNING}, episodes=3, seconds=20.0, seed=9)
+    windows = cut(others, 2.0)
+    before, after, right = (
+        np.sqrt(np.mean(pose_errors(others, theta, windows)[:, 0] ** 2))
+        for theta in (TRUTH, {**TRUTH, **learnt.theta}, {**TRUTH, **TURNING})
+    )
+    assert after < 0.5 * before
+    assert after < 1.25 * right
+
+
+def test_the_guard_and_the_held_out_errors_tell_of_blocks_that_were_not_fitted(found):
+    drives, learnt = found
+    assert set(learnt.guard) == {1.0, 2.0, 5.0}
+    before = pose_errors(drives, TRUTH, cut(drives, 2.0))[:, 0] ** 2
+    assert np.sqrt(learnt.held_out.mean() / before.mean()) == pytest.approx(learnt.guard[2.0].value)
+    inside = pose_errors(drives, {**TRUTH, **learnt.theta}, cut(drives, 2.0))[:, 0] ** 2
+    assert inside.mean() < learnt.held_out.mean()
+
+
+def test_curves_that_promise_nothing_to_who_asks_are_not_used(found):
+    drives, learnt = found
+    asked = []
+    refused = remainder(drives, TRUTH, lambda held_out: asked.append(held_out))
+    assert (refused.used, dict(refused.guard), dict(refused.theta)) == (False, {}, {})
+    np.testing.assert_array_equal(asked, [learnt.held_out])
+    np.testing.assert_array_equal(refused.held_out, learnt.held_out)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_nothing_is_used_where_nothing_is_missing(seed):
+    drives = planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed)
+    assert not remainder(drives, TRUTH).used
+
+
+def test_too_few_blocks_teach_nothing():
+    drives = planted_drives({**TRUTH, **TURNING}, episodes=1, seconds=12.0)
+    learnt = remainder(drives, TRUTH)
+    assert (dict(learnt.theta), learnt.used) == ({}, False)
+    assert len(learnt.held_out)
+
+
+GOOD, DULL = Ratio(0.8, (0.7, 0.9)), Ratio(1.0, (0.9, 1.1))
+BAD, UNSURE = Ratio(1.1, (0.9, 1.3)), Ratio(0.8, (0.6, 1.01))
+
+
+@pytest.mark.parametrize(
+    ("guard", "used"),
+    [
+        ({1.0: GOOD, 2.0: DULL}, True),
+        ({1.0: GOOD, 2.0: BAD}, False),
+        ({1.0: DULL, 2.0: DULL}, False),
+        ({1.0: UNSURE, 2.0: DULL}, False),
+        ({}, False),
+    ],
+)
+def test_the_guard_wants_a_sure_gain_somewhere_and_a_loss_nowhere(guard, used):
+    assert DULL.value < RULES.remainder_harms < BAD.value
+    assert GOOD.value < RULES.remainder_helps < DULL.value
+    assert _helps(guard) == used
+    assert not Remainder().used

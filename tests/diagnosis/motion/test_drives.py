@@ -1,0 +1,345 @@
+"""Cosine and sine from the tangent of half the angle are those of numpy.
+
+Measured drives become arrays: what counts as an increment, and what a command is as a duty.
+What was asked for lately is not worked out again.
+A log_of_vehicle's robot is one of ours, or what its log_of_vehicle says of it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import ROBOT, driven_log, planted_drives, planted_log
+
+from proxytune.diagnosis import robot_of
+from proxytune.diagnosis.motion.drives import (
+    MOST,
+    Recent,
+    cosine_and_sine,
+    duties_of,
+    gather,
+    number_of,
+    relative,
+    sum_by,
+)
+from proxytune.driving import read_robot
+from proxytune.errors import LogError, SettingsError
+from proxytune.logs import Log, LogEpisode
+
+
+@pytest.mark.parametrize("reach", [1e-9, 1.0, 100.0])
+def test_they_are_those_of_numpy_for_any_angle(reach):
+    angle = np.random.default_rng(1).uniform(-reach, reach, (7, 500))
+    np.testing.assert_allclose(cosine_and_sine(angle), (np.cos(angle), np.sin(angle)), rtol=0.0, atol=1e-14)
+
+
+def test_right_angles_are_right():
+    quarter = np.arange(-6, 7) * np.pi / 2.0
+    cosine, sine = cosine_and_sine(quarter)
+    np.testing.assert_allclose(cosine + 1j * sine, 1j ** np.arange(-6, 7), rtol=0.0, atol=1e-14)
+
+
+def test_of_zero_they_are_exact():
+    assert [part.item() for part in cosine_and_sine(np.zeros(()))] == [1.0, 0.0]
+
+
+SPEED_PER_RAD = 0.0318 / 0.6
+
+
+def episode(x, *, commands=None, wheels=None, name="a"):
+    """A drive along x, 20 rows per second; None where there is no pose."""
+    rows = len(x)
+    place = np.array([np.nan if value is None else value for value in x], dtype=float)
+    poses = np.stack((place, 0.0 * place, 0.0 * place), axis=1)
+    commands = np.full((rows, 2), 0.5) if commands is None else np.array(commands, dtype=float)
+    wheels = None if wheels is None else np.array(wheels, dtype=float)
+    return LogEpisode(name, np.arange(rows) / 20.0, commands, poses, wheels)
+
+
+def log(*episodes, command="duty"):
+    return Log("yard", "duckiebot", command, 20.0, {}, episodes)
+
+
+def gathered(*episodes, command="duty"):
+    return gather(log(*episodes, command=command), ROBOT, episodes)
+
+
+def rows_of(drives):
+    return [(int(a), int(b)) for a, b in zip(drives.first // 3, drives.last // 3, strict=True)]
+
+
+def test_a_pose_that_repeats_is_an_older_one_shown_again():
+    assert rows_of(gathered(episode([0.0, 0.1, 0.1, 0.2]))) == [(0, 1), (1, 3)]
+
+
+def test_a_robot_that_stands_shows_a_pose_of_its_own_every_fifth_of_a_second():
+    assert rows_of(gathered(episode([0.0] * 10))) == [(0, 4), (4, 8)]
+
+
+def test_ticks_are_at_least_60_per_second():
+    drives = gathered(episode([0.0, 0.1, 0.2]))
+    assert (drives.tick_hz, drives.rate_hz) == (60.0, 20.0)
+    slow = replace(log(episode([0.0, 0.1, 0.2])), rate_hz=7.0)
+    assert gather(slow, ROBOT, slow.episodes).tick_hz == 63.0
+
+
+def test_an_increment_spans_missing_poses_up_to_a_second_and_no_longer():
+    second = [0.0, *[None] * 19, 1.0, 1.1]
+    assert rows_of(gathered(episode(second))) == [(0, 20), (20, 21)]
+    longer = [0.0, 0.1, *[None] * 20, 1.0, 1.1]
+    drives = gathered(episode(longer))
+    assert rows_of(drives) == [(0, 1), (22, 23)]
+    assert drives.linked.tolist() == [False, False]
+
+
+def test_increments_are_linked_within_an_episode_and_not_across():
+    drives = gathered(episode([0.0, 0.1, 0.2]), episode([5.0, 5.1, 5.2], name="b"))
+    assert drives.linked.tolist() == [False, True, False, True]
+    assert drives.episode.tolist() == [0, 0, 1, 1]
+    assert drives.block.tolist() == [0, 0, 1, 1]
+
+
+def test_leaving_increments_out_breaks_the_links_over_them_and_renumbers_blocks():
+    drives = gathered(episode([0.0, 0.1, 0.2, 0.3, 0.4]), episode([0.0, 0.1, 0.2], name="b"))
+    some = drives.only(np.array([True, True, False, True, False, True]))
+    assert some.linked.tolist() == [False, True, False, False]
+    assert some.block.tolist() == [0, 0, 0, 1]
+    assert rows_of(some) == [(0, 1), (1, 2), (3, 4), (1, 2)]
+    assert drives.only(drives.episode == 1).block.tolist() == [0, 0]
+
+
+def test_episodes_of_different_length_go_on_with_their_last_command():
+    long = episode([0.0, 0.1, 0.2], commands=[[0.1, 0.2]] * 3)
+    short = episode([0.0, 0.1], commands=[[0.3, 0.4], [0.5, 0.6]], name="b")
+    duties = gathered(long, short).duties
+    assert duties.shape == (2, 9, 2)
+    np.testing.assert_array_equal(duties[1, ::3], [[0.3, 0.4], [0.5, 0.6], [0.5, 0.6]])
+
+
+def test_an_episode_without_poses_adds_no_increment():
+    drives = gathered(episode([None, None, None]), episode([0.0, 0.1, 0.2], name="b"))
+    assert drives.episode.tolist() == [1, 1]
+
+
+def test_a_log_without_two_poses_in_a_row_is_refused():
+    with pytest.raises(LogError, match="yard: no two measured poses"):
+        gathered(episode([0.0, None, None]))
+
+
+@pytest.mark.parametrize(
+    ("command", "given", "duty"),
+    [
+        ("duty", (0.4, -0.7), (0.4, -0.7)),
+        ("twist", (0.3, 1.0), ((0.3 - 0.08) / 0.6, (0.3 + 0.08) / 0.6)),
+        ("twist", (-0.2, -0.5), ((-0.2 + 0.04) / 0.6, (-0.2 - 0.04) / 0.6)),
+        ("wheel_speed", (10.0, -5.0), (10.0 * SPEED_PER_RAD, -5.0 * SPEED_PER_RAD)),
+    ],
+)
+def test_every_kind_of_command_becomes_a_fraction_of_full_speed(command, given, duty):
+    commands = np.array([given, given])
+    np.testing.assert_allclose(duties_of(log(command=command), ROBOT, commands), [duty, duty])
+
+
+@pytest.mark.parametrize(("command", "given"), [("twist", (0.5, 2.0)), ("wheel_speed", (19.0, 0.0))])
+def test_more_than_full_speed_is_refused_with_what_to_state(command, given):
+    with pytest.raises(LogError, match=r"asks a wheel for .* m/s, more than .*full_speed_m_s"):
+        duties_of(log(command=command), ROBOT, np.array([given]))
+
+
+def test_a_log_without_commands_is_refused():
+    with pytest.raises(LogError, match="yard: has no commands"):
+        duties_of(log(command="none"), ROBOT, np.empty((3, 0)))
+
+
+def test_a_drive_begins_at_rest_or_at_the_measured_wheel_speeds():
+    still = episode([0.0, 0.1])
+    turning = episode([0.0, 0.1], wheels=[[3.0, 4.0], [5.0, 6.0]])
+    np.testing.assert_array_equal(gathered(still).rest, [[0.0, 0.0]])
+    drives = gathered(turning)
+    np.testing.assert_allclose(drives.rest, [[3.0 * SPEED_PER_RAD, 4.0 * SPEED_PER_RAD]])
+    np.testing.assert_allclose(drives.wheels[0, 3:, 1], 6.0 * SPEED_PER_RAD)
+
+
+def test_wheel_speeds_with_a_gap_are_not_used_but_where_they_begin():
+    gap = episode([0.0, 0.1, 0.2], wheels=[[3.0, 4.0], [np.nan, np.nan], [5.0, 6.0]])
+    drives = gathered(gap)
+    assert drives.wheels is None
+    assert drives.rest[0, 0] == pytest.approx(3.0 * SPEED_PER_RAD)
+    assert gathered(episode([0.0, 0.1], wheels=[[np.nan, np.nan], [5.0, 6.0]])).rest.tolist() == [[0.0, 0.0]]
+
+
+def test_wheel_speeds_of_some_episodes_only_are_not_used():
+    assert gathered(episode([0.0, 0.1], wheels=np.ones((2, 2))), episode([0.0, 0.1], name="b")).wheels is None
+
+
+def test_headings_between_measured_ones_are_interpolated():
+    one = episode([0.0, None, 0.2])
+    poses = one.poses.copy()
+    poses[[0, 2], 2] = (1.0, 2.0)
+    drives = gathered(replace(one, poses=poses))
+    np.testing.assert_allclose(drives.headings[0, :7], 1.0 + np.arange(7) / 6.0)
+
+
+def test_an_increment_is_seen_from_its_first_pose():
+    np.testing.assert_allclose(
+        relative(np.array([1.0, 2.0, np.pi / 2]), np.array([0.5, 5.0, 3.0])), [3.0, 0.5, 3.0 - np.pi / 2], atol=1e-12
+    )
+
+
+def test_travel_is_the_way_without_what_noise_adds():
+    random = np.random.default_rng(1)
+    x = 0.01 * np.arange(400)
+    noisy = gathered(episode(x + random.normal(0.0, 0.015, 400)))
+    assert np.abs(np.diff(noisy.poses[:, :, 0])).sum() > 5.0
+    assert noisy.travel[:, 0].sum() == pytest.approx(3.99, rel=0.03)
+    np.testing.assert_allclose(gathered(episode(x)).travel[:, 0], 0.01, rtol=1e-9)
+
+
+def test_all_increments_together_last_as_long_as_the_drives():
+    drives = planted_drives({}, episodes=2, seconds=6.0)
+    assert drives.seconds == pytest.approx(2 * (6.0 - 1 / 20))
+
+
+def test_sums_by_label_leave_negative_labels_out():
+    sums = sum_by(np.array([0, 2, -1, 2]), np.arange(8.0).reshape(4, 2), 4)
+    np.testing.assert_array_equal(sums, [[0, 1], [0, 0], [8, 10], [0, 0]])
+
+
+def test_sums_by_label_are_weighted():
+    weights = np.array([2.0, 1.0, 5.0, -1.0])
+    sums = sum_by(np.array([0, 2, -1, 2]), np.arange(8.0).reshape(4, 2), 3, weights)
+    np.testing.assert_array_equal(sums, [[0, 2], [0, 0], [-4, -4]])
+
+
+def test_runs_of_labels_are_numbered_in_order():
+    assert number_of(np.array([4, 4, 1, 7, 7])).tolist() == [0, 0, 1, 2, 2]
+
+
+@pytest.mark.parametrize("name", ["husky", "irobot_create"])
+def test_the_other_robots_commands_are_scaled_by_their_own_figures(name):
+    other = read_robot(name)
+    full = other.figures["full_speed"] / other.figures["wheel_radius"]
+    speeds = duties_of(log(command="wheel_speed"), other, np.array([[full, -full]]))
+    np.testing.assert_allclose(speeds, [[1.0, -1.0]])
+
+
+def at_own_times(issued, commands, rows=4, wheels=None):
+    drive = replace(episode([0.1 * k for k in range(rows)], wheels=wheels), commands=np.array(commands, dtype=float))
+    return gathered(replace(drive, issued=np.array(issued)))
+
+
+def test_a_command_is_held_from_its_own_time_as_the_mean_over_each_tick():
+    drives = at_own_times([0.025, 0.1], [[0.6, 0.3], [0.0, 0.2]])
+    np.testing.assert_allclose(drives.duties[0, :8, 0], [0, 0.3, 0.6, 0.6, 0.6, 0.6, 0, 0], atol=1e-12)
+    assert np.flatnonzero(drives.issued[0]).tolist() == [1, 6]
+    assert drives.rate_hz == pytest.approx(1.0 / 0.075)
+
+
+def test_a_command_from_before_the_first_sample_is_in_force_already():
+    drives = at_own_times([-0.4, -0.2, 0.05], [[0.9, 0.9], [0.6, 0.3], [0.0, 0.2]])
+    np.testing.assert_allclose(drives.rest, [[0.6, 0.3]])
+    np.testing.assert_allclose(drives.duties[0, :4, 1], [0.3, 0.3, 0.3, 0.2])
+    assert np.flatnonzero(drives.issued[0]).tolist() == [3]
+
+
+def test_commands_at_the_samples_times_are_the_commands_of_the_samples():
+    rows = [[0.1, 0.2], [0.3, 0.1], [0.0, 0.0], [0.5, 0.5]]
+    plain = gathered(episode([0.0, 0.1, 0.2, 0.3], commands=rows))
+    own = at_own_times([0.0, 0.05, 0.1, 0.15], rows)
+    np.testing.assert_allclose(own.duties, plain.duties, atol=1e-12)
+    np.testing.assert_array_equal(own.issued, plain.issued)
+    assert own.rate_hz == pytest.approx(plain.rate_hz)
+
+
+def asked_of(keys):
+    """The keys for which a result was worked out."""
+    recent, made = Recent(), []
+    for key in keys:
+        assert recent.get(key, lambda key=key: made.append(key) or 10 * key) == 10 * key
+    return made
+
+
+def test_the_same_is_worked_out_once():
+    assert asked_of([1, 2, 1, 2, 2, 1]) == [1, 2]
+
+
+def test_what_was_asked_for_longest_ago_is_forgotten_first():
+    fill = list(range(MOST))
+    assert asked_of([*fill, 0, MOST, 0, 1]) == [*fill, MOST, 1]
+
+
+OWN = {"wheel_radius": 0.05, "effective_baseline": 0.4}
+
+
+@pytest.fixture(scope="module")
+def log_of_vehicle():
+    return planted_log({}, episodes=2, seconds=10.0, noise=None)
+
+
+def with_commands(log_of_vehicle, kind, commands, geometry=OWN):
+    episodes = tuple(replace(e, commands=np.array(commands, dtype=float)) for e in log_of_vehicle.episodes)
+    return replace(log_of_vehicle, robot="tractor", command=kind, geometry=dict(geometry), episodes=episodes)
+
+
+def test_a_robot_with_a_folder_is_read_from_it(log_of_vehicle):
+    assert robot_of(log_of_vehicle) == read_robot("duckiebot")
+
+
+def test_another_robot_can_be_named(log_of_vehicle):
+    assert robot_of(log_of_vehicle, "husky") == read_robot("husky")
+    assert robot_of(replace(log_of_vehicle, robot="tractor"), "duckiebot") == read_robot("duckiebot")
+
+
+def test_an_unknown_name_is_refused_with_the_nearest(log_of_vehicle):
+    with pytest.raises(SettingsError, match="robot 'duckybot' is unknown"):
+        robot_of(log_of_vehicle, "duckybot")
+
+
+@pytest.mark.parametrize(
+    ("geometry", "missing"),
+    [
+        ({}, "wheel_radius_m and baseline_m"),
+        ({"wheel_radius": 0.05}, "baseline_m"),
+        ({"effective_baseline": 0.4}, "wheel_radius_m"),
+    ],
+)
+def test_an_unknown_robot_needs_its_geometry(log_of_vehicle, geometry, missing):
+    with pytest.raises(LogError, match=f"robot 'tractor' is unknown .* does not state {missing};"):
+        robot_of(replace(log_of_vehicle, robot="tractor", geometry=geometry))
+
+
+def test_an_unknown_robot_has_the_geometry_of_its_log_and_obeys_at_once(log_of_vehicle):
+    robot = robot_of(replace(log_of_vehicle, robot="tractor", geometry={**OWN, "full_speed": 1.5}))
+    assert (robot.name, robot.theta, robot.urdf) == ("tractor", {}, None)
+    assert dict(robot.figures) == {**OWN, "full_speed": 1.5, "motor_time_constant": 0.0, "control_rate": 20.0}
+
+
+def test_a_robot_of_the_logs_own_figures_may_be_named_as_the_log_names_it(log_of_vehicle):
+    own = replace(log_of_vehicle, robot="tractor", geometry={**OWN, "full_speed": 1.5})
+    assert robot_of(own, "tractor") == robot_of(own)
+
+
+@pytest.mark.parametrize(
+    ("kind", "command", "fastest"),
+    [("twist", (0.8, 1.0), 1.0), ("twist", (0.0, -3.0), 0.6), ("wheel_speed", (10.0, -23.0), 1.2)],
+)
+def test_full_speed_is_taken_from_the_fastest_command_and_then_no_command_is_beyond_it(
+    log_of_vehicle, kind, command, fastest
+):
+    told = with_commands(log_of_vehicle, kind, [command, (0.0, 0.0)])
+    robot = robot_of(told)
+    assert robot.figures["full_speed"] == pytest.approx(fastest)
+    assert np.abs(duties_of(told, robot, told.episodes[0].commands)).max() <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("rows", [1200, 40])
+def test_full_speed_of_duties_is_how_fast_it_drove(rows):
+    at_once = {"delay": 0.0, "motor_lag.time_constant": 0.0}
+    straight = driven_log(at_once, np.full((3, rows, 2), 0.5), np.zeros((3, 3)), noise=None)
+    robot = robot_of(replace(straight, robot="tractor", geometry=dict(OWN)))
+    assert robot.figures["full_speed"] == pytest.approx(0.6, rel=0.05)
+
+
+def test_full_speed_of_a_robot_that_never_moved_is_still_positive(log_of_vehicle):
+    still = with_commands(log_of_vehicle, "duty", np.zeros((200, 2)))
+    assert robot_of(still).figures["full_speed"] > 0.0

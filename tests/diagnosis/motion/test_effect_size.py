@@ -1,0 +1,264 @@
+"""Drives of two robots fall in two groups; drives of one do not, whatever it lacks.
+
+Effects are kept for what they are worth in error of prediction, not for their evidence.
+What drives could not have shown: a full-speed limit in slow drives, say.
+"""
+
+from dataclasses import replace
+
+import hidden
+import numpy as np
+import pytest
+from planted import DECLARED, NOISE, TRUTH, driven_log, drives_of, fitted, planted_drives, planted_log
+
+from proxytune.diagnosis import MOTION_EFFECTS, RULES, AdoptedEffect, Findings, Ratio, cut, pose_errors
+from proxytune.diagnosis.motion import effect_size as likeness
+from proxytune.diagnosis.motion.effect_size import (
+    WeighedEffect,
+    _drawn_squares,
+    drop_immaterial,
+    invisible_effects,
+    two_robots,
+    worth,
+)
+from proxytune.diagnosis.motion.evidence import Variant, without_effect
+from proxytune.diagnosis.motion.fitting import evaluate
+from proxytune.diagnosis.motion.innovations import Noise
+
+SHORT = {"episodes": 6, "seconds": 20.0}
+
+
+def mixed(theta, of=(1, 3, 4)):
+    """A log some of whose drives are another robot's."""
+    one, other = planted_log(TRUTH, **SHORT), planted_log({**TRUTH, **theta}, **SHORT)
+    chosen = [(other if e in of else one).episodes[e] for e in range(6)]
+    return replace(one, episodes=tuple(chosen))
+
+
+CASES = {case.name: case for case in (*hidden.IN_FORM, *hidden.OTHER_FORM, *hidden.OUTSIDE)}
+
+
+def unlike(log):
+    drives = drives_of(log)
+    return two_robots(drives, fitted(drives))
+
+
+@pytest.mark.parametrize(("theta", "wheel"), [({"trim": -0.06}, None), ({"wheel_gain.left": 0.88}, "left")])
+def test_drives_of_two_robots_are_told_apart_with_their_gains(theta, wheel):
+    found = unlike(mixed(theta))
+    assert found is not None
+    assert set(found.groups) == {(0, 2, 5), (1, 3, 4)}
+    assert wheel in (None, found.wheel)
+    assert abs(found.gains[1] - found.gains[0]) > 0.06
+
+
+@pytest.mark.parametrize("theta", [{}, {"motor_lag.time_constant": 0.3}])
+def test_drives_of_one_robot_are_alike(theta):
+    assert unlike(planted_log({**TRUTH, **theta}, **SHORT)) is None
+
+
+@pytest.mark.parametrize(
+    "name", ["dead_band width 0.12", "stiction breakaway 0.14", "dead_zone_that_jumps", "eccentric_wheel"]
+)
+def test_what_one_robot_lacks_does_not_make_two_of_it(name):
+    assert unlike(hidden.make_log(CASES[name], episodes=8, seconds=40.0)) is None
+
+
+def test_drives_on_two_floors_fall_in_two_groups_too():
+    found = unlike(hidden.make_log(CASES["carpet"], episodes=8, seconds=40.0))
+    assert sorted(found.gains) == pytest.approx([0.8, 1.0], abs=0.03)
+
+
+def test_a_single_drive_of_another_kind_is_no_second_robot():
+    assert unlike(mixed({"trim": -0.06}, of=(1,))) is None
+
+
+def test_three_drives_are_too_few_to_tell():
+    log = mixed({"trim": -0.06})
+    assert unlike(replace(log, episodes=log.episodes[:3])) is None
+
+
+def test_many_drives_are_looked_at_a_few_at_a_time_with_the_same_result(monkeypatch):
+    drives = drives_of(mixed({"wheel_gain.left": 0.88}))
+    model = fitted(drives)
+    together = two_robots(drives, model)
+    monkeypatch.setattr(likeness, "AT_ONCE", len(drives.episode) // 3)
+    apart = two_robots(drives, model)
+    assert apart.groups == together.groups
+    assert apart.gains == pytest.approx(together.gains, rel=1e-9)
+
+
+SCRUB, SLIP = (("yaw_scrub",),), (("lateral_slip",),)
+MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
+
+
+def adopted(effect, free=(), names=()):
+    return AdoptedEffect(effect, "", names or tuple(name for names in free for name in names), free, 60.0, 0.002, ())
+
+
+def found(drives, theta, *effects):
+    free = DECLARED + tuple(coordinate for effect in effects for coordinate in effect.free)
+    declared = evaluate(drives, TRUTH, DECLARED, NOISE)
+    return Findings(declared, evaluate(drives, theta, free, NOISE), effects, (), (), ())
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives(MIXED, episodes=6, seconds=20.0)
+
+
+@pytest.fixture(scope="module")
+def weighed(drives):
+    return drop_immaterial(found(drives, MIXED, adopted("yaw_scrub", SCRUB), adopted("lateral_slip", SLIP)), 1)
+
+
+def test_what_matters_is_kept_and_what_does_not_is_dropped(weighed):
+    assert [effect.effect for effect in weighed.adopted] == ["yaw_scrub"]
+    assert [dropped.effect.effect for dropped in weighed.immaterial] == ["lateral_slip"]
+
+
+def test_the_model_is_fitted_again_without_what_was_dropped(weighed):
+    assert "lateral_slip" not in weighed.model.theta
+    assert SLIP[0] not in weighed.model.free
+    assert weighed.model.theta["yaw_scrub"] == pytest.approx(0.13, abs=0.005)
+    assert weighed.immaterial[0].beside.theta["lateral_slip"] == 0.002
+
+
+def test_where_everything_matters_nothing_changes(drives):
+    whole = found(drives, MIXED, adopted("yaw_scrub", SCRUB))
+    assert drop_immaterial(whole, 1) is whole
+
+
+def test_of_two_effects_that_stand_for_one_another_one_is_kept(drives):
+    twins = (adopted("yaw_scrub", SCRUB), adopted("wheel_gain", (("wheel_gain.left", "wheel_gain.right"),)))
+    theta = {**TRUTH, "yaw_scrub": 0.13, "wheel_gain.left": 1.0, "wheel_gain.right": 1.0}
+    assert [one.effect for one in drop_immaterial(found(drives, theta, *twins), 1).adopted] == ["yaw_scrub"]
+
+
+def test_drives_too_short_for_windows_drop_nothing():
+    few = planted_drives(MIXED, episodes=2, seconds=4.0)
+    short = found(few, MIXED, adopted("lateral_slip", SLIP))
+    assert drop_immaterial(short, 1) is short
+
+
+def test_worth_is_told_on_drives_that_were_not_fitted(drives):
+    tested = planted_drives(MIXED, seed=2, episodes=4, seconds=20.0)
+    variant = Variant(MIXED, (*DECLARED, *SCRUB, *SLIP))
+    much, little = (worth(drives, tested, variant, adopted(*one), 1) for one in (("yaw_scrub", SCRUB), ("s", SLIP)))
+    assert set(much) == set(little) == {1.0, 2.0, 5.0}
+    assert max(one.interval[0] for one in much.values()) > 1.2
+    assert max(one.value for one in much.values()) > 1.5
+    assert all(one.interval[0] < RULES.material_factor and one.value < 1.2 for one in little.values())
+
+
+@pytest.mark.parametrize(("size", "matters"), [(0.4, True), (0.02, False)])
+def test_a_random_effect_matters_if_its_draws_make_up_the_error(size, matters):
+    calm = planted_drives(TRUTH, episodes=6, seconds=20.0)
+    lossy = adopted("dropped_commands", names=("dropped_commands",))
+    kept = drop_immaterial(found(calm, {**TRUTH, "dropped_commands": size}, lossy), 1)
+    assert bool(kept.adopted) == matters
+    if not matters:
+        assert kept.model.theta["delay"] == pytest.approx(TRUTH["delay"], abs=0.01)
+
+
+def test_without_a_random_effect_its_mean_lateness_is_delay():
+    theta = {**TRUTH, "delay_jitter": 0.1}
+    lack = without_effect(Variant(theta, DECLARED), adopted("delay_jitter", names=("delay_jitter",)), 20.0)
+    assert lack.theta == pytest.approx({**TRUTH, "delay": TRUTH["delay"] + 0.05})
+    assert lack.free == DECLARED
+
+
+@pytest.mark.parametrize(
+    ("ratios", "material"),
+    [
+        ([(1.2, 1.1, 1.3)], True),
+        ([(1.2, 0.9, 1.6)], False),
+        ([(1.04, 1.02, 1.06)], False),
+        ([(0.8, 0.7, 0.9)], False),
+        ([(1.0, 0.9, 1.1), (1.06, 1.01, 1.1)], True),
+    ],
+)
+def test_an_effect_matters_if_at_some_horizon_the_error_without_it_is_clearly_larger(ratios, material):
+    one = WeighedEffect(adopted("x", SLIP), {float(h): Ratio(value, ends) for h, (value, *ends) in enumerate(ratios)})
+    assert one.material == material
+    assert RULES.material_factor == 1.05
+
+
+def test_an_effect_does_harm_only_where_predictions_are_shown_to_be_better_without_it():
+    def weighed(value, low, high):
+        return WeighedEffect(adopted("lateral_slip", SLIP), {2.0: Ratio(value, (low, high))})
+
+    assert weighed(0.9, 0.85, 0.96).harmful
+    assert not weighed(0.9, 0.75, 1.02).harmful
+    assert not weighed(0.97, 0.95, 0.99).harmful
+    assert not weighed(1.2, 1.1, 1.3).harmful
+
+
+@pytest.mark.parametrize("size", [0.05, 0.1])
+def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them(size):
+    calm = planted_drives(TRUTH, episodes=6, seconds=20.0, noise=Noise((1e-6, 1e-6, 1e-6), (0.005, 0.01)))
+    jittery = Variant({**TRUTH, "delay": TRUTH["delay"] - size / 2.0, "delay_jitter": size}, DECLARED)
+    windows = cut(calm, 2.0)
+    errors = pose_errors(calm, jittery.theta, windows)[:, 0]
+    drawn = np.sqrt(_drawn_squares(calm, jittery, windows, 1).mean())
+    assert drawn > 0.4 * np.sqrt(np.mean(errors**2)), "by their size alone they would matter"
+    kept = drop_immaterial(found(calm, jittery.theta, adopted("delay_jitter", names=("delay_jitter",))), 1)
+    assert kept.adopted == ()
+
+
+def test_draws_matter_only_where_more_than_one_horizon_shows_them():
+    shown, hidden = Ratio(1.14, (1.03, 1.26)), Ratio(1.04, (1.0, 1.1))
+    lossy = adopted("dropped_commands", names=("dropped_commands",))
+    assert not WeighedEffect(lossy, {1.0: hidden, 2.0: hidden, 5.0: shown}).material
+    assert WeighedEffect(lossy, {1.0: hidden, 2.0: shown, 5.0: shown}).material
+    assert WeighedEffect(lossy, {2.0: shown}).material
+
+
+VISIBILITY_DECLARED = {"trim", "delay"}
+
+
+def swinging(level, swing):
+    times = np.arange(600) / 20.0
+    turn = swing * np.sin(2.0 * np.pi * times / 5.0)
+    duties = np.stack((level - turn, level + turn), axis=1)
+    return fitted(drives_of(driven_log(TRUTH, np.tile(duties, (3, 1, 1)), np.zeros((3, 3)))))
+
+
+@pytest.fixture(scope="module")
+def slow():
+    return invisible_effects(swinging(0.15, 0.03), VISIBILITY_DECLARED)
+
+
+def test_slow_drives_cannot_show_saturation(slow):
+    assert "saturation" in slow
+
+
+def test_driving_below_the_limit_of_both_wheels_cannot_show_saturation():
+    assert "saturation" in invisible_effects(swinging(0.3, 0.05), VISIBILITY_DECLARED)
+
+
+def test_fast_drives_can():
+    assert "saturation" not in invisible_effects(swinging(0.9, 0.1), VISIBILITY_DECLARED)
+
+
+def test_straight_drives_cannot_show_what_turning_costs():
+    assert "turn_slip" in invisible_effects(swinging(0.3, 0.0), VISIBILITY_DECLARED)
+
+
+def test_rich_drives_show_nearly_everything():
+    hidden = invisible_effects(fitted(planted_drives(TRUTH, episodes=6, seconds=30.0)), VISIBILITY_DECLARED)
+    assert len(hidden) <= 3
+
+
+def test_what_is_declared_or_adopted_is_not_told_as_unseen(slow):
+    assert not VISIBILITY_DECLARED & set(slow)
+    assert "saturation" not in invisible_effects(swinging(0.15, 0.03), {*VISIBILITY_DECLARED, "saturation"})
+
+
+def test_unseen_effects_are_effects_of_motion_in_the_catalogues_order(slow):
+    assert slow == tuple(name for name in MOTION_EFFECTS if name in slow)
+
+
+def test_commands_that_never_change_cannot_show_their_loss():
+    steady = fitted(drives_of(driven_log(TRUTH, np.full((3, 600, 2), 0.4), np.zeros((3, 3)))))
+    assert {"dropped_commands", "delay_jitter"} <= set(invisible_effects(steady, VISIBILITY_DECLARED))

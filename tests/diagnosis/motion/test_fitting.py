@@ -1,0 +1,221 @@
+"""Parameters are found with honest intervals, and blocks are foretold as if they had been left out.
+
+Logs that cannot bear the question are refused with what is wrong; honest logs are not.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import DECLARED, NOISE, ROBOT, TRUTH, drives_of, fitted, planted_drives, planted_log, with_poses
+
+from proxytune.diagnosis import Fit, increments, span, theta_at
+from proxytune.diagnosis.motion import fitting
+from proxytune.diagnosis.motion.fitting import (
+    check_motion,
+    check_units,
+    evaluate,
+    fit,
+    held_out_log_likelihood,
+    intervals,
+    loss_of,
+    replace_noise,
+    slopes,
+    sum_by_block,
+)
+from proxytune.diagnosis.motion.innovations import Whitener, whitener
+from proxytune.errors import LogError
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives(TRUTH)
+
+
+@pytest.fixture(scope="module")
+def found(drives):
+    return fitted(drives)
+
+
+def test_planted_trim_and_delay_lie_in_narrow_intervals(found):
+    known = intervals(found)
+    for name, true in TRUTH.items():
+        low, high = known[name]
+        assert low < true < high
+        assert low < found.theta[name] < high
+    assert known["trim"][1] - known["trim"][0] < 0.02
+    assert known["delay"][1] - known["delay"][0] < 0.03
+
+
+def test_intervals_cover_the_truth_most_of_the_time():
+    covered = []
+    for seed in range(10, 18):
+        known = intervals(fitted(planted_drives(TRUTH, seed=seed, episodes=3)))
+        covered += [known[name][0] <= true <= known[name][1] for name, true in TRUTH.items()]
+    assert sum(covered) >= 12
+
+
+def test_the_noise_is_found_with_the_parameters(found):
+    np.testing.assert_allclose(found.noise.drive, NOISE.drive, rtol=0.3)
+    np.testing.assert_allclose(found.noise.pose, NOISE.pose, rtol=0.15)
+
+
+def test_nothing_free_leaves_the_parameters_alone(drives):
+    assert fit(drives, TRUTH, ()).theta == TRUTH
+
+
+def test_parameters_that_share_a_coordinate_stay_equal():
+    truth = {"wheel_gain.left": 0.9, "wheel_gain.right": 0.9, **TRUTH}
+    drives = planted_drives(truth, episodes=3)
+    both = (("wheel_gain.left", "wheel_gain.right"),)
+    fit_of_gain = fit(drives, {**truth, "wheel_gain.left": 1.0, "wheel_gain.right": 1.0}, both)
+    assert fit_of_gain.theta["wheel_gain.left"] == fit_of_gain.theta["wheel_gain.right"] == pytest.approx(0.9, abs=0.01)
+    assert set(intervals(fit_of_gain)) == set(both[0])
+
+
+@pytest.mark.parametrize("start", [0.09, 0.2])
+def test_a_scan_finds_the_threshold_of_stiction(start):
+    truth = {**TRUTH, "stiction.breakaway": 0.14, "stiction.imbalance": 0.0}
+    drives = planted_drives(truth)
+    found = fit(drives, {**truth, "stiction.breakaway": start}, (("stiction.breakaway",),))
+    assert found.theta["stiction.breakaway"] == pytest.approx(0.14, rel=0.03)
+
+
+def test_of_steps_that_are_as_good_a_round_one_is_taken(drives, monkeypatch):
+    name = "command_quantisation"
+    monkeypatch.setattr(fitting, "loss_of", lambda drives, theta, whiten: round(abs(theta[name] - 0.25), 3))
+    theta = {**TRUTH, name: 0.2503}
+    assert fitting._scan(drives, theta, ((name,),), None, np.array([0.9, 1.1]))[name] == 0.25
+
+
+def test_a_step_is_found_with_an_interval_round_it():
+    truth = {**TRUTH, "command_quantisation": 0.25}
+    free = (*DECLARED, ("command_quantisation",))
+    found = fit(planted_drives(truth), {**truth, "command_quantisation": 0.2503}, free)
+    assert found.theta["command_quantisation"] == pytest.approx(0.25, rel=2e-3)
+    assert not found.slopes[:, 2].any()
+    low, high = intervals(found)["command_quantisation"]
+    assert 0.24 < low < 0.25 < high < 0.26
+
+
+def test_the_threshold_of_stiction_lies_in_its_interval():
+    truth = {**TRUTH, "stiction.breakaway": 0.141, "stiction.imbalance": 0.0}
+    found = fit(planted_drives(truth), {**truth, "stiction.breakaway": 0.15}, (*DECLARED, ("stiction.breakaway",)))
+    low, high = intervals(found)["stiction.breakaway"]
+    assert low < 0.141 < high < low + 0.03
+
+
+def test_values_stay_within_their_bounds():
+    low, high = span(("delay",), ROBOT)
+    edge = planted_drives({"trim": 0.0, "delay": high, "motor_lag.time_constant": 0.3}, episodes=3)
+    known = fit(edge, {"trim": 0.0, "delay": high - 0.02}, DECLARED).theta
+    assert low <= known["delay"] <= high
+    assert known["delay"] == pytest.approx(high, abs=1e-3)
+
+
+def test_slopes_foretell_a_small_change(found):
+    low, high = span(("trim",), ROBOT)
+    moved = theta_at(found.theta, (("trim",),), np.array([found.theta["trim"] + 1e-4 * (high - low)]))
+    there = found.whiten.whiten(found.drives.measured - increments(found.drives, moved))
+    change = found.slopes[:, 0] * 1e-4
+    assert np.linalg.norm(there - found.innovations - change) < 0.01 * np.linalg.norm(change)
+
+
+def test_slopes_at_the_highest_value_step_backwards(drives):
+    whiten = whitener(drives, NOISE)
+    high = span(("delay",), ROBOT)[1]
+    edge = slopes(drives, {"trim": 0.0, "delay": high}, (("delay",),), whiten)
+    inside = slopes(drives, {"trim": 0.0, "delay": high - 0.001}, (("delay",),), whiten)
+    assert np.corrcoef(edge[:, 0], inside[:, 0])[0, 1] > 0.9
+
+
+def test_the_fitted_model_loses_least(found):
+    here = loss_of(found.drives, found.theta, found.whiten)
+    for name, step in (("trim", 0.01), ("delay", 0.01)):
+        for sign in (-1.0, 1.0):
+            moved = {**found.theta, name: found.theta[name] + sign * step}
+            assert loss_of(found.drives, moved, found.whiten) > here + 0.1
+
+
+def test_the_same_model_with_other_noise_keeps_its_parameters(found):
+    louder = replace_noise(found, NOISE)
+    assert (louder.theta, louder.free, louder.noise) == (found.theta, found.free, NOISE)
+    assert evaluate(found.drives, found.theta, found.free, NOISE).innovations == pytest.approx(louder.innovations)
+
+
+def linear(drives, columns=2, seed=4):
+    """A model whose innovations are linear in its parameters and small."""
+    random = np.random.default_rng(seed)
+    size = 3 * len(drives.episode)
+    slope = random.standard_normal((size, columns))
+    factor = np.zeros((6, size))
+    factor[0] = random.uniform(0.5, 2.0, size)
+    free = tuple((str(number),) for number in range(columns))
+    z = 0.5 * random.standard_normal(size)
+    return Fit(drives, {}, free, NOISE, Whitener(factor), z, slope)
+
+
+def test_a_block_is_foretold_as_if_the_others_alone_had_been_fitted(drives):
+    few = drives.only(np.isin(drives.block, (0, 3, 4, 7)) & (np.arange(len(drives.block)) % 5 == 0))
+    model = linear(few)
+    told = held_out_log_likelihood(model)
+    label = np.repeat(few.block, 3)
+    for block in range(4):
+        own = label == block
+        refit = np.linalg.lstsq(model.slopes[~own], -model.innovations[~own], rcond=None)[0]
+        left = model.innovations[own] + model.slopes[own] @ refit
+        surprise = 0.5 * left @ left + np.log(model.whiten.factor[0][own]).sum()
+        assert told[block] == pytest.approx(-surprise, rel=1e-5)
+
+
+def test_a_useless_parameter_costs_and_a_needed_one_pays(drives):
+    model = linear(drives, columns=3)
+    useless = float(
+        held_out_log_likelihood(model).sum() - held_out_log_likelihood(replace(model, slopes=model.slopes[:, :1])).sum()
+    )
+    assert useless < 2.0
+    needed = replace(model, innovations=model.innovations + 0.2 * model.slopes[:, 1])
+    gain = float(
+        held_out_log_likelihood(needed).sum()
+        - held_out_log_likelihood(replace(needed, slopes=needed.slopes[:, :1])).sum()
+    )
+    assert gain == pytest.approx(0.5 * 0.04 * (model.slopes[:, 1] ** 2).sum(), rel=0.3)
+
+
+def test_sums_by_block_add_up(found):
+    sums = sum_by_block(found.drives, found.slopes)
+    assert len(sums) == found.drives.block.max() + 1
+    np.testing.assert_allclose(sums.sum(axis=0), found.slopes.sum(axis=0))
+
+
+NOMINAL = {"trim": 0.0, "delay": 0.15}
+
+
+@pytest.fixture(scope="module")
+def log():
+    return planted_log({"trim": 0.03, "delay": 0.12}, episodes=4, seconds=40.0)
+
+
+def test_an_honest_log_is_let_through(log):
+    check_motion("yard", drives_of(log))
+    check_units("yard", drives_of(log), NOMINAL)
+
+
+def test_a_robot_that_stands_still_is_refused(log):
+    random = np.random.default_rng(1)
+    still = with_poses(log, lambda poses: np.ones(3) + random.normal(0.0, 1e-4, poses.shape))
+    with pytest.raises(LogError, match=r"^yard: the robot got 0\.\d+ m far .* stands still"):
+        check_motion("yard", drives_of(still))
+
+
+def test_a_robot_that_stands_still_under_a_noisy_tracker_is_refused(log):
+    random = np.random.default_rng(1)
+    still = with_poses(log, lambda poses: random.normal(0.0, (0.002, 0.002, 0.005), poses.shape))
+    with pytest.raises(LogError, match="stands still"):
+        check_motion("yard", drives_of(still))
+
+
+def test_a_robot_that_is_never_told_to_move_is_refused(log):
+    quiet = replace(log, episodes=tuple(replace(e, commands=0.0 * e.commands) for e in log.episodes))
+    with pytest.raises(LogError, match="^yard: every command is zero"):
+        check_motion("yard", drives_of(quiet))

@@ -1,0 +1,323 @@
+"""The whitener is the factor of the errors' covariance, and noise is found from them.
+
+What a model says of recorded commands: paths, their increments, and windows that start from measured states.
+A diagnosis walks as the planar plant does.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from planted import NOISE, TRUTH, planted_drives
+
+from proxytune.diagnosis import HUBER, disturbed_increments, increments, wheel_speeds
+from proxytune.diagnosis.motion.drives import relative
+from proxytune.diagnosis.motion.innovations import (
+    FIRST_GUESS,
+    JITTER,
+    TURN_WEIGHT,
+    Noise,
+    arrived_commands,
+    clip_outliers,
+    expected_theta,
+    fit_noise,
+    huber,
+    increments_along,
+    lateness,
+    log_likelihood,
+    paths,
+    walk,
+    whitener,
+    window_paths,
+)
+from proxytune.driving.plants import integrate
+from proxytune.effects import PARAMETERS
+from proxytune.errors import SettingsError
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives({}, episodes=3, seconds=20.0, noise=None)
+
+
+@pytest.fixture(scope="module")
+def few(drives):
+    """Twelve increments of two episodes, one of them apart."""
+    places = np.flatnonzero(drives.travel[:, 0] > 0.005)
+    first, second = places[places < 300][40:47], places[places > 500][30:36]
+    chosen = np.zeros(len(drives.episode), dtype=bool)
+    chosen[[*first[:4], *first[5:], *second]] = True
+    return drives.only(chosen)
+
+
+def dense(drives, noise):
+    """The covariance by definition: Jacobians of the increments in the noise of every pose, and drive noise."""
+    count = len(drives.episode)
+    sample = np.cumsum(~drives.linked) + np.arange(count) - 1
+    ends = np.stack((sample, sample + 1), axis=1)
+    poses = np.zeros((ends.max() + 1, 3))
+    poses[ends[:, 0]], poses[ends[:, 1]] = drives.poses[:, 0], drives.poses[:, 1]
+    jacobian = np.zeros((3 * count, poses.size))
+    for column in range(poses.size):
+        moved = np.zeros(poses.size)
+        moved[column] = 1e-6
+        there, back = (
+            relative(poses[ends[:, 0]] + step[ends[:, 0]], poses[ends[:, 1]] + step[ends[:, 1]])
+            for step in (moved.reshape(-1, 3), -moved.reshape(-1, 3))
+        )
+        jacobian[:, column] = (there - back).ravel() / 2e-6
+    white = np.tile(np.square((noise.pose[0], noise.pose[0], noise.pose[1])), len(poses))
+    way = drives.travel[:, 0] + TURN_WEIGHT * drives.travel[:, 1]
+    drive = np.square(noise.drive) * way[:, None] + JITTER
+    return jacobian @ np.diag(white) @ jacobian.T + np.diag(drive.ravel())
+
+
+def factor(whiten, size):
+    return np.stack([whiten.colour(unit).ravel() for unit in np.eye(size)], axis=1)
+
+
+def test_the_few_drives_have_a_break_and_turn(few):
+    assert (~few.linked).sum() >= 3
+    assert np.abs(few.measured[:, 2]).max() > 0.02
+
+
+@pytest.mark.parametrize("noise", [NOISE, Noise((0.1, 0.02, 0.5), (0.02, 0.1))])
+def test_the_banded_covariance_is_that_of_noisy_poses_and_noisy_driving(few, noise):
+    lower = factor(whitener(few, noise), 3 * len(few.episode))
+    wanted = dense(few, noise)
+    np.testing.assert_allclose(lower @ lower.T, wanted, atol=1e-7 * np.abs(wanted).max())
+    assert np.abs(wanted[3:6, :3]).max() > 0.1 * noise.pose[0] ** 2
+
+
+@settings(derandomize=True, deadline=None, max_examples=20)
+@given(seed=st.integers(0, 10**6), size=st.floats(0.1, 10.0))
+def test_colouring_and_whitening_undo_each_other(few, seed, size):
+    whiten = whitener(few, Noise((0.02 * size, 0.01, 0.1), (0.003, 0.01 * size)))
+    z = np.random.default_rng(seed).standard_normal(3 * len(few.episode))
+    np.testing.assert_allclose(whiten.whiten(whiten.colour(z)), z, atol=1e-9)
+
+
+def test_columns_are_whitened_side_by_side(few):
+    whiten = whitener(few, NOISE)
+    errors = np.random.default_rng(1).standard_normal((len(few.episode), 3, 4))
+    together = whiten.whiten(errors)
+    for column in range(4):
+        np.testing.assert_allclose(together[:, column], whiten.whiten(errors[..., column]))
+
+
+def test_the_log_likelihood_is_the_gaussian_one_where_nothing_is_an_outlier(few):
+    whiten, covariance = whitener(few, NOISE), dense(few, NOISE)
+    errors = 0.3 * whiten.colour(np.random.default_rng(2).standard_normal(3 * len(few.episode)))
+    flat = errors.ravel()
+    wanted = -0.5 * flat @ np.linalg.solve(covariance, flat) - 0.5 * np.linalg.slogdet(covariance)[1]
+    assert log_likelihood(errors, whiten) == pytest.approx(wanted, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "noise", [Noise((0.03, 0.015, 0.2), (0.003, 0.008)), Noise((0.01, 0.02, 0.05), (0.0015, 0.004))]
+)
+def test_planted_noise_is_found_again(drives, noise):
+    z = np.random.default_rng(3).standard_normal(3 * len(drives.episode))
+    found = fit_noise(drives, whitener(drives, noise).colour(z), FIRST_GUESS)
+    np.testing.assert_allclose(found.drive, noise.drive, rtol=0.25)
+    np.testing.assert_allclose(found.pose, noise.pose, rtol=0.1)
+
+
+def test_noise_is_found_from_a_start_ten_times_too_large(drives):
+    z = np.random.default_rng(3).standard_normal(3 * len(drives.episode))
+    start = replace(NOISE, drive=tuple(10.0 * s for s in NOISE.drive), pose=tuple(10.0 * s for s in NOISE.pose))
+    found = fit_noise(drives, whitener(drives, NOISE).colour(z), start)
+    np.testing.assert_allclose(found.pose, NOISE.pose, rtol=0.1)
+
+
+def test_the_innovations_of_a_model_that_is_right_are_white():
+    from proxytune.diagnosis import increments
+
+    drives = planted_drives({"trim": 0.03}, episodes=6, seconds=20.0)
+    z = whitener(drives, NOISE).whiten(drives.measured - increments(drives, {"trim": 0.03})).reshape(-1, 3)
+    np.testing.assert_allclose(z.std(axis=0), 1.0, atol=0.1)
+    assert np.abs(np.mean(z[1:] * z[:-1], axis=0)).max() < 0.08
+
+
+def test_outliers_count_linearly_and_their_slope_is_cut():
+    z = np.linspace(-8.0, 8.0, 1601)
+    np.testing.assert_allclose(np.gradient(huber(z), z)[1:-1], clip_outliers(z)[1:-1], atol=0.01)
+    assert np.diff(huber(np.array([HUBER, 5.0, 6.0, 7.0])))[1:].tolist() == [HUBER, HUBER]
+
+
+RICH = {
+    **TRUTH,
+    "motor_lag.time_constant": 0.3,
+    "dead_band.width": 0.05,
+    "turn_slip": 0.05,
+    "lateral_slip": 0.03,
+    "command_quantisation": 0.1,
+    "marker_offset.forward": 0.02,
+    "heading_offset": 2.0,
+}
+
+
+@pytest.fixture(scope="module")
+def drives_of_replay():
+    return planted_drives(TRUTH, episodes=3, seconds=8.0, noise=None)
+
+
+@pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
+def test_increments_are_the_differences_of_paths(drives_of_replay, theta):
+    walked = paths(drives_of_replay, theta)
+    assert walked.shape == (3, drives_of_replay.duties.shape[1] + 1, 3)
+    for index in (0, 7, 40, len(drives_of_replay.episode) - 1):
+        episode, first, last = (
+            int(row[index]) for row in (drives_of_replay.episode, drives_of_replay.first, drives_of_replay.last)
+        )
+        np.testing.assert_array_equal(
+            increments(drives_of_replay, theta)[index], relative(walked[episode, first], walked[episode, last])
+        )
+    np.testing.assert_array_equal(increments(drives_of_replay, theta), increments_along(drives_of_replay, walked))
+
+
+def test_the_model_that_drove_says_what_was_measured(drives_of_replay):
+    np.testing.assert_allclose(increments(drives_of_replay, TRUTH), drives_of_replay.measured, atol=1e-9)
+
+
+@pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
+def test_windows_from_an_episodes_start_are_its_path(drives_of_replay, theta):
+    begins = np.flatnonzero(
+        np.isin(np.arange(len(drives_of_replay.episode)), np.unique(drives_of_replay.episode, return_index=True)[1])
+    )
+    begins = begins[drives_of_replay.first[begins] == 0]
+    assert len(begins) == 3
+    walked = window_paths(drives_of_replay, theta, begins, 300)
+    np.testing.assert_allclose(
+        walked, paths(drives_of_replay, theta)[drives_of_replay.episode[begins], :301], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
+def test_a_window_in_the_middle_knows_the_commands_before_it(drives_of_replay, theta):
+    begin = np.array([50])
+    walked = window_paths(drives_of_replay, theta, begin, 60)[0]
+    whole = paths(drives_of_replay, theta)[
+        drives_of_replay.episode[50], drives_of_replay.first[50] : drives_of_replay.first[50] + 61
+    ]
+    np.testing.assert_allclose(relative(walked[0], walked), relative(whole[0], whole), atol=1e-9)
+
+
+def test_a_window_starts_from_the_measured_wheel_speeds_where_there_are_any(drives_of_replay):
+    full = np.ones_like(drives_of_replay.duties)
+    turning = replace(drives_of_replay, wheels=full)
+    begin = np.array([50])
+    moved = [window_paths(one, TRUTH, begin, 1)[0, 1, 0] for one in (drives_of_replay, turning)]
+    assert moved[1] > moved[0]
+    assert moved[1] == pytest.approx(0.6 / 60.0, rel=0.1)
+
+
+def test_a_window_past_the_end_goes_on_with_the_last_command(drives_of_replay):
+    last = np.array([np.flatnonzero(drives_of_replay.episode == 0)[-1]])
+    walked = window_paths(drives_of_replay, TRUTH, last, 200)
+    steps = np.diff(walked[0], axis=0)
+    np.testing.assert_allclose(np.hypot(*steps[-1, :2]), np.hypot(*steps[-50, :2]), rtol=0.2)
+    assert np.isfinite(walked).all()
+
+
+def test_nothing_measured_after_a_windows_start_changes_it(drives_of_replay):
+    poses = drives_of_replay.poses.copy()
+    poses[60:] += 5.0
+    later = replace(drives_of_replay, poses=poses)
+    begin = np.array([50])
+    np.testing.assert_array_equal(
+        window_paths(later, {**TRUTH, "floor_slope.x": 0.05}, begin, 90),
+        window_paths(drives_of_replay, {**TRUTH, "floor_slope.x": 0.05}, begin, 90),
+    )
+
+
+@pytest.mark.parametrize(
+    ("theta", "late"),
+    [
+        ({}, 0.0),
+        ({"delay_jitter": 0.1}, 0.05),
+        ({"dropped_commands": 0.2}, 0.25 / 20.0),
+        ({"dropped_commands": 0.5, "delay_jitter": 0.02}, 1.0 / 20.0 + 0.01),
+    ],
+)
+def test_random_effects_make_commands_late_by_their_mean(theta, late):
+    assert lateness(theta, 20.0) == pytest.approx(late)
+    calm = expected_theta({"trim": 0.02, "delay": 0.1, **theta}, 20.0)
+    assert calm == pytest.approx({"trim": 0.02, "delay": 0.1 + late})
+
+
+def test_the_mean_lateness_is_that_of_drawn_drives():
+    drawn = planted_drives({**TRUTH, "dropped_commands": 0.3}, episodes=6, seconds=30.0, noise=None)
+
+    def strays(delay):
+        return np.square(drawn.measured - increments(drawn, {"trim": TRUTH["trim"], "delay": delay}))[:, 0].sum()
+
+    best = min(np.arange(0.1, 0.18, 0.004), key=strays)
+    assert best == pytest.approx(TRUTH["delay"] + lateness({"dropped_commands": 0.3}, 20.0), abs=0.012)
+
+
+def test_a_random_effect_without_a_declared_delay_is_late_from_nothing():
+    assert expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
+
+
+def test_what_is_added_to_the_twists_moves_the_robot(drives_of_replay):
+    extra = np.zeros((*drives_of_replay.duties.shape[:2], 3))
+    np.testing.assert_allclose(
+        disturbed_increments(drives_of_replay, TRUTH, extra), increments(drives_of_replay, TRUTH), atol=1e-12
+    )
+    extra[..., 2] = 0.6
+    turned = disturbed_increments(drives_of_replay, TRUTH, extra)[:, 2] - increments(drives_of_replay, TRUTH)[:, 2]
+    np.testing.assert_allclose(turned, 0.6 * (drives_of_replay.last - drives_of_replay.first) / 60.0, atol=1e-9)
+
+
+def test_wheels_and_arrived_commands_have_the_shape_of_duties(drives_of_replay):
+    assert (
+        wheel_speeds(drives_of_replay, RICH).shape
+        == arrived_commands(drives_of_replay, RICH).shape
+        == drives_of_replay.duties.shape
+    )
+    late = arrived_commands(drives_of_replay, {"delay": 0.2})
+    np.testing.assert_allclose(late[:, 12:], drives_of_replay.duties[:, :-12], atol=1e-9)
+
+
+def test_a_value_out_of_bounds_is_refused(drives_of_replay):
+    with pytest.raises(SettingsError, match="delay: must be between"):
+        increments(drives_of_replay, {"delay": PARAMETERS["delay"].high + 0.1})
+
+
+def test_windows_with_measured_wheels_are_told_where_they_point(drives_of_replay):
+    theta = {**TRUTH, "floor_slope.x": 0.05, "floor_slope.y": 0.02}
+    begin = np.flatnonzero(drives_of_replay.first % 60 == 0)[2:9]
+    assert len(begin) != len(drives_of_replay.duties)
+    measured = replace(drives_of_replay, wheels=wheel_speeds(drives_of_replay, theta))
+    plain, known = (window_paths(one, theta, begin, 60) for one in (drives_of_replay, measured))
+    np.testing.assert_allclose(known, plain, atol=0.02)
+    level = window_paths(measured, TRUTH, begin, 60)
+    assert np.abs(level - known).max() > 0.02
+
+
+TICK_S = 1.0 / 60.0
+
+
+def twists(turn, sideways=0.3):
+    """Three drives of 400 ticks, straight ahead for a while, and standing at last."""
+    drawn = np.random.default_rng(1).standard_normal((3, 400, 3)) * (0.5, sideways, turn)
+    drawn[:, 100:150, 2], drawn[:, -50:] = 0.0, 0.0
+    return drawn
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 3.0, 150.0])
+@pytest.mark.parametrize("sideways", [0.0, 0.3])
+def test_the_poses_are_those_of_the_planar_plant(turn, sideways):
+    asked = twists(turn, sideways)
+    walked = walk(asked, TICK_S)
+    np.testing.assert_allclose(walked[:, 1:], integrate(np.zeros((3, 3)), asked, TICK_S), rtol=0.0, atol=1e-12)
+
+
+def test_it_begins_at_the_origin_and_changes_no_twist():
+    asked = twists(3.0)
+    before = asked.copy()
+    np.testing.assert_array_equal(walk(asked, TICK_S)[:, 0], 0.0)
+    np.testing.assert_array_equal(asked, before)

@@ -1,0 +1,174 @@
+"""The noise of measured poses is told from the logs alone, and what it makes of windows.
+
+Parameters are fitted to windows, and only where windows that were left out are no worse.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import DECLARED, NOISE, TRUTH, drives_of, planted_drives, planted_log
+
+from proxytune.diagnosis import RULES, cut, pose_errors
+from proxytune.diagnosis.motion.fitting import evaluate
+from proxytune.diagnosis.motion.innovations import Noise
+from proxytune.diagnosis.motion.multistep_fit import (
+    PoseNoise,
+    fit_windows,
+    held_out_squares,
+    horizons,
+    noise_floor,
+    polish_fit,
+    pose_noise,
+)
+
+STILL = Noise((0.0, 0.0, 0.0), (0.003, 0.008))
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives(TRUTH, episodes=6, seconds=60.0, noise=STILL)
+
+
+def test_the_noise_of_poses_is_found_within_a_few_percent(drives):
+    found = pose_noise(drives, TRUTH)
+    assert found.place == pytest.approx(0.003, rel=0.04)
+    assert found.turn == pytest.approx(0.008, rel=0.04)
+
+
+def test_noise_of_the_drive_does_not_pass_for_noise_of_poses():
+    found = pose_noise(planted_drives(TRUTH, episodes=6, seconds=60.0), TRUTH)
+    assert found.place == pytest.approx(NOISE.pose[0], rel=0.08)
+    assert found.turn == pytest.approx(NOISE.pose[1], rel=0.15)
+
+
+def test_a_missing_effect_does_not_pass_for_noise_of_poses(drives):
+    wrong = pose_noise(drives, {**TRUTH, "trim": 0.1, "yaw_scrub": 0.12})
+    assert wrong.place == pytest.approx(0.003, rel=0.1)
+
+
+def test_outliers_do_not_pass_for_noise(drives):
+    log = planted_log(TRUTH, episodes=6, seconds=60.0, noise=STILL)
+
+    def jumping(episode):
+        poses = episode.poses.copy()
+        poses[::100, :2] += 0.5
+        return replace(episode, poses=poses)
+
+    jumped = pose_noise(drives_of(replace(log, episodes=tuple(map(jumping, log.episodes)))), TRUTH)
+    assert jumped.place == pytest.approx(0.003, rel=0.25)
+
+
+def test_poses_without_noise_have_none():
+    quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
+    assert max(pose_noise(quiet, TRUTH)) < 1e-6
+
+
+def test_drives_too_short_for_third_differences_tell_no_noise():
+    few = planted_drives(TRUTH, episodes=1, seconds=0.3)
+    assert pose_noise(few, TRUTH) == PoseNoise(0.0, 0.0)
+
+
+@pytest.mark.parametrize("horizon_s", [1.0, 2.0, 5.0])
+def test_the_floor_is_the_error_of_the_true_model_where_only_poses_are_noisy(drives, horizon_s):
+    windows = cut(drives, horizon_s)
+    place, turn = np.sqrt(np.mean(pose_errors(drives, TRUTH, windows) ** 2, axis=0))
+    told = noise_floor(drives, windows, PoseNoise(0.003, 0.008))
+    assert told[0] == pytest.approx(place, rel=0.08)
+    assert told[1] == pytest.approx(turn, rel=0.08)
+    assert noise_floor(drives, windows, pose_noise(drives, TRUTH))[0] == pytest.approx(place, rel=0.1)
+
+
+def test_a_noisy_heading_counts_by_the_way_that_it_leads_astray(drives):
+    windows = cut(drives, 5.0)
+    place, _ = noise_floor(drives, windows, PoseNoise(0.0, 0.01))
+    short, _ = noise_floor(drives, cut(drives, 1.0), PoseNoise(0.0, 0.01))
+    assert place > 1.5 * short > 0.0
+    assert noise_floor(drives, windows, PoseNoise(0.003, 0.0))[0] == pytest.approx(0.006)
+
+
+@pytest.fixture(scope="module")
+def drives_of_polish():
+    return planted_drives(TRUTH, episodes=6, seconds=20.0)
+
+
+def model(drives_of_polish, **values):
+    return evaluate(drives_of_polish, {**TRUTH, **values}, DECLARED, NOISE)
+
+
+def squares(drives_of_polish, theta, horizon_s=2.0):
+    return pose_errors(drives_of_polish, theta, cut(drives_of_polish, horizon_s))[:, 0] ** 2
+
+
+def test_windows_lead_back_to_the_values_that_drove():
+    quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
+    found = fit_windows(quiet, {"trim": 0.0, "delay": 0.18}, DECLARED, cut(quiet, 2.0))
+    assert found["trim"] == pytest.approx(TRUTH["trim"], abs=2e-4)
+    assert found["delay"] == pytest.approx(TRUTH["delay"], abs=2e-3)
+
+
+def test_without_a_free_parameter_or_a_window_nothing_is_fitted(drives_of_polish):
+    assert fit_windows(drives_of_polish, TRUTH, (), cut(drives_of_polish, 2.0)) == TRUTH
+    assert fit_windows(drives_of_polish, {"trim": 0.0, "delay": 0.1}, DECLARED, cut(drives_of_polish, 100.0)) == {
+        "trim": 0.0,
+        "delay": 0.1,
+    }
+
+
+def test_a_few_wild_poses_do_not_bend_the_parameters(drives_of_polish):
+    poses = drives_of_polish.poses.copy()
+    poses[300:306] += (3.0, -2.0, 1.0)
+    found = fit_windows(replace(drives_of_polish, poses=poses), TRUTH, DECLARED, cut(drives_of_polish, 2.0))
+    assert found["trim"] == pytest.approx(TRUTH["trim"], abs=0.01)
+
+
+def test_long_logs_are_thinned(drives_of_polish, monkeypatch):
+    asked = []
+    monkeypatch.setattr("proxytune.diagnosis.motion.multistep_fit.MOST_WINDOWS", 5)
+    monkeypatch.setattr(
+        "proxytune.diagnosis.motion.multistep_fit.predicted_motion",
+        lambda d, t, w: asked.append(len(w.begin)) or np.zeros((len(w.window), 3)),
+    )
+    fit_windows(drives_of_polish, TRUTH, DECLARED, cut(drives_of_polish, 2.0))
+    assert 3 <= max(asked) <= 5
+
+
+def test_no_pose_is_predicted_by_what_was_fitted_to_it(drives_of_polish):
+    poses = drives_of_polish.poses.copy()
+    own = drives_of_polish.block % 4 == 0
+    poses[own, :, 2] += np.linspace(0.0, 2.0, own.sum())[:, None]
+    fitted = fit_windows(replace(drives_of_polish, poses=poses), TRUTH, DECLARED, cut(drives_of_polish, 2.0))
+    apart = held_out_squares(replace(drives_of_polish, poses=poses), TRUTH, DECLARED, 2.0)
+    others = drives_of_polish.block[cut(drives_of_polish, 2.0).increment] % 4 == 0
+    together = squares(replace(drives_of_polish, poses=poses), fitted)
+    assert apart[2.0][others].mean() > together[others].mean()
+    assert set(apart) == set(horizons(drives_of_polish)) == {1.0, 2.0, 5.0}
+
+
+def test_values_that_predict_poorly_are_fitted_again(drives_of_polish):
+    poor = model(drives_of_polish, trim=0.08, delay=0.2)
+    better, polish = polish_fit(poor)
+    assert squares(drives_of_polish, better.theta).mean() < 0.5 * squares(drives_of_polish, poor.theta).mean()
+    assert min(one.value for one in polish.ratios.values()) < RULES.polish_helps
+    assert max(one.value for one in polish.ratios.values()) <= RULES.polish_harms
+    for name, true in TRUTH.items():
+        low, high = polish.intervals[name]
+        assert low < better.theta[name] < high
+        assert low - 0.5 * (high - low) < true < high + 0.5 * (high - low)
+
+
+def test_values_that_windows_do_not_mend_are_kept(drives_of_polish):
+    right = model(drives_of_polish)
+    assert polish_fit(right) == (right, None)
+
+
+def test_values_that_would_do_harm_at_some_horizon_are_not_taken(drives_of_polish, monkeypatch):
+    poor = model(drives_of_polish, trim=0.08, delay=0.2)
+    monkeypatch.setattr("proxytune.diagnosis.motion.multistep_fit.RULES", replace(RULES, polish_harms=0.01))
+    assert polish_fit(poor) == (poor, None)
+
+
+def test_drives_too_short_for_windows_in_three_blocks_are_not_fitted_to():
+    few = model(planted_drives(TRUTH, episodes=2, seconds=4.0), trim=0.08)
+    assert horizons(few.drives) == ()
+    assert polish_fit(few) == (few, None)

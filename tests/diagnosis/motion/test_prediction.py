@@ -1,0 +1,424 @@
+"""What a model says of a log, window by window.
+
+What drives from the same commands do not repeat is noise; what they do, a model could predict.
+How weights move windows is what replays with other weights show.
+Windows cover unbroken poses and are of the stated horizon; errors come with honest intervals.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from foreign_robot import FOREIGN_TRUTH, drive, write_own_times
+from learnt_truth import MANY, TURNING
+from manoeuvres import make_drives
+from planted import ROBOT, TRUTH, driven_log, drives_of, planted_drives, planted_log
+
+from proxytune.diagnosis import agreement, cut, pose_errors, predict, robot_of
+from proxytune.diagnosis.motion import prediction as windows_module
+from proxytune.diagnosis.motion.drives import gather
+from proxytune.diagnosis.motion.prediction import (
+    FITTED_S,
+    POSES,
+    SHORTEST,
+    choose_windows,
+    compare_repeats,
+    ratio,
+    rmse,
+    select_windows,
+    slopes_of,
+)
+from proxytune.effects import learnt_effect
+from proxytune.errors import LogError
+from proxytune.logs import read_log
+
+COLUMNS = ["episode", "start_time", "time", "x", "y", "heading"]
+
+
+@pytest.fixture(scope="module")
+def log():
+    return planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
+
+
+def test_windows_follow_one_another_and_cover_every_row(log):
+    table = predict(log, ROBOT, TRUTH, 2.0)
+    assert list(table.columns) == COLUMNS
+    for name, own in table.groupby("episode"):
+        assert name in ("00", "01")
+        assert sorted(own.start_time.unique()) == pytest.approx([0.0, 2.0, 4.0, 6.0, 8.0])
+        assert sorted(own.time.unique()) == pytest.approx(np.arange(200) / 20.0)
+        assert (own.groupby("start_time").time.count() <= 41).all()
+
+
+def test_a_model_agrees_with_its_own_noiseless_log(log):
+    found = agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0)
+    assert found.place < 1e-9
+    assert found.turn < 1e-9
+    assert (found.poses, found.windows) == (2 * 199, 10)
+
+
+def test_a_stub_at_a_drives_end_is_not_counted_as_a_window(log):
+    table = predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 1.9)
+    found = agreement(table, log, 1.9)
+    ends = table.groupby(["episode", "start_time"]).time.max().reset_index()
+    assert (ends.time - ends.start_time).min() < 0.5
+    assert found.windows == 2 * 5
+    assert found.poses == found.windows * 38
+    whole = table[table.start_time < 9.0]
+    assert agreement(whole, log, 1.9) == found
+
+
+@pytest.mark.parametrize("extra", [TURNING, MANY], ids=["turning", "many"])
+def test_learnt_motion_is_predicted_with_its_past_before_each_window(log, extra):
+    driven = planted_log({**TRUTH, **extra}, episodes=2, seconds=10.0, noise=None)
+    assert agreement(predict(driven, ROBOT, TRUTH, 2.0), driven, 2.0).place > 0.005
+    found = agreement(predict(driven, ROBOT, {**TRUTH, **extra}, 2.0), driven, 2.0)
+    assert found.place < 1e-9
+    assert found.turn < 1e-9
+
+
+def test_another_model_does_not(log):
+    found = agreement(predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 2.0), log, 2.0)
+    assert found.place > 0.005
+    assert found.turn > 0.02
+
+
+def test_each_window_starts_from_the_measured_pose(log):
+    table = predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 1.0)
+    starts = table[table.time == table.start_time]
+    measured = {(e.name, time): pose for e in log.episodes for time, pose in zip(e.times, e.poses, strict=True)}
+    for row in starts.itertuples():
+        np.testing.assert_allclose((row.x, row.y, row.heading), measured[row.episode, row.time], atol=1e-12)
+
+
+def test_headings_go_on_over_a_whole_turn(log):
+    table = predict(log, ROBOT, TRUTH, 5.0)
+    for _, window in table.groupby(["episode", "start_time"]):
+        assert np.abs(np.diff(window.heading)).max() < 0.5
+    far = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
+    turned = replace(far, episodes=tuple(replace(e, poses=e.poses + (0.0, 0.0, 40.0)) for e in far.episodes))
+    assert predict(turned, ROBOT, TRUTH, 5.0).heading.iloc[0] == pytest.approx(turned.episodes[0].poses[0, 2])
+
+
+def test_a_slope_is_predicted_exactly_whatever_the_heading():
+    theta = {**TRUTH, "floor_slope.x": 0.04, "floor_slope.y": -0.02}
+    log = planted_log(theta, episodes=3, seconds=10.0, noise=None)
+    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
+    assert agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0).place > 0.01
+
+
+def test_a_marker_is_predicted_exactly():
+    theta = {**TRUTH, "marker_offset.forward": 0.05, "heading_offset": 3.0}
+    plain = planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
+
+    def seen(poses):
+        out = poses.copy()
+        out[:, :2] += 0.05 * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
+        out[:, 2] += np.radians(3.0)
+        return out
+
+    log = replace(plain, episodes=tuple(replace(e, poses=seen(e.poses)) for e in plain.episodes))
+    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
+
+
+def test_a_window_begins_at_the_first_measured_pose_after_the_one_before(log):
+    first = log.episodes[0]
+    poses = first.poses.copy()
+    poses[:7] = np.nan
+    poses[44:60] = np.nan
+    broken = replace(log, episodes=(replace(first, poses=poses),))
+    starts = predict(broken, ROBOT, TRUTH, 2.0).start_time.unique()
+    assert list(starts) == pytest.approx([0.35, 3.0, 5.0, 7.0, 9.0])
+
+
+def test_poses_that_were_not_measured_are_not_compared(log):
+    first = log.episodes[0]
+    poses = first.poses.copy()
+    poses[50:60] = np.nan
+    broken = replace(log, episodes=(replace(first, poses=poses),))
+    assert agreement(predict(broken, ROBOT, TRUTH, 2.0), broken, 2.0).poses < 190
+
+
+@pytest.mark.parametrize("horizon", [0.0, 0.04, -1.0, float("nan")])
+def test_a_horizon_shorter_than_a_sample_is_refused(log, horizon):
+    with pytest.raises(LogError, match="shorter than a sample"):
+        predict(log, ROBOT, TRUTH, horizon)
+
+
+def test_a_log_without_poses_is_refused(log):
+    blind = replace(log, episodes=tuple(replace(e, poses=np.full_like(e.poses, np.nan)) for e in log.episodes))
+    with pytest.raises(LogError, match="no two measured poses"):
+        predict(blind, ROBOT, TRUTH, 2.0)
+
+
+@pytest.mark.parametrize("known", [1, 2])
+def test_an_episode_with_a_pose_or_two_is_predicted_from_it(log, known):
+    first = log.episodes[0]
+    poses = np.full_like(first.poses, np.nan)
+    poses[:known] = first.poses[:known]
+    broken = replace(log, episodes=(replace(first, poses=poses), log.episodes[1]))
+    table = predict(broken, ROBOT, TRUTH, 2.0)
+    assert len(table[table.episode == "00"]) == 41
+
+
+def test_random_effects_are_predicted_by_their_mean(log):
+    late = predict(log, ROBOT, {"trim": 0.03, "delay": 0.07, "delay_jitter": 0.1}, 2.0)
+    assert agreement(late, log, 2.0).place < 1e-9
+
+
+@pytest.fixture(scope="module")
+def own_times(tmp_path_factory):
+    home = tmp_path_factory.mktemp("own_times")
+    return read_log(write_own_times(home, [drive(1, seconds=20.0)]))
+
+
+def test_poses_at_times_of_their_own_are_predicted_at_those_times(own_times):
+    (episode,) = own_times.episodes
+    robot = robot_of(own_times)
+    table = predict(own_times, robot, FOREIGN_TRUTH, 2.0)
+    assert set(table.time) == set(episode.measured.times[episode.measured.times >= table.time.min()])
+    found = agreement(table, own_times, 2.0)
+    assert found.place < 0.0035, "noise of 1 mm at the start and 3 mrad over up to 0.5 m"
+    assert found.poses > 1500
+
+
+def drives_of_of_repeats(log):
+    return gather(log, ROBOT, log.episodes)
+
+
+def again(times, *, theta=TRUTH, seconds=30.0):
+    """Drives of which each manoeuvre is driven so many times."""
+    duties, starts = make_drives(3, 2, round(20 * seconds))
+    return drives_of_of_repeats(driven_log(theta, np.repeat(duties, times, axis=0), np.repeat(starts, times, axis=0)))
+
+
+@pytest.mark.parametrize("times", [2, 5])
+@pytest.mark.parametrize("horizon_s", [1.0, 2.0])
+def test_a_model_that_is_right_misses_only_what_is_not_repeated(times, horizon_s):
+    found, apart, part = compare_repeats(again(times), TRUTH, horizon_s)
+    assert part == 1.0
+    assert 0.003 < apart < 0.03
+    assert found.value == pytest.approx(1.0, abs=0.15)
+    assert found.interval[0] < 1.0 < found.interval[1] + 0.1
+
+
+def test_a_model_that_lacks_something_misses_more_than_is_not_repeated():
+    found = compare_repeats(again(3, theta={**TRUTH, "yaw_scrub": 0.12}), TRUTH, 2.0).share
+    assert found.value < 0.7
+    assert found.interval[1] < 0.9
+
+
+def test_drives_that_end_earlier_are_repeats_as_far_as_they_go():
+    duties, starts = make_drives(3, 1, 600)
+    log = driven_log(TRUTH, np.repeat(duties, 2, axis=0), np.repeat(starts, 2, axis=0))
+    one, other = log.episodes
+    short = replace(other, times=other.times[:500], commands=other.commands[:500], poses=other.poses[:500])
+    assert compare_repeats(drives_of_of_repeats(replace(log, episodes=(one, short))), TRUTH, 1.0) is not None
+    stub = replace(other, times=other.times[:150], commands=other.commands[:150], poses=other.poses[:150])
+    assert compare_repeats(drives_of_of_repeats(replace(log, episodes=(one, stub))), TRUTH, 1.0) is None
+
+
+def test_standing_before_the_first_command_is_no_repeat():
+    duties, starts = make_drives(4, 6, 400)
+    duties[:, :200] = 0.0
+    assert compare_repeats(drives_of_of_repeats(driven_log(TRUTH, duties[:5], starts[:5])), TRUTH, 2.0) is None
+
+
+@pytest.mark.parametrize(("times", "seconds"), [(1, 30.0), (2, 6.0)])
+def test_of_drives_that_are_hardly_repeated_nothing_is_said(times, seconds):
+    assert compare_repeats(again(times, seconds=seconds), TRUTH, 2.0) is None
+
+
+def test_of_a_horizon_without_windows_nothing_is_said():
+    assert compare_repeats(again(2, seconds=3.0), TRUTH, 5.0) is None
+
+
+def test_drives_without_repeats_leave_windows_without_repeats():
+    duties, starts = make_drives(3, 2, 600)
+    duties, starts = np.concatenate((duties, duties[:1])), np.concatenate((starts, starts[:1]))
+    assert 0.3 < compare_repeats(drives_of_of_repeats(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9
+
+
+SIZE = 1e-4
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives(TRUTH, episodes=2, seconds=8.0, noise=None)
+
+
+@pytest.mark.parametrize("extra", [TURNING, MANY], ids=["turning", "many"])
+@pytest.mark.parametrize("named", [{}, {"marker_offset.forward": 0.05, "heading_offset": 4.0}], ids=["plain", "marker"])
+def test_the_change_per_weight_is_that_of_replays(drives, extra, named):
+    offered = learnt_effect(extra)
+    theta = {**TRUTH, **named}
+    still = slopes_of(drives, theta, offered)
+    weights = [name for name in extra if "range" not in name]
+    order = [f"learnt.{curve.group}.{curve.channel}@{knot!r}" for curve in offered.curves for knot in curve.knots]
+    assert sorted(order) == sorted(weights)
+    none = dict.fromkeys(weights, 0.0)
+    for column, name in enumerate(order):
+        moved = slopes_of(drives, {**theta, **extra, **none, name: SIZE}, offered)
+        seen = (still.left - moved.left) / SIZE
+        np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=2e-3 * np.abs(seen).max() + 1e-6)
+
+
+def test_a_model_that_is_right_leaves_nothing(drives):
+    assert np.abs(slopes_of(drives, TRUTH, learnt_effect(TURNING)).left).max() < 1e-9
+
+
+def test_windows_are_thinned_to_a_few_poses_that_reach_their_end(drives):
+    windows = choose_windows(drives)
+    counts = np.bincount(windows.window)
+    assert counts.max() == POSES
+    lasts = (drives.last[windows.increment] - drives.first[windows.begin][windows.window]) / drives.tick_hz
+    assert lasts.max() == FITTED_S
+    assert np.all(np.diff(lasts)[np.diff(windows.window) == 0] > 0.0)
+
+
+@pytest.fixture(scope="module")
+def drives_of_windows():
+    return planted_drives(TRUTH, episodes=6, seconds=30.0)
+
+
+def with_gaps(rows):
+    log = planted_log(TRUTH, episodes=2, seconds=20.0)
+    first = log.episodes[0]
+    poses = first.poses.copy()
+    poses[rows] = np.nan
+    return drives_of(replace(log, episodes=(replace(first, poses=poses), *log.episodes[1:])))
+
+
+@pytest.mark.parametrize("horizon_s", [0.5, 1.0, 2.0, 5.0])
+def test_windows_cover_every_increment_once_but_for_short_ends(drives_of_windows, horizon_s):
+    windows = cut(drives_of_windows, horizon_s)
+    assert len(np.unique(windows.increment)) == len(windows.increment)
+    left = np.setdiff1d(np.arange(len(drives_of_windows.episode)), windows.increment)
+    runs = int((~drives_of_windows.linked).sum())
+    assert len(left) <= runs * SHORTEST * horizon_s * 20.0
+    assert len(windows.begin) >= drives_of_windows.seconds / horizon_s * 0.6
+
+
+@pytest.mark.parametrize("horizon_s", [0.7, 1.9, 4.0])
+def test_a_horizon_that_does_not_divide_a_drive_leaves_no_stub(drives_of_windows, horizon_s):
+    windows = cut(drives_of_windows, horizon_s)
+    for window, begin in enumerate(windows.begin):
+        own = windows.increment[windows.window == window]
+        assert (
+            drives_of_windows.last[own[-1]] - drives_of_windows.first[begin]
+        ) / drives_of_windows.tick_hz >= 0.9 * horizon_s - 1e-9
+
+
+def test_some_windows_are_chosen_with_all_their_poses(drives_of_windows):
+    windows = cut(drives_of_windows, 2.0)
+    kept = np.arange(len(windows.begin)) % 3 == 1
+    some = select_windows(windows, kept)
+    assert np.array_equal(some.begin, windows.begin[kept])
+    assert np.array_equal(np.unique(some.window), np.arange(kept.sum()))
+    for number, window in enumerate(np.flatnonzero(kept)):
+        own = windows.increment[windows.window == window]
+        assert np.array_equal(some.increment[some.window == number], own)
+
+
+@pytest.mark.parametrize("horizon_s", [1.0, 2.0])
+@pytest.mark.parametrize("rows", [slice(50, 60), slice(100, 150)])
+def test_no_window_crosses_a_gap_a_block_or_an_episode(rows, horizon_s):
+    drives_of_windows = with_gaps(rows)
+    windows = cut(drives_of_windows, horizon_s)
+    for window, begin in enumerate(windows.begin):
+        own = windows.increment[windows.window == window]
+        assert own[0] == begin
+        assert np.array_equal(own, np.arange(begin, begin + len(own)))
+        assert drives_of_windows.linked[own[1:]].all()
+        assert len(np.unique(drives_of_windows.block[own])) == len(np.unique(drives_of_windows.episode[own])) == 1
+        lasts = (drives_of_windows.last[own[-1]] - drives_of_windows.first[begin]) / drives_of_windows.tick_hz
+        assert SHORTEST * horizon_s <= lasts <= horizon_s + 1e-9
+
+
+def test_runs_shorter_than_most_of_the_horizon_have_no_window():
+    few = planted_drives(TRUTH, episodes=2, seconds=4.0)
+    assert len(cut(few, 10.0).begin) == 0
+
+
+def test_a_model_does_not_stray_from_its_own_noiseless_drives():
+    quiet = planted_drives(TRUTH, episodes=2, seconds=20.0, noise=None)
+    assert pose_errors(quiet, TRUTH, cut(quiet, 2.0)).max() < 1e-9
+    assert pose_errors(quiet, {**TRUTH, "trim": 0.1}, cut(quiet, 2.0))[:, 0].max() > 0.01
+
+
+def test_an_error_has_an_interval_round_it():
+    random = np.random.default_rng(1)
+    blocks = np.repeat(np.arange(12), 50)
+    found = rmse(random.chisquare(1, 600) * np.repeat(random.uniform(0.5, 1.5, 12), 50), blocks)
+    assert 0.8 < found.interval[0] < found.value < found.interval[1] < 1.25
+
+
+def test_intervals_cover_the_true_error_about_as_often_as_they_say():
+    random = np.random.default_rng(2)
+    blocks = np.repeat(np.arange(12), 20)
+    covered = 0
+    for _ in range(200):
+        size = np.repeat(random.gamma(4.0, 0.25, 12), 20)
+        low, high = rmse(random.chisquare(1, 240) * size, blocks).interval
+        covered += low <= 1.0 <= high
+    assert 170 <= covered <= 199
+
+
+def test_the_ratio_of_an_error_with_itself_is_one():
+    squares, blocks = np.random.default_rng(1).random(100), np.repeat(np.arange(10), 10)
+    assert ratio(squares, squares, blocks)[:2] == (1.0, (1.0, 1.0))
+
+
+def test_a_ratio_is_surer_than_its_parts_where_both_vary_together():
+    random = np.random.default_rng(3)
+    blocks = np.repeat(np.arange(10), 30)
+    before = random.chisquare(1, 300) * np.repeat(random.uniform(0.2, 3.0, 10), 30)
+    found = ratio(0.25 * before * random.uniform(0.9, 1.1, 300), before, blocks)
+    assert found.value == pytest.approx(0.5, rel=0.02)
+    assert found.interval[0] < 0.5 < found.interval[1]
+    assert np.ptp(found.interval) < 0.1 * np.ptp(rmse(before, blocks).interval)
+
+
+def test_a_single_block_says_nothing_of_its_uncertainty():
+    found = rmse(np.ones(5), np.zeros(5, dtype=int))
+    assert found.value == 1.0
+    assert not np.isfinite(found.interval[1])
+
+
+def test_a_ratio_is_shown_by_many_blocks_on_one_side_though_a_few_weigh_most():
+    blocks = np.repeat(np.arange(16), 20)
+    before = np.exp(np.random.default_rng(1).normal(size=320))
+    more = np.append(np.full(15, 1.05), 300.0)[blocks]
+    larger, smaller = ratio(before * more, before, blocks), ratio(before, before * more, blocks)
+    assert larger.interval[0] < 1.0 < larger.value
+    assert larger.above
+    assert not larger.below
+    assert smaller.below
+    assert not smaller.above
+
+
+def test_a_ratio_of_few_blocks_or_of_errors_that_are_the_same_shows_nothing():
+    squares, blocks = np.arange(1.0, 9.0), np.arange(8)
+    assert not ratio(squares, squares, blocks).above
+    assert not ratio(np.append(squares, 0.0), np.append(squares, 0.0), np.arange(9)).below
+    assert not ratio(np.array([4.0, 9.0, 1.0]), np.array([1.0, 1.0, 0.9]), np.arange(3)).above
+
+
+def test_windows_of_a_few_episodes_at_a_time_have_the_same_errors_to_the_bit(drives_of_windows, monkeypatch):
+    theta = {**TRUTH, "dead_band.width": 0.1, "floor_slope.y": 0.02, "motor_lag.time_constant": 0.3}
+    gone = drives_of_windows.only((drives_of_windows.episode != 3) & (np.arange(len(drives_of_windows.episode)) != 150))
+    windows = cut(gone, 2.0)
+    every_other = select_windows(windows, np.arange(len(windows.begin)) % 2 == 0)
+    whole = pose_errors(gone, theta, every_other)
+    monkeypatch.setattr(windows_module, "AT_ONCE", gone.duties.shape[1])
+    assert np.array_equal(pose_errors(gone, theta, every_other), whole)
+
+
+def test_no_more_episodes_are_replayed_at_a_time_than_memory_is_to_take(drives_of_windows, monkeypatch):
+    sizes, replay = [], windows_module.window_paths
+    monkeypatch.setattr(
+        windows_module, "window_paths", lambda some, *rest: sizes.append(len(some.duties)) or replay(some, *rest)
+    )
+    monkeypatch.setattr(windows_module, "AT_ONCE", 2 * drives_of_windows.duties.shape[1])
+    pose_errors(drives_of_windows, TRUTH, cut(drives_of_windows, 2.0))
+    assert sizes == [2, 2, 2]

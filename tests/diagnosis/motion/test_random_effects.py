@@ -1,0 +1,185 @@
+"""Lost and jittering commands are found, and clean drives have none.
+
+The size of a random effect, and an interval that holds it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from own_times import own_times_log
+from planted import TRUTH, drives_of, fitted, planted_drives
+
+from proxytune.diagnosis import RANDOM_EFFECTS
+from proxytune.diagnosis.motion.random_effects import (
+    _changed_commands,
+    _invert,
+    _lose_commands,
+    _mixture,
+    random_effects,
+    responses,
+    size_random_effect,
+)
+
+SHORT = {"episodes": 4, "seconds": 25.0}
+
+
+def ratio(effect, size, pull, energy):
+    """The log-likelihood ratio of each command, one command per second."""
+    late = RANDOM_EFFECTS[effect].lateness(size, 1.0)
+    return _mixture(late, pull, energy)
+
+
+def weighed(theta, seed=1):
+    effects = random_effects(fitted(planted_drives({**TRUTH, **theta}, seed=seed, **SHORT)), 1)
+    return {effect.effect: effect for effect in effects}
+
+
+@pytest.fixture(scope="module")
+def lost():
+    return weighed({"dropped_commands": 0.3})
+
+
+@pytest.fixture(scope="module")
+def late():
+    return weighed({"delay_jitter": 0.15})
+
+
+def test_lost_commands_are_found_with_their_probability(lost):
+    found = lost["dropped_commands"]
+    assert found.gain > 30.0
+    assert found.p_value <= 0.01
+    assert found.gain > lost["delay_jitter"].gain
+    assert 0.1 < found.value < 0.5
+
+
+def test_jittering_commands_are_found_with_their_spread(late):
+    found = late["delay_jitter"]
+    assert found.gain > 15.0
+    assert found.p_value <= 0.01
+    assert 0.07 < found.value < 0.3
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_clean_drives_have_neither(seed):
+    for found in weighed({}, seed).values():
+        assert found.gain < 10.0
+
+
+def test_every_effect_names_its_parameter(lost):
+    assert {name: effect.parameter for name, effect in lost.items()} == {name: name for name in lost}
+
+
+def answers(base, others=1):
+    return responses(base, np.random.default_rng(1).standard_normal((len(base.innovations), others)))
+
+
+@pytest.fixture(scope="module")
+def answered():
+    return answers(fitted(planted_drives({**TRUTH, "dropped_commands": 0.3}, episodes=2, seconds=10.0)), 7)
+
+
+def test_every_command_that_changes_something_has_a_response(answered):
+    assert 20 < len(answered.size) < 2 * 200
+    assert answered.pull.shape == answered.size.shape
+    assert answered.others.shape == (7, len(answered.size))
+    assert answered.size.min() > 0.0
+
+
+def test_a_model_that_explains_everything_is_pulled_nowhere():
+    base = fitted(planted_drives(TRUTH, episodes=2, seconds=10.0, noise=None))
+    found = answers(base)
+    assert np.median(np.abs(found.pull) / found.size) < 0.1
+
+
+def test_a_robot_whose_command_never_changes_has_no_responses():
+    drives = planted_drives(TRUTH, episodes=2, seconds=10.0)
+    still = replace(drives, duties=np.full_like(drives.duties, 0.4), rest=np.full_like(drives.rest, 0.4))
+    base = fitted(still)
+    assert len(answers(base).size) == 0
+    assert random_effects(base, 1) == ()
+
+
+@pytest.mark.parametrize(
+    ("effect", "size"),
+    [("dropped_commands", 0.05), ("dropped_commands", 0.2), ("delay_jitter", 0.3), ("delay_jitter", 2.0)],
+)
+def test_mean_lateness_speaks_for_nothing_since_the_delay_has_it_already(effect, size):
+    pull = np.array([-1e-4, 0.0, 1e-4])
+    said = ratio(effect, size, pull, np.zeros(3))
+    np.testing.assert_allclose(said - said[1], 0.0, atol=2e-6)
+    assert said[1] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("effect", "size"), [("dropped_commands", 0.2), ("delay_jitter", 1.5)])
+def test_what_points_against_a_loss_of_no_consequence_costs(effect, size):
+    gains = ratio(effect, size, np.array([-8.0, 0.0, 0.0]), np.array([8.0, 8.0, 1e-9]))
+    assert gains[0] > 1.0
+    assert gains[1] < 0.0
+    assert gains[2] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_times_are_weighed_as_their_likelihoods_add_up_however_far_apart_they_are():
+    late = RANDOM_EFFECTS["dropped_commands"].lateness(0.2, 1.0)
+    pull, energy = np.array([-900.0, 0.3, 900.0]), np.array([1.0, 2.0, 40.0])
+    each = [w - k * pull - 0.5 * k**2 * energy for k, w in zip(late.commands, late.log_weights, strict=True)]
+    wanted = np.logaddexp.reduce(each, axis=0)
+    np.testing.assert_allclose(_mixture(late, pull, energy), wanted, rtol=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_commands_at_times_of_their_own_are_no_jitter_of_the_robot_but_on_a_grid_they_look_like_it(seed):
+    gains = {}
+    for gridded in (False, True):
+        log = own_times_log(seed, episodes=4, seconds=30.0, gridded=gridded)
+        found = {effect.effect: effect for effect in random_effects(fitted(drives_of(log)), 1)}
+        gains[gridded] = found["delay_jitter"].gain
+    assert gains[False] < 5.0
+    assert gains[True] > 30.0
+
+
+def test_a_command_that_is_lost_is_lost_until_the_next_one():
+    drives = drives_of(own_times_log(1, episodes=1, seconds=20.0, gridded=False))
+    changed, phase = _changed_commands(drives)
+    lost = changed[phase == phase[5]]
+    duties = _lose_commands(drives, lost)
+    issued = np.flatnonzero(drives.issued[0])
+    for _, tick in lost:
+        following = issued[issued > tick][0]
+        np.testing.assert_array_equal(
+            duties[0, tick:following], np.tile(drives.duties[0, tick - 1], (following - tick, 1))
+        )
+    assert np.any(duties != drives.duties)
+    assert np.diff(lost[:, 1]).min() > 2.0 * drives.tick_hz
+
+
+def told(effect, size, seed):
+    """What is told of an effect at first, and in the end."""
+    base = fitted(planted_drives({**TRUTH, effect: size}, seed=seed, episodes=6, seconds=30.0))
+    (first,) = [one for one in random_effects(base, 1) if one.effect == effect]
+    return first, size_random_effect(base, first, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("effect", "size"), [("dropped_commands", 0.3), ("delay_jitter", 0.15)])
+def test_intervals_hold_the_true_size(effect, size):
+    found = [told(effect, size, seed)[1] for seed in (1, 2, 3)]
+    assert sum(one.interval[0] <= size <= one.interval[1] for one in found) >= 2
+    for one in found:
+        assert one.value == pytest.approx(size, rel=0.35)
+        assert one.interval[0] < one.value < one.interval[1]
+        assert one.interval[1] < 4.0 * one.interval[0]
+
+
+@pytest.mark.slow
+def test_the_same_seed_says_the_same():
+    assert told("dropped_commands", 0.3, 1) == told("dropped_commands", 0.3, 1)
+
+
+def test_the_size_is_that_of_which_drives_say_what_is_measured():
+    sizes = np.array([0.1, 0.2, 0.4])
+    said = np.log(0.5 * sizes) + np.array([[-0.05], [0.05]])
+    value, low, high = _invert(sizes, said, float(np.log(0.1)))
+    assert value == pytest.approx(0.2)
+    assert 0.1 < low < 0.2 < high < 0.4

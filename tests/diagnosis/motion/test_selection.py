@@ -1,0 +1,285 @@
+"""An effect is adopted with its rivals, and what no longer pays beside it is dropped.
+
+Of what was looked at, what has most evidence is chosen, unless it stands for something else.
+What was chosen beside an effect that does harm is searched for again without it.
+The search adds effects one at a time, as long as each has evidence enough and no signal says far more.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from planted import DECLARED, NOISE, ROBOT, TRUTH, planted_drives
+
+from proxytune.diagnosis import AdoptedEffect, Curve, Findings
+from proxytune.diagnosis.motion import selection as naming
+from proxytune.diagnosis.motion import selection as searching
+from proxytune.diagnosis.motion.evidence import Evidence, FittedLead
+from proxytune.diagnosis.motion.fitting import evaluate, fit
+from proxytune.diagnosis.motion.innovations import at_edge
+from proxytune.diagnosis.motion.random_effects import RandomEffect
+from proxytune.diagnosis.motion.screening import Lead, candidates
+from proxytune.diagnosis.motion.selection import Choice, adopt, choose_best, drop_idle
+from proxytune.driving import read_robot
+from proxytune.effects import CATALOGUE
+
+FORMS = {form.effect: form for form in candidates(ROBOT, TRUTH, ()) if not form.form}
+AS_GOOD, WORSE = {"lateral_slip": 1e-4}, {"lateral_slip": 0.2}
+ACROSS, ALONG = (0.0, 1.0, 0.0), (0.99, 0.1, 0.0)
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives(TRUTH, episodes=4, seconds=12.0)
+
+
+def lead(effect, column):
+    form = FORMS[effect]
+    return Lead(form, form.probes[0], form.probes[0], 100.0, 100.0, 0.002, np.array(column))
+
+
+def rivals(drives, gain, theta, column=ACROSS):
+    """The rivals of an effect of 100 nats beside a second one: its gain, its values and what it does."""
+    best, second = lead("yaw_scrub", (1.0, 0.0, 0.0)), lead("lateral_slip", column)
+    model = evaluate(drives, {**TRUTH, "yaw_scrub": 0.16}, DECLARED, NOISE)
+    fits = {"yaw_scrub": FittedLead(best, model, 100.0)}
+    if gain is not None:
+        fits["lateral_slip"] = FittedLead(second, evaluate(drives, {**TRUTH, **theta}, DECLARED, NOISE), gain)
+    (adopted,) = adopt([], Choice(100.0, model, best), Evidence([best, second], fits, (), []))
+    return [rival.effect for rival in adopted.rivals]
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(50.0, []), (65.0, []), (75.0, ["lateral_slip"])])
+def test_a_second_effect_is_a_rival_by_most_of_the_evidence_if_it_predicts_no_worse(drives, gain, expected):
+    assert rivals(drives, gain, AS_GOOD) == expected
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(75.0, []), (96.0, []), (98.0, ["lateral_slip"])])
+def test_an_effect_that_predicts_worse_is_a_rival_only_within_three_nats(drives, gain, expected):
+    assert rivals(drives, gain, WORSE) == expected
+
+
+@pytest.mark.parametrize("gain", [None, 20.0])
+def test_an_effect_that_does_the_same_to_the_motion_is_a_rival_whatever_its_evidence(drives, gain):
+    assert rivals(drives, gain, AS_GOOD, ALONG) == ["lateral_slip"]
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(50.0, []), (80.0, ["delay_jitter"])])
+def test_a_random_effect_has_the_other_as_rival_by_most_of_the_evidence(drives, gain, expected):
+    lost, late = (RandomEffect(name, name, 0.1, (0.05, 0.2), nats, 0.01) for name, nats in
+                  (("dropped_commands", 100.0), ("delay_jitter", gain)))  # fmt: skip
+    choice = Choice(100.0, evaluate(drives, TRUTH, DECLARED, NOISE), random=lost)
+    (adopted,) = adopt([], choice, Evidence([], {}, (lost, late), []))
+    assert [rival.effect for rival in adopted.rivals] == expected
+    assert (adopted.names, adopted.interval) == (("dropped_commands",), (0.05, 0.2))
+
+
+def test_an_effect_that_does_nothing_beside_the_last_one_is_dropped_and_one_that_pays_is_kept():
+    drives = planted_drives({**TRUTH, "yaw_scrub": 0.13}, episodes=4, seconds=12.0)
+    idle, pays, last = (
+        AdoptedEffect(name, "", (name,), ((name,),), 60.0, 0.002, ())
+        for name in ("lateral_slip", "yaw_scrub", "turn_slip")
+    )
+    theta = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.0, "turn_slip": 0.0}
+    free = DECLARED + idle.free + pays.free + last.free
+    model, kept = drop_idle(fit(drives, theta, free), [pays, idle, last])
+    assert [effect.effect for effect in kept] == ["yaw_scrub", "turn_slip"]
+    assert "lateral_slip" not in model.theta
+    assert model.theta["yaw_scrub"] == pytest.approx(0.13, abs=0.005)
+
+
+CHOICE_ROBOT = read_robot("duckiebot")
+CHOICE_FORMS = {one.label: one for one in reversed(candidates(CHOICE_ROBOT, TRUTH, ()))}
+
+
+def chosen(drives, *tried, p_value=0.002, random=()):
+    """What is chosen of effects, each with its values and its gain."""
+    model = evaluate(drives, TRUTH, DECLARED, NOISE)
+    fits = {}
+    for label, values, gain in tried:
+        form = CHOICE_FORMS[label]
+        lead = Lead(form, form.probes[0], form.probes[0], gain, gain, p_value, np.ones(3))
+        fits[label] = FittedLead(lead, evaluate(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
+    best = choose_best(model, Evidence([], fits, random, []), 15.0)
+    return best and best.lead.candidate.label
+
+
+def patch(radius):
+    values = {"loss": 0.001, "x": 0.0, "y": 0.0, "radius": radius}
+    return {f"slippery_patch.{name}": value for name, value in values.items()}
+
+
+def test_most_evidence_is_chosen_and_little_is_not(drives):
+    slip, scrub = ("lateral_slip", {"lateral_slip": 1e-4}, 90.0), ("yaw_scrub", {"yaw_scrub": 0.1601}, 80.0)
+    assert chosen(drives, slip, scrub) == "lateral_slip"
+    assert chosen(drives, ("yaw_scrub", {"yaw_scrub": 0.1601}, 10.0)) is None
+
+
+@pytest.mark.parametrize(("p_value", "wanted"), [(0.002, "yaw_scrub"), (0.01, "yaw_scrub"), (0.02, None), (0.1, None)])
+def test_what_chance_gains_more_than_once_in_a_hundred_logs_is_not_chosen(drives, p_value, wanted):
+    assert chosen(drives, ("yaw_scrub", {"yaw_scrub": 0.1601}, 500.0), p_value=p_value) == wanted
+
+
+@pytest.mark.parametrize(("gain", "p_value"), [(500.0, 0.02), (25.0, 0.01)])
+def test_a_random_effect_needs_as_small_a_chance_and_twice_the_evidence(drives, gain, p_value):
+    lost = RandomEffect("dropped_commands", "dropped_commands", 0.1, (0.05, 0.2), gain, p_value)
+    assert chosen(drives, random=(lost,)) is None
+
+
+@pytest.mark.parametrize(("scrub", "wanted"), [(0.1601, "yaw_scrub"), (0.14, None), (0.12, None)])
+def test_an_effect_that_predicts_worse_is_not_chosen_whatever_its_evidence(drives, scrub, wanted):
+    assert chosen(drives, ("yaw_scrub", {"yaw_scrub": scrub}, 500.0)) == wanted
+
+
+def test_behind_an_effect_that_predicts_worse_the_next_one_is_chosen(drives):
+    worse, next_best = ("yaw_scrub", {"yaw_scrub": 0.12}, 500.0), ("lateral_slip", {"lateral_slip": 1e-4}, 90.0)
+    assert chosen(drives, worse, next_best) == "lateral_slip"
+
+
+def test_a_part_of_the_map_that_holds_all_drives_is_no_part(drives):
+    scrub = ("yaw_scrub", {"yaw_scrub": 0.1601}, 50.0)
+    assert chosen(drives, ("slippery_patch", patch(0.1), 90.0), scrub) == "slippery_patch"
+    assert chosen(drives, ("slippery_patch", patch(5.0), 90.0), scrub) == "yaw_scrub"
+
+
+@pytest.mark.parametrize(("gain", "wanted"), [(85.0, "dead_band"), (40.0, "dead_band (left wheel)")])
+def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little_loss(drives, gain, wanted):
+    one = ("dead_band (left wheel)", {"dead_band.width": 0.001, "dead_band.imbalance": 0.001}, 90.0)
+    both = ("dead_band", {"dead_band.width": 0.001, "dead_band.imbalance": 0.0}, gain)
+    assert chosen(drives, one, both) == wanted
+
+
+@pytest.mark.parametrize(("gain", "wanted"), [(85.0, "yaw_scrub"), (40.0, "motor_lag")])
+def test_an_effect_within_its_range_is_preferred_to_one_at_its_end(drives, gain, wanted, monkeypatch):
+    monkeypatch.setattr("proxytune.diagnosis.motion.selection.predicts_no_worse", lambda one, other: True)
+    lag = ("motor_lag", {"motor_lag.time_constant": 1.0, "motor_lag.imbalance": 0.0}, 90.0)
+    assert chosen(drives, lag, ("yaw_scrub", {"yaw_scrub": 0.1601}, gain)) == wanted
+
+
+def test_only_an_end_that_is_not_neutral_is_an_edge():
+    assert at_edge("motor_lag.time_constant", 1.0, CHOICE_ROBOT)
+    assert not at_edge("dead_band.width", 0.0, CHOICE_ROBOT)
+    assert not at_edge("motor_lag.time_constant", 0.5, CHOICE_ROBOT)
+
+
+MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
+SLIP, SCRUB = (AdoptedEffect(name, "", (name,), ((name,),), 60.0, 0.002, ()) for name in ("lateral_slip", "yaw_scrub"))
+
+
+@pytest.fixture(scope="module")
+def base():
+    return evaluate(planted_drives(MIXED, episodes=6, seconds=20.0), TRUTH, DECLARED, NOISE)
+
+
+def searching_of_names(answers, asked):
+    """A search that adopts what is given, in that order, less what it is to do without."""
+
+    def search(base, seed, report, without=()):
+        asked.append(without)
+        effects = tuple(effect for effect in answers if effect.effect not in without)
+        theta = {**TRUTH, **{effect.effect: MIXED[effect.effect] for effect in effects}}
+        free = DECLARED + tuple(coordinate for effect in effects for coordinate in effect.free)
+        return Findings(base, evaluate(base.drives, theta, free, NOISE), effects, (), (), ())
+
+    return search
+
+
+def named(base, monkeypatch, *answers, harmful=True):
+    whole = naming.drop_immaterial
+
+    def weighed(found, seed):
+        kept = whole(found, seed)
+        return replace(kept, immaterial=tuple(one._replace(harmful=harmful) for one in kept.immaterial))
+
+    monkeypatch.setattr(naming, "drop_immaterial", weighed)
+    asked, told = [], []
+    monkeypatch.setattr(naming, "search", searching_of_names(answers, asked))
+    return naming.name_effects(base, 1, told.append), asked, told
+
+
+@pytest.mark.slow
+def test_an_effect_that_misled_is_left_out_of_a_second_search_and_still_told(base, monkeypatch):
+    found, asked, told = named(base, monkeypatch, SLIP, SCRUB)
+    assert asked == [(), ("lateral_slip",)]
+    assert "searching again without lateral_slip" in told
+    assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
+    assert [dropped.effect.effect for dropped in found.immaterial] == ["lateral_slip"]
+
+
+def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
+    found, asked, _ = named(base, monkeypatch, SLIP, SCRUB, harmful=False)
+    assert asked == [()]
+    assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
+
+
+@pytest.mark.slow
+def test_an_effect_that_was_found_last_and_does_not_matter_misled_nobody(base, monkeypatch):
+    found, asked, _ = named(base, monkeypatch, SCRUB, SLIP)
+    assert asked == [()]
+    assert [dropped.effect.effect for dropped in found.immaterial] == ["lateral_slip"]
+
+
+@pytest.mark.slow
+def test_the_second_search_is_not_taken_where_it_predicts_worse(base, monkeypatch):
+    monkeypatch.setattr(naming, "predicts_no_worse", lambda one, other: False)
+    found, asked, _ = named(base, monkeypatch, SLIP, SCRUB)
+    assert len(asked) == 2
+    assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
+    assert len(found.immaterial) == 1
+
+
+SEARCH_FORMS = [
+    form
+    for form in candidates(ROBOT, TRUTH, ("trim", "delay"))
+    if not form.form and not CATALOGUE[form.effect].trace.placed
+]
+
+
+@pytest.fixture(scope="module")
+def base_of_search():
+    return evaluate(planted_drives(TRUTH, episodes=4, seconds=12.0), TRUTH, DECLARED, NOISE)
+
+
+def adopted(base_of_search, monkeypatch, *rounds):
+    """The gains of the effects adopted in rounds, each with an effect's gain and a curve's; and the remainder's."""
+    left = iter(rounds)
+
+    def gather_evidence(model, taken, seed):
+        gain, curve = next(left, (0.0, 0.0))
+        form = next(form for form in SEARCH_FORMS if form.effect not in taken)
+        neutral = {name: value for names, value in zip(form.free, form.neutral, strict=True) for name in names}
+        lead = Lead(form, form.probes[0], form.probes[0], gain, gain, 0.002, np.ones(3))
+        signal = Curve(SimpleNamespace(name="time", effects=()), curve, np.zeros(1))
+        fitted = replace(base_of_search, theta={**base_of_search.theta, **neutral})
+        return Evidence([lead], {form.label: FittedLead(lead, fitted, gain)}, (), [signal])
+
+    monkeypatch.setattr(searching, "gather_evidence", gather_evidence)
+    monkeypatch.setattr(searching, "drop_idle", lambda model, effects: (model, effects))
+    found = searching.search(base_of_search, 1, lambda line: None)
+    return [effect.gain for effect in found.adopted], [curve.gain for curve in found.remainder]
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(10.0, []), (14.9, []), (15.1, [15.1])])
+def test_an_effect_needs_fifteen_nats(base_of_search, monkeypatch, gain, expected):
+    assert adopted(base_of_search, monkeypatch, (gain, 0.0)) == (expected, [])
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(40.0, [5000.0]), (60.0, [5000.0, 60.0])])
+def test_after_much_evidence_a_hundredth_of_it_is_needed(base_of_search, monkeypatch, gain, expected):
+    assert adopted(base_of_search, monkeypatch, (5000.0, 0.0), (gain, 0.0)) == (expected, [])
+
+
+def test_no_more_than_five_effects_are_added(base_of_search, monkeypatch):
+    assert adopted(base_of_search, monkeypatch, *[(100.0, 0.0)] * 9)[0] == [100.0] * 5
+
+
+def test_no_first_effect_is_added_where_a_signal_says_far_more(base_of_search, monkeypatch):
+    assert adopted(base_of_search, monkeypatch, (100.0, 140.0)) == ([], [140.0])
+    assert adopted(base_of_search, monkeypatch, (100.0, 125.0))[0] == [100.0]
+    assert adopted(base_of_search, monkeypatch, (200.0, 238.0))[0] == [200.0]
+
+
+@pytest.mark.parametrize(("curve", "expected"), [(300.0, [500.0, 100.0]), (400.0, [500.0])])
+def test_a_later_effect_is_added_if_it_says_a_third_of_what_a_signal_does(base_of_search, monkeypatch, curve, expected):
+    assert adopted(base_of_search, monkeypatch, (500.0, 0.0), (100.0, curve))[0] == expected

@@ -1,0 +1,90 @@
+"""Curves over signals: the signal that something depends on leads, and nothing leads where nothing is missing."""
+
+import hidden
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from planted import ROBOT, TRUTH, drives_of, fitted, planted_drives
+
+from proxytune.diagnosis import MOTION_EFFECTS, RULES
+from proxytune.diagnosis.motion.drives import gather
+from proxytune.diagnosis.motion.signals import fit_curves, hats, signal_groups
+from proxytune.effects import CATALOGUE, Cue
+
+SHORT = {"episodes": 3, "seconds": 30.0}
+
+
+@settings(derandomize=True, deadline=None, max_examples=50)
+@given(
+    signal=arrays(float, st.tuples(st.integers(1, 3), st.integers(2, 30)), elements=st.floats(-1e3, 1e3)),
+    knots=st.integers(2, 9),
+)
+def test_hats_sum_to_one_and_are_never_negative(signal, knots):
+    columns = hats(signal, knots)
+    np.testing.assert_allclose(columns.sum(axis=-1), 1.0, atol=1e-9)
+    assert columns.min() >= 0.0
+    assert columns.shape[:-1] == signal.shape
+    assert columns.shape[-1] <= knots
+
+
+def test_hats_reach_from_the_least_value_of_a_signal_to_its_greatest():
+    columns = hats(np.linspace(-2.0, 3.0, 101), 6)
+    np.testing.assert_allclose(columns[[0, 20, 100]], np.eye(6)[[0, 1, 5]], atol=1e-9)
+
+
+def test_hats_over_a_signal_that_stands_still_are_one_constant():
+    np.testing.assert_array_equal(hats(np.full((2, 5), 3.0)), np.ones((2, 5, 1)))
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return fitted(planted_drives(TRUTH, **SHORT))
+
+
+def test_every_signal_has_motion_on_every_tick_and_effects_of_the_catalogue(clean):
+    groups = list(signal_groups(clean))
+    assert {group.name for group in groups} == set(Cue)
+    assert {name for group in groups for name in group.effects} == set(MOTION_EFFECTS)
+    for group in groups:
+        assert group.twists.shape[:3] == (*clean.drives.duties.shape[:2], 3)
+        assert np.isfinite(group.twists).all()
+        assert all(group.name in CATALOGUE[name].trace.cues for name in group.effects)
+        assert group.signal.shape == clean.drives.duties.shape[:2]
+
+
+def test_no_curve_gains_much_where_nothing_is_missing(clean):
+    assert fit_curves(clean)[0].gain < RULES.least_gain_nats
+
+
+@pytest.mark.parametrize(
+    ("effect", "figures", "signals"),
+    [
+        ("carpet", {"factor": 0.8, "beyond": 0.0}, {"position"}),
+        pytest.param("eccentric_wheel", {"ripple": 0.25}, {"left wheel angle"}, marks=pytest.mark.slow),
+        pytest.param("weak_reverse", {"factor": 0.8}, {"direction of travel", "wheel command"}, marks=pytest.mark.slow),
+        ("slipping_hub", {"factor": 0.85, "after": 15.0}, {"time in the episode", "cumulated use"}),
+    ],
+)
+def test_the_signal_that_the_motion_depends_on_leads(effect, figures, signals):
+    case = hidden.Case(effect, ((effect, figures),), "normal", 8, 0.02, 0.12)
+    found = fit_curves(fitted(drives_of(hidden.make_log(case, **SHORT))))
+    assert found[0].group.name in signals
+    assert found[0].gain > RULES.least_gain_nats
+    assert found[0].weights.shape == (found[0].group.twists.shape[-1],)
+
+
+def test_curves_come_best_first(clean):
+    gains = [curve.gain for curve in fit_curves(clean)]
+    assert gains == sorted(gains, reverse=True)
+
+
+def test_a_wheel_has_turned_as_far_as_it_rolled():
+    log = hidden.make_log(hidden.Case("plain", (), "normal", 5, 0.0, 0.0), episodes=2, seconds=10.0, noiseless=True)
+    drives = gather(log, ROBOT, log.episodes)
+    angles = drives.angles
+    way = np.stack([np.hypot(*np.diff(e.poses[:, :2], axis=0).T).sum() for e in log.episodes])
+    rolled = np.abs(np.diff(angles, axis=1)).sum(axis=1).mean(axis=-1) * 0.0318
+    assert (rolled > 0.9 * way).all()
+    np.testing.assert_array_equal(angles[0, 0], 0.0)

@@ -1,0 +1,132 @@
+"""The error at a horizon is told before and after, against the best that any model reached.
+
+The verdict follows from the error that is left, against the bracket of the noise floor.
+"""
+
+import pytest
+from planted import CALM, DECLARED, NOISE, TRUTH, planted_drives
+
+from proxytune.diagnosis import AdoptedEffect, Findings, Ratio, pose_errors
+from proxytune.diagnosis.answer import KeptAside, bracket, horizon_error, verdict
+from proxytune.diagnosis.motion.evidence import DroppedEffect, Variant
+from proxytune.diagnosis.motion.fitting import evaluate
+from proxytune.diagnosis.motion.multistep_fit import pose_noise
+from proxytune.diagnosis.motion.prediction import Repeated
+
+SCRUBBED = {**TRUTH, "yaw_scrub": 0.13}
+SCRUB = AdoptedEffect("yaw_scrub", "", ("yaw_scrub",), (("yaw_scrub",),), 60.0, 0.002, ())
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return planted_drives(SCRUBBED, episodes=6, seconds=15.0, noise=CALM)
+
+
+def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0, how=pose_errors):
+    declared, extended = (evaluate(drives, theta, DECLARED, NOISE) for theta in (TRUTH, model))
+    findings = Findings(declared, extended, (), (), (), (), tuple(dropped))
+    kept = KeptAside(drives, drives, pose_noise(drives, model))
+    return horizon_error(findings, kept, horizon_s, learnt or {}, how)
+
+
+def test_before_is_the_declared_model_and_after_the_extended_one(drives):
+    told = error(drives, model=SCRUBBED)
+    assert told.before.value > 3.0 * told.after.value
+    assert told.ratio.value == pytest.approx(told.after.value / told.before.value)
+    assert told.floor.reached == pytest.approx(told.after.value)
+
+
+@pytest.mark.parametrize(("model", "times"), [(TRUTH, 1), (SCRUBBED, 2)])
+def test_a_model_to_which_nothing_was_added_is_driven_once(drives, model, times):
+    driven = []
+
+    def drive(*given):
+        driven.append(given)
+        return pose_errors(*given)
+
+    told = error(drives, model=model, how=drive)
+    assert len(driven) == times
+    assert (told.before == told.after) == (times == 1)
+
+
+@pytest.mark.parametrize("how", [{"dropped": [DroppedEffect(SCRUB, Variant(SCRUBBED, DECLARED))]},
+                                 {"learnt": {"yaw_scrub": 0.13}}])  # fmt: skip
+def test_what_a_dropped_effect_or_learnt_curves_reached_lowers_the_floor(drives, how):
+    plain, lower = error(drives), error(drives, **how)
+    assert plain.floor.reached == plain.after.value == lower.after.value
+    assert lower.floor.reached < plain.floor.reached / 3.0
+
+
+def test_no_error_is_told_where_fewer_than_three_blocks_have_a_window(drives):
+    assert error(drives, horizon_s=100.0) is None
+    assert error(drives.only(drives.block < 2)) is None
+    assert error(drives.only(drives.block < 3)) is not None
+
+
+KNOWN = Repeated(Ratio(0.97, (0.9, 1.05)), 0.0116, 0.8)
+BEYOND = Repeated(Ratio(0.5, (0.4, 0.6)), 0.006, 0.75)
+UNSURE = Repeated(Ratio(0.75, (0.5, 1.1)), 0.009, 0.8)
+
+
+def said(after, lower, *, reached=None, repeated=None, named=True, unnamed=False):
+    floor = bracket(lower, after if reached is None else reached, repeated)
+    return verdict(after, floor, named=named, unnamed=unnamed)
+
+
+@pytest.mark.parametrize("unnamed", [True, False])
+def test_an_error_at_the_noise_of_the_poses_is_explained(unnamed):
+    assert said(0.0045, 0.004, unnamed=unnamed) == "explained"
+    assert said(0.0045, 0.004, unnamed=unnamed, named=False) == "nothing missing"
+
+
+def test_an_error_that_nothing_lowers_within_a_narrow_bracket_is_explained():
+    assert said(0.0055, 0.004) == "explained"
+    assert said(0.0065, 0.004) == "cannot be told"
+    assert said(0.0055, 0.004, reached=0.005) == "cannot be told"
+
+
+def test_an_error_that_drives_do_not_repeat_is_explained():
+    assert said(0.012, 0.004, repeated=KNOWN) == "explained"
+    assert said(0.012, 0.004, repeated=KNOWN, named=False) == "nothing missing"
+
+
+def test_repeats_of_a_manoeuvre_that_never_meets_what_is_missing_explain_nothing():
+    assert said(0.029, 0.004, repeated=KNOWN) == "cannot be told"
+
+
+def test_nothing_is_explained_while_a_named_effect_lowers_the_error():
+    assert said(0.012, 0.004, repeated=KNOWN, reached=0.0105) == "cannot be told"
+
+
+@pytest.mark.parametrize(("named", "answer"), [(True, "partly explained"), (False, "unexplained")])
+def test_an_error_that_drives_repeat_or_a_signal_explains_is_not_explained(named, answer):
+    assert said(0.012, 0.004, repeated=BEYOND, named=named) == answer
+    assert said(0.012, 0.004, unnamed=True, named=named) == answer
+    assert said(0.012, 0.004, repeated=KNOWN, unnamed=True, named=named) == answer
+
+
+def test_what_the_noise_is_cannot_be_told_from_few_repeats_or_none():
+    assert said(0.012, 0.004) == "cannot be told"
+    assert said(0.012, 0.004, repeated=UNSURE) == "cannot be told"
+
+
+def test_a_narrow_bracket_does_not_explain_what_drives_repeat():
+    assert said(0.0055, 0.004, repeated=BEYOND) == "partly explained"
+
+
+def test_the_floor_lies_between_the_noise_of_poses_and_what_a_model_reached():
+    floor = bracket(0.004, 0.012, None)
+    assert floor.lower == 0.004
+    assert 0.012 < floor.upper < 0.0125
+    assert bracket(0.013, 0.012, None).lower == 0.012
+
+
+def test_repeats_lower_the_upper_end_but_not_beneath_the_lower():
+    alone = bracket(0.004, 0.012, None).upper
+    most = 0.006 * 0.6 / 0.5
+    assert bracket(0.004, 0.012, BEYOND._replace(part=1.0)).upper == pytest.approx(alone * most / 0.012)
+    half = ((0.012**2 + most**2) / 2.0) ** 0.5
+    assert bracket(0.004, 0.012, BEYOND._replace(part=0.5)).upper == pytest.approx(alone * half / 0.012)
+    assert bracket(0.004, 0.012, KNOWN).upper == alone
+    assert bracket(0.010, 0.012, BEYOND._replace(part=1.0)).upper == 0.010
+    assert bracket(0.004, 0.005, BEYOND._replace(part=1.0)).upper == bracket(0.004, 0.005, None).upper

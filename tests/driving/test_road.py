@@ -1,0 +1,512 @@
+"""A map of one's own is a file beside the study; what cannot be driven is refused in one line.
+
+On every map the road that is scored, the one that is followed and the one that is drawn are one and the same.
+What was published on small_loop stays to the last bit: values taken before roads were lists of segments.
+"""
+
+import dataclasses
+import functools
+import hashlib
+import re
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+import square_loop
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune.domain import make_episode
+from proxytune.driving import (
+    COLOURS,
+    TICK_HZ,
+    Course,
+    Expert,
+    Road,
+    Sight,
+    draw_floor,
+    drive,
+    lane_following,
+    lane_length,
+    lane_point,
+    lane_pose,
+    map_names,
+    off_map,
+    read_map,
+    read_robot,
+    robot_names,
+    score_trajectory,
+    shipped_map,
+)
+from proxytune.driving.episode import driving_score
+from proxytune.driving.lane import corners
+from proxytune.driving.road import Arc, Paint, Straight, length
+from proxytune.effects import Stage, stage_chain
+from proxytune.errors import SettingsError
+from proxytune.files import shipped
+from proxytune.settings import Section
+
+HORSESHOE = (shipped("robots") / "maps" / "horseshoe.toml").read_text(encoding="utf-8")
+LOOP = (shipped("robots") / "maps" / "small_loop.toml").read_text(encoding="utf-8")
+LEFT = "{ radius = 0.2925, turn = 90.0 }"
+
+
+def family(folder, name="mine.toml", **domain):
+    values = {"plant": "planar", "map": name, "seconds": 1.0, **domain}
+    return lane_following(Section(folder / "study.toml", "domain.", values), model=None)
+
+
+def written(folder, text):
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def changed(text, old, new, times=1):
+    assert old in text
+    return text.replace(old, new, times)
+
+
+def refusal(folder, text):
+    """What is said of a map after its path, on one line."""
+    path = written(folder, text)
+    with pytest.raises(SettingsError) as caught:
+        family(folder)
+    said = str(caught.value)
+    assert "\n" not in said
+    assert said.startswith(f"{path}: ")
+    return said.removeprefix(f"{path}: ")
+
+
+def figure_eight():
+    head, tail = LOOP.split("segments = [")
+    eight = [LEFT] * 3 + ["{ straight = 0.6 }"] + ["{ radius = 0.2925, turn = -90.0 }"] * 3 + ["{ straight = 0.6 }"]
+    return f"{head}segments = [{', '.join(eight)}]{tail.split(']', 1)[1]}"
+
+
+def overlapping():
+    """The horseshoe with its middle let down by 20 cm onto the way below."""
+    before, after = HORSESHOE.split("    { radius = 0.2925, turn = -90.0 },\n", 1)
+    middle, rest = after.split("    { radius = 0.2925, turn = -90.0 },\n", 1)
+    bend, down = "    { radius = 0.2925, turn = -90.0 },\n", "    { straight = 0.2 },\n"
+    return before + down + bend + middle + bend + down + rest
+
+
+def test_maps_that_travel_along_are_no_robots():
+    assert set(map_names()) == {"horseshoe", "small_loop"}
+    assert "maps" not in robot_names()
+
+
+def test_an_unknown_map_is_told_with_the_nearest():
+    with pytest.raises(SettingsError, match=r"map 'horse_shoe' is unknown; did you mean 'horseshoe'\?"):
+        shipped_map("horse_shoe")
+
+
+@pytest.mark.slow
+def test_a_map_beside_the_study_is_driven(tmp_path):
+    written(tmp_path, HORSESHOE)
+    mine, theirs = family(tmp_path), family(tmp_path, "horseshoe")
+    assert mine.map.name == "mine"
+    assert mine.starts == 10
+    episode = make_episode({}, agent="steady", start=2, seed=3)
+    assert mine.run(episode) == theirs.run(episode)
+    assert mine.run(episode) != family(tmp_path, "small_loop").run(episode)
+
+
+def test_what_a_map_file_says_is_part_of_the_family(tmp_path):
+    written(tmp_path, HORSESHOE)
+    before, same = family(tmp_path), family(tmp_path)
+    assert before == same
+    assert before.identity == same.identity
+    written(tmp_path, changed(HORSESHOE, "white_width = 0.048", "white_width = 0.047"))
+    assert family(tmp_path) != before
+    assert family(tmp_path).identity != before.identity
+
+
+def test_segments_are_read_in_their_order():
+    loop = shipped_map("small_loop")
+    assert loop.segments == (Straight(0.585), Arc(0.2925, 90.0)) * 4
+    assert loop.paint.bend_radius == 0.17
+
+
+def test_bends_are_painted_on_the_roads_own_radius_where_the_file_says_nothing(tmp_path):
+    assert read_map(written(tmp_path, changed(LOOP, "bend_radius = 0.17\n", ""))).paint.bend_radius is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("size", "sise", "sise: unknown key; did you mean 'size'?"),
+        ("lane_width", "lane_with", "road.lane_with: unknown key; did you mean 'lane_width'?"),
+        ("white_width = 0.048\n", "", "paint.white_width: is missing; add it"),
+        ("white_width", "withe_width", "paint.withe_width: unknown key"),
+        ("format = 1", "format = 2", "format: must be between 1 and 1, got 2"),
+        ("[1.755, 1.755]", "1.755", "size: must be a list of 2 finite numbers, got 1.755"),
+        ("[1.755, 1.755]", "[1.755, true]", "size: must be a list of 2 finite numbers"),
+        ("[1.755, 1.755]", f"[1.755, 1{'0' * 400}]", "size: must be a list of 2 finite numbers"),
+        ("[1.755, 1.755]", "[1.755, inf]", "size: must be a list of 2 finite numbers"),
+        ("[1.755, 1.755]", "[1.755, 11.0]", "size: each side must be above 0 and at most 10 m"),
+        ("size = [1.755, 1.755]\n", "", "size: must be a list of 2 finite numbers, got None"),
+        ("begin = [1.4625, 0.585, 90.0]\n", "", "road.begin: must be a list of 3 finite numbers"),
+        ("{ straight = 0.585 }", "0.585", "road.segments[0]: must be { straight = M } or { radius = M"),
+        ("straight =", "strait =", "road.segments[0].strait: unknown key; did you mean 'straight'?"),
+        ("= 0.585 }", "= 0.585, turn = 3 }", "road.segments[0].turn: unknown key"),
+        ("straight = 0.585", "straight = -1.0", "road.segments[0].straight: must be between 0.001 and"),
+        ("turn = 90.0", "turn = 180.0", "road.segments[1].turn: must be between -90 and 90, got 180.0"),
+        ("turn = 90.0", "turn = 0.0", "road.segments[1].turn: must not be 0; write { straight = M }"),
+        ("radius = 0.2925, ", "", "road.segments[1].radius: is missing; add it"),
+        (
+            "radius = 0.2925",
+            "radius = 0.2",
+            "road.segments[1].radius: 0.2 m is too tight a bend for a road 0.585 m wide",
+        ),
+        (
+            "turn = 90.0",
+            "turn = 80.0",
+            "road.segments: the road does not close: its turns add up to 350°; make it 360°",
+        ),
+        ("1.4625, 0.585, 90.0", "1.5, 0.585, 90.0", "road.segments: the road leaves the map at (1.7"),
+        ("lane_width = 0.22", "lane_width = 0.3", "road.lane_width: the two lanes overlap at 0.3 m"),
+        ("width = 0.585", "width = 0.4", "road.width: 0.4 m has no room for two lanes; at least 0.4774 m"),
+        ("bend_radius = 0.17", "bend_radius = 0.3", "paint.bend_radius: 0.3 m is wider than a bend; at most 0.2925"),
+        ("[0.4237, 0.702", "[0.8775, 0.8775", "starts[0]: lies 0.714 m beside the lane that runs its way"),
+        ("[0.4237, 0.702, 104.3]", "[0.4, 0.7]", "starts[0]: must be a list of 3 finite numbers, got"),
+        ("starts = [", "starts = []\nmore = [", "more: unknown key"),
+    ],
+)
+def test_a_mistake_in_a_map_file_is_one_line_with_file_and_key(tmp_path, old, new, says):
+    assert refusal(tmp_path, changed(LOOP, old, new)).startswith(says)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            changed(LOOP, "straight = 0.585", "straight = 0.7"),
+            "does not close: it ends at (1.462, 0.700), 0.115 m from",
+        ),
+        (changed(LOOP, "turn = 90.0", "turn = -90.0", 4), "runs clockwise; lay it counter-clockwise"),
+        (figure_eight(), "does not close: its turns add up to 0°; make it 360°"),
+        (overlapping(), "overlaps itself at ("),
+    ],
+)
+def test_a_road_that_is_no_simple_loop_is_refused(tmp_path, text, says):
+    assert refusal(tmp_path, text).startswith(f"road.segments: the road {says}")
+
+
+def test_a_map_without_starts_is_refused(tmp_path):
+    empty = re.sub(r"starts = \[\n.*?\n\]", "starts = []", LOOP, flags=re.DOTALL)
+    assert refusal(tmp_path, empty) == "starts: must be a list with something in it, got []"
+
+
+def test_a_map_file_that_is_not_there_is_one_line(tmp_path):
+    with pytest.raises(SettingsError, match=r"gone\.toml: no such file; check the path"):
+        family(tmp_path, "gone.toml")
+
+
+def test_a_map_by_an_unknown_name_is_told_of_both_kinds(tmp_path):
+    with pytest.raises(SettingsError) as caught:
+        family(Path(), "horse")
+    assert "domain.map: unknown value 'horse'; did you mean 'horseshoe'?" in str(caught.value)
+    assert "ends in .toml" in str(caught.value)
+
+
+HEXAGON = (Straight(0.4), Arc(0.3, 60.0), Straight(0.2)) * 6
+
+
+def uneven():
+    """Bends of four radii to both sides, two straights in a row, one after the last bend."""
+    s_bend = (Arc(0.4, -45.0), Arc(0.4, 45.0))
+    open_end = (Straight(0.8), Straight(0.4), Arc(0.6, 90.0), Straight(0.4), Arc(0.35, 90.0), *s_bend)
+    x, y = corners((0.0, 0.0, 0.0), (*open_end, Arc(0.3, 90.0), Arc(0.25, 90.0)))[-1]
+    return (*open_end, Straight(x + 0.3), Arc(0.3, 90.0), Straight(y), Arc(0.25, 90.0), Straight(0.3))
+
+
+def plain(name, begin, segments):
+    paint = Paint(white_width=0.02, yellow_width=0.02, bend_radius=None, straight_dash=0.05, bend_dash=0.05)
+    return Road(name, "", (3.0, 2.5), begin, segments, 0.4, 0.1, 0.15, paint, ((*begin[:2], begin[2]),))
+
+
+SHIPPED = [shipped_map(name) for name in map_names()]
+ROADS = [*SHIPPED, plain("hexagon", (1.1, 0.4, 0.0), HEXAGON), plain("uneven", (0.9, 0.4, 0.0), uneven())]
+every_road = pytest.mark.parametrize("road", ROADS, ids=lambda road: road.name)
+every_shipped = pytest.mark.parametrize("road", SHIPPED, ids=lambda road: road.name)
+both_lanes = pytest.mark.parametrize("outer", [True, False], ids=("outer", "inner"))
+quick = settings(derandomize=True, max_examples=60, deadline=None)
+coordinates = st.floats(-0.5, 3.5)
+points = st.tuples(coordinates, coordinates)
+ways = st.floats(-12.0, 20.0)
+
+
+def wrapped(way, lap):
+    return np.mod(way + lap / 2, lap) - lap / 2
+
+
+def lane(road, outer, spacing=0.002):
+    """Points, and headings from each to the next, of a lane's centre line."""
+    lap = float(lane_length(road, outer))
+    line = lane_point(road, outer, np.linspace(0.0, lap, round(lap / spacing) + 1))
+    return line, np.arctan2(*np.diff(line, axis=0).T[::-1])
+
+
+@every_road
+def test_the_road_closes(road):
+    np.testing.assert_allclose(corners(road.begin, road.segments)[-1], road.begin[:2], atol=1e-12)
+
+
+@every_road
+@quick
+@given(outer=st.booleans(), along=ways)
+def test_the_point_so_far_along_a_lane_is_seen_so_far_along_it(road, outer, along):
+    behind, here, ahead = lane_point(road, outer, along + np.array([-1e-5, 0.0, 1e-5]))
+    pose = lane_pose(road, here, np.arctan2(*(ahead - behind)[::-1]))
+    assert pose.counter_clockwise == outer
+    assert pose.deviation == pytest.approx(0, abs=1e-11)
+    assert pose.heading_error == pytest.approx(0, abs=1e-4)
+    assert wrapped(pose.along - along, lane_length(road, outer)) == pytest.approx(0, abs=1e-9)
+
+
+@every_road
+@quick
+@given(point=points, heading=st.floats(-10, 10))
+def test_a_pose_lies_its_deviation_to_the_left_of_the_point_so_far_along(road, point, heading):
+    pose = lane_pose(road, np.array(point), np.array(heading))
+    direction = heading - pose.heading_error
+    left = np.array((-np.sin(direction), np.cos(direction)))
+    expected = lane_point(road, pose.counter_clockwise, pose.along) + pose.deviation * left
+    np.testing.assert_allclose(point, expected, atol=1e-9)
+    assert 0 <= pose.along <= lane_length(road, pose.counter_clockwise)
+
+
+@every_road
+@quick
+@given(here=points, there=points, heading=st.floats(-10, 10))
+def test_deviation_never_changes_by_more_than_the_robot_moves(road, here, there, heading):
+    pose = lane_pose(road, np.array([here, there]), np.array([heading, heading + pi]))
+    of_outer = np.where(pose.counter_clockwise, pose.deviation, 2 * road.lane_offset - pose.deviation)
+    assert abs(of_outer[0] - of_outer[1]) <= np.hypot(*np.subtract(here, there)) + 1e-9
+
+
+@every_road
+@quick
+@given(point=points, heading=st.floats(-10, 10))
+def test_no_point_of_the_lane_is_nearer_than_the_deviation(road, point, heading):
+    pose = lane_pose(road, np.array(point), np.array(heading))
+    line, _ = lane(road, bool(pose.counter_clockwise))
+    assert np.hypot(*(line - point).T).min() == pytest.approx(abs(pose.deviation), abs=0.002)
+
+
+@every_road
+@both_lanes
+def test_a_lane_is_as_long_as_its_points_are_apart(road, outer):
+    line, _ = lane(road, outer)
+    assert lane_length(road, outer) == pytest.approx(np.hypot(*np.diff(line, axis=0).T).sum(), abs=1e-4)
+
+
+@every_road
+def test_the_outer_lap_is_longer_and_the_inner_one_shorter_by_one_full_turn_of_the_lanes_offset(road):
+    turn = 2 * pi * road.lane_offset
+    assert lane_length(road, True) == pytest.approx(length(road.segments) + turn)
+    assert lane_length(road, False) == pytest.approx(length(road.segments) - turn)
+
+
+@every_road
+@both_lanes
+def test_the_outer_lane_goes_round_counter_clockwise_and_the_inner_one_clockwise(road, outer):
+    _, headings = lane(road, outer)
+    assert np.unwrap(headings)[-1] - headings[0] == pytest.approx(2 * pi if outer else -2 * pi, abs=0.02)
+
+
+def test_the_horseshoe_turns_to_both_sides_and_the_small_loop_to_one():
+    sides = {road.name: np.sign(np.round(np.diff(np.unwrap(lane(road, True)[1])), 6)) for road in SHIPPED}
+    assert set(sides["horseshoe"]) == {-1.0, 0.0, 1.0}
+    assert set(sides["small_loop"]) == {0.0, 1.0}
+
+
+@functools.cache
+def floor_as_driven(road):
+    """The floor with bends that are painted where the road is scored."""
+    return draw_floor(dataclasses.replace(road, paint=dataclasses.replace(road.paint, bend_radius=None)))
+
+
+def painted(road, offset, outer=True):
+    """Colours along the line that runs so far right of the road's centre line [m]."""
+    floor, (line, _) = floor_as_driven(road), lane(dataclasses.replace(road, lane_offset=offset), outer)
+    columns, rows = ((line - floor.origin) * floor.pixels_per_metre).astype(int).T
+    return floor.pixels[rows, columns]
+
+
+@pytest.mark.slow
+@every_road
+@both_lanes
+def test_the_edge_lines_and_the_lanes_are_drawn_where_they_are_scored(road, outer):
+    edge = (road.width - road.paint.white_width) / 2
+    assert (painted(road, edge, outer) == COLOURS["white"]).all()
+    assert (painted(road, road.lane_offset, outer) == COLOURS["asphalt"]).all()
+
+
+@every_road
+def test_the_centre_line_is_dashed_all_the_way_round(road):
+    yellow = (painted(road, 1e-6) == COLOURS["yellow"]).all(axis=1)
+    assert 0.5 < yellow.mean() < 0.7
+    changes = np.flatnonzero(np.diff(yellow.astype(int)))
+    assert np.diff(changes).max() * 0.002 < 2.5 * max(road.paint.straight_dash, road.paint.bend_dash)
+
+
+def test_a_map_that_is_not_square_ends_where_its_own_sides_do():
+    road = shipped_map("horseshoe")
+    wide, high = road.size
+    assert wide > high
+    assert not off_map(road, wide, high)
+    assert off_map(road, wide + 1e-9, high)
+    assert off_map(road, wide, high + 1e-9)
+    floor = draw_floor(road)
+    row, column = (int((where - floor.origin) * floor.pixels_per_metre) for where in (high + 0.01, wide / 2))
+    assert tuple(floor.pixels[row, column]) == COLOURS["off_map"]
+
+
+@every_shipped
+def test_ten_starts_lie_in_their_lanes_some_in_either(road):
+    starts = np.array(road.starts)
+    pose = lane_pose(road, starts[:, :2], np.radians(starts[:, 2]))
+    assert len(set(road.starts)) == 10
+    assert (np.abs(pose.deviation) < road.lane_width / 2).all()
+    assert (np.abs(pose.heading_error) < pi / 4).all()
+    assert set(pose.counter_clockwise) == {True, False}
+
+
+class Dark:
+    """A camera that costs nothing: the expert does not look."""
+
+    def render(self, poses):
+        return np.zeros((len(poses), 1, 1, 3), dtype=np.uint8)
+
+
+@pytest.mark.slow
+@every_shipped
+@both_lanes
+@pytest.mark.parametrize("plant", ["planar", "bullet"])
+def test_the_expert_drives_a_lap_with_both_wheels_in_the_lane(road, outer, plant):
+    robot = read_robot("duckiebot")
+    look_ahead, speed, gain, _ = robot.expert_figures()
+    line, headings = lane(road, outer)
+    start, seconds = np.array((*line[0], headings[0])), 1.02 * float(lane_length(road, outer)) / speed
+    family = lane_following(Section(Path("study.toml"), "domain.", {"plant": plant, "map": road.name}), model=None)
+    instance = dataclasses.replace(family.instance({}), camera=Dark(), image=stage_chain((), Stage.IMAGE))
+    course = Course(start, seconds, 0, functools.partial(off_map, road))
+    with family.plant_at(robot, start) as world:
+        poses = drive(instance, world, Expert(road, look_ahead, speed, gain, 0.0, 0), course, Sight).poses
+    figures = {"tick_s": 1 / TICK_HZ, "seconds": seconds}
+    assert score_trajectory(road, poses, **figures)["distance"] > lane_length(road, outer)
+    assert driving_score(road, poses, wheel_distance=robot.wheel_distance(), **figures) > seconds - 0.1
+
+
+ROAD = shipped_map("small_loop")
+POSES = (
+    ((1.5912, 0.702, 93.0), (True, 0.11699999999999999, -5.551115123125783e-17, 0.05235987755982996)),
+    ((0.4237, 0.702, 104.3), (False, 1.2165928766580083, -0.0025000000000000577, 0.24958208303518914)),
+    ((1.62, 1.63, 140.0), (True, 0.9204380915521725, -0.22230602172784691, 0.07627789391698281)),
+    ((0.15, 0.12, -40.0), (True, 3.4230833355789434, -0.21554955830373373, 0.05394546672146941)),
+    ((1.2, 1.31, -50.0), (False, 2.561466402968898, -0.020621789367236354, -0.6615712927744184)),
+    ((0.7, 0.9, 20.0), (False, 1.414592876658008, -0.2788, -1.2217304763960306)),
+    ((2.1, -0.3, 1000.0), (False, 0.12458789398039238, 1.119993207646777, 0.9351427785595816)),
+    ((1.0, 0.2, -2.0), (True, 4.154858238538031, 0.036199999999999954, -0.03490658503988595)),
+)
+POINTS = (
+    ((True, 0.3), (1.5912, 0.885)),
+    ((True, 1.0), (1.402767608562042, 1.5210394285608213)),
+    ((True, 4.1), (0.9451417614619689, 0.16379999999999995)),
+    ((True, 5.2), (1.5912, 0.7985223486159592)),
+    ((False, 0.2), (1.226135132764508, 0.43111924464212215)),
+    ((False, 0.9), (0.5284825718673798, 0.43125924314849323)),
+    ((False, 2.7), (1.3126382149516254, 1.2505281294667514)),
+    ((False, 3.6), (1.1963669750278436, 0.4233360812429655)),
+)
+SCORES = {
+    "distance": 3.9058582540263966,
+    "survival_time": 20.0,
+    "time_out_of_lane": 6.25,
+    "deviation": 0.08287315944351115,
+    "early_distance": 1.0403709678201967,
+    "early_offset": 0.07155488347606542,
+    "speed": 0.29058951168201647,
+}
+SAME = {"rel": 1e-14, "abs": 1e-15}
+"""Processors round sines differently in the last bit; the closed form, below, is compared on one and the same."""
+
+
+def wobble():
+    time = np.arange(1201) / 60
+    x = 0.8775 + 0.7 * np.cos(0.4 * time) * (1 + 0.1 * np.sin(3 * time))
+    return np.column_stack((x, 0.8775 + 0.68 * np.sin(0.4 * time), 0.4 * time + np.pi / 2 + 0.2 * np.sin(time)))
+
+
+def poses():
+    """On the map and up to a metre off it; also on its diagonals, tiles' edges and the first numbers beside them."""
+    random = np.random.default_rng(7)
+    edges = np.array([0.0, 0.2925, 0.585, 0.8775, 1.17, 1.4625, 1.755])
+    beside = (edges[:, None] + np.arange(-8, 9) * 2.0**-53).ravel()
+    diagonal = random.uniform(-0.4, 0.4, 2000)
+    positions = np.concatenate(
+        (
+            random.uniform(-0.5, 2.3, (30000, 2)),
+            random.choice(beside, (5000, 2)),
+            np.stack((random.uniform(-1.0, 2.8, 5000), random.choice(beside, 5000)), axis=1),
+            np.stack((random.choice(beside, 5000), random.uniform(-1.0, 2.8, 5000)), axis=1),
+            0.8775 + np.stack((diagonal, diagonal), axis=1),
+            0.8775 + np.stack((diagonal, -diagonal), axis=1),
+        )
+    )
+    headings = random.uniform(-10.0, 10.0, len(positions))
+    headings[::5] = np.rint(headings[::5]) * np.pi / 2
+    return positions, headings
+
+
+def test_every_pose_is_seen_as_the_published_closed_form_sees_it_to_the_last_bit():
+    positions, headings = poses()
+    for ours, published in zip(
+        lane_pose(ROAD, positions, headings), square_loop.lane_pose(positions, headings), strict=True
+    ):
+        np.testing.assert_array_equal(ours, published)
+
+
+def test_every_point_of_a_lane_is_the_published_closed_forms_to_the_last_bit():
+    random = np.random.default_rng(8)
+    along, outer = random.uniform(-12.0, 12.0, 20000), random.random(20000) < 0.5
+    np.testing.assert_array_equal(lane_point(ROAD, outer, along), square_loop.lane_point(outer, along))
+    for lane in (True, False):
+        assert lane_length(ROAD, lane) == square_loop.lane_length(lane)
+
+
+@pytest.mark.parametrize(("pose", "seen"), POSES)
+def test_poses_are_seen_as_they_were(pose, seen):
+    assert tuple(lane_pose(ROAD, np.array(pose[:2]), np.radians(pose[2]))) == pytest.approx(seen, **SAME)
+
+
+@pytest.mark.parametrize(("way", "point"), POINTS)
+def test_points_of_the_lanes_are_where_they_were(way, point):
+    assert tuple(lane_point(ROAD, *way)) == pytest.approx(point, **SAME)
+
+
+def test_laps_are_as_long_as_they_were():
+    assert float(lane_length(ROAD, True)) == 4.986477651384041
+    assert float(lane_length(ROAD, False)) == 3.369185753316016
+
+
+def test_a_drive_is_scored_as_it_was():
+    assert score_trajectory(ROAD, wobble(), tick_s=1 / 60, seconds=20.0) == pytest.approx(SCORES, rel=1e-13)
+    worth = driving_score(ROAD, wobble(), wheel_distance=0.1, tick_s=1 / 60, seconds=20.0)
+    assert worth == pytest.approx(6.066666666666666, rel=1e-13)
+
+
+def test_the_floor_is_drawn_as_it_was_to_the_last_byte():
+    floor = draw_floor(ROAD)
+    digest = hashlib.sha256(floor.pixels.tobytes()).hexdigest()
+    assert digest == "e347d735d4b196fd72756c4ccd6e92f0cd26dedf7df020c7f7af0014d9228700"
+    assert (floor.pixels.shape, floor.origin) == ((832, 832, 3), -0.1625000000000001)
+
+
+def test_the_map_ends_where_it_did():
+    assert not off_map(ROAD, 3 * 0.585, 3 * 0.585)
+    assert off_map(ROAD, np.nextafter(3 * 0.585, 2.0), 0.5)

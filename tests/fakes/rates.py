@@ -1,0 +1,272 @@
+"""What `diagnose` says of every hidden effect, and how often that is right: rows, rates and a confusion matrix."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from unittest import mock
+
+import numpy as np
+from bullet_truth import BulletCase, make_bullet_log
+from rate_jobs import GENERATORS, Job
+
+import proxytune.diagnosis.motion.diagnose as diagnosing
+import proxytune.diagnosis.motion.evidence as looking
+from proxytune.diagnosis import RANDOM_EFFECTS, Diagnosis, Drives, Fit, cut
+from proxytune.diagnosis.motion.diagnose import declared_effects, diagnose
+from proxytune.diagnosis.motion.drives import relative
+from proxytune.diagnosis.motion.random_effects import RandomEffect, random_effects
+from proxytune.diagnosis.motion.screening import Candidate, candidates
+from proxytune.driving import Robot, read_robot
+from proxytune.logs import Log
+from proxytune.space import Theta
+
+CLEAR = 30.0
+"""An effect with more evidence than this should be named [nats]."""
+
+MATERIAL = 1.05
+"""What is hidden is material if errors without it are so many times those of the model that is right."""
+
+HORIZON_S = 2.0
+FLAGGED = ("partly explained", "unexplained")
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was said of a case.
+
+    Attributes:
+        job: The case.
+        verdict: The verdict.
+        adopted: The effects that were added, each with its rivals.
+        depends_on: Signals that explain the rest.
+        evidence: Of the hidden effects, that of the weakest [nats]; the best of all effects where none is hidden.
+        before: Error with what is declared [m].
+        after: Error with what was added [m].
+        learnt: Error with what was learnt besides [m], NaN where nothing is.
+        true: Error of the model that is right [m], NaN where there is none.
+        floor: The noise floor that was told, its lower and upper end [m].
+        immaterial: Effects that were found and do not matter.
+        problem: What went wrong, empty as a rule.
+    """
+
+    job: Job
+    verdict: str
+    adopted: tuple[tuple[str, ...], ...] = ()
+    depends_on: tuple[str, ...] = ()
+    evidence: float = 0.0
+    before: float = np.nan
+    after: float = np.nan
+    learnt: float = np.nan
+    true: float = np.nan
+    floor: tuple[float, float] = (np.nan, np.nan)
+    immaterial: tuple[str, ...] = ()
+    problem: str = ""
+
+    @property
+    def flagged(self) -> bool:
+        """Whether it was said that something is left over."""
+        return self.verdict in FLAGGED
+
+    @property
+    def calm(self) -> bool:
+        """Whether it was said that nothing is left over."""
+        return self.verdict in ("explained", "nothing missing")
+
+    @property
+    def right(self) -> bool:
+        """Whether every hidden effect is among those added or their rivals."""
+        said = {name for names in self.adopted for name in names}
+        return all(said & set(names) for names in self.job.right)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether an effect was added that is not hidden, nor a rival of one, and no flag raised."""
+        return not self.flagged and bool(self.surplus)
+
+    @property
+    def material(self) -> bool:
+        """Whether what is hidden makes errors larger by 5 %; effects that draw move no mean, and count."""
+        return not self.before < MATERIAL * self.true
+
+    @property
+    def surplus(self) -> tuple[str, ...]:
+        """Effects that were added, are not hidden and no rivals of one that is."""
+        known = {name for names in self.job.right for name in names} - {self.job.without}
+        return tuple(names[0] for names in self.adopted if not set(names) & known)
+
+    @property
+    def reached(self) -> float:
+        """The error with all that was found, curves included [m]."""
+        return self.learnt if np.isfinite(self.learnt) else self.after
+
+    @property
+    def text(self) -> str:
+        """One line of the table."""
+        added = " + ".join(f"{names[0]}({'/'.join(names[1:])})" if names[1:] else names[0] for names in self.adopted)
+        errors = " ".join(
+            f"{1e3 * value:.1f}" for value in (self.before, self.after, self.learnt, self.true, *self.floor)
+        )
+        name = self.job.case.name + (f" without {self.job.without}" if self.job.without else "")
+        added += f"; immaterial: {', '.join(self.immaterial)}" if self.immaterial else ""
+        rest = f" rest: {', '.join(self.depends_on)}" if self.depends_on else ""
+        head = f"{self.job.kind:11s} {name:44s} {self.verdict:16s}"
+        return f"{head} [{added}]{rest} {self.evidence:.0f} nats, mm: {errors} {self.problem}".rstrip()
+
+
+def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
+    """Diagnose one case."""
+    robot = read_robot("duckiebot")
+    log = _log(job, episodes, seconds)
+    try:
+        with _without(job.without):
+            found = diagnose(log, robot, declared_effects(robot))
+    except Exception as problem:
+        return Row(job, "failed", problem=f"{type(problem).__name__}: {problem}")
+    error = min(found.errors, key=lambda one: abs(one.horizon_s - HORIZON_S))
+    return Row(
+        job=job,
+        verdict=found.verdict,
+        adopted=tuple((one.effect, *(rival.effect for rival in one.rivals)) for one in found.effects),
+        depends_on=found.residual_depends_on,
+        evidence=_evidence(job, found),
+        before=error.before.value,
+        after=error.after.value,
+        learnt=_learnt_error(found),
+        true=_true_error(job, found.parts.tested, episodes, seconds),
+        floor=error.floor[:2],
+        immaterial=tuple(one.effect for one in found.immaterial),
+    )
+
+
+def _log(job: Job, episodes: int, seconds: float, noiseless: bool = False) -> Log:
+    if isinstance(job.case, BulletCase):
+        return make_bullet_log(job.case, episodes=episodes, seconds=seconds, noiseless=noiseless)
+    make_log = GENERATORS[job.generator].make_log
+    log: Log = make_log(job.case, episodes=episodes, seconds=seconds, noiseless=noiseless)
+    return log
+
+
+@contextmanager
+def _without(effect: str) -> Iterator[None]:
+    """Take an effect out of what the search may find, and leave out the confirmation on the bullet plant."""
+
+    def forms(robot: Robot, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
+        return tuple(form for form in candidates(robot, theta, taken) if form.effect != effect)
+
+    def chancy(model: Fit, seed: int) -> tuple[RandomEffect, ...]:
+        return tuple(found for found in random_effects(model, seed) if found.effect != effect)
+
+    with (
+        mock.patch.object(looking, "candidates", forms),
+        mock.patch.object(looking, "random_effects", chancy),
+        mock.patch.object(diagnosing, "has_body", return_value=False),
+    ):
+        yield
+
+
+def _evidence(job: Job, found: Diagnosis) -> float:
+    gains = {tried.effect: tried.gain for tried in reversed(found.found.tried)}
+    gains |= {one.effect: max(one.gain, gains.get(one.effect, 0.0)) for one in found.effects}
+    if not job.right or job.without:
+        return max(gains.values(), default=0.0)
+    return min(max(gains.get(name, 0.0) for name in names) for names in job.right)
+
+
+def _learnt_error(found: Diagnosis) -> float:
+    errors = found.learning.errors
+    return min(errors, key=lambda one: abs(one.horizon_s - HORIZON_S)).after.value if errors else float("nan")
+
+
+def _true_error(job: Job, tested: Drives, episodes: int, seconds: float) -> float:
+    """The error of the same windows when the hidden robot itself predicts, undisturbed; NaN where it draws."""
+    if isinstance(job.case, BulletCase) or {name for names in job.right for name in names} & set(RANDOM_EFFECTS):
+        return float("nan")
+    quiet = _log(job, episodes, seconds, noiseless=True)
+    poses = np.stack([episode.poses for episode in quiet.episodes])[2::3]
+    windows = cut(tested, HORIZON_S)
+    ticks = round(tested.tick_hz / tested.rate_hz)
+    begin, ends = windows.begin[windows.window], windows.increment
+    episode = tested.episode[ends]
+    said = relative(poses[episode, tested.first[begin] // ticks], poses[episode, tested.last[ends] // ticks])
+    seen = relative(tested.poses[begin, 0], tested.poses[ends, 1])
+    return float(np.sqrt(np.mean(np.sum((said - seen)[:, :2] ** 2, axis=1))))
+
+
+@dataclass(frozen=True)
+class Rate:
+    """So many of so many."""
+
+    hits: int
+    of: int
+
+    @property
+    def share(self) -> float:
+        """The share, 1 of none."""
+        return self.hits / self.of if self.of else 1.0
+
+    def __str__(self) -> str:
+        return f"{self.hits} of {self.of} ({100.0 * self.share:.0f} %)"
+
+
+def rates(rows: Sequence[Row]) -> dict[str, Rate]:
+    """How often the diagnosis is right, by what was hidden."""
+    by_kind = {kind: [row for row in rows if row.job.kind == kind] for kind in {row.job.kind for row in rows}}
+    form, other, outside = (by_kind.get(kind, []) for kind in ("in form", "other form", "outside"))
+    material = [row for row in form if row.material]
+    seen = {row.job.case.name for row in material if row.evidence > CLEAR}
+    lost = [row for row in by_kind.get("taken out", []) if row.job.case.name in seen]
+    true = [row for row in rows if np.isfinite(row.true)]
+    return {
+        "in form and material: named, nothing beside": _rate(material, lambda row: row.right and not row.surplus),
+        "in form and material: named": _rate(material, lambda row: row.right),
+        "in form, not material: nothing wrong named": _rate(
+            [row for row in form if not row.material], lambda row: not row.surplus
+        ),
+        "in form wrong without a flag": _rate(form, lambda row: row.wrong),
+        "pairs both named": _rate(by_kind.get("pair", []), lambda row: row.right),
+        "clean false alarms": _rate(by_kind.get("clean", []), lambda row: bool(row.adopted) or row.flagged),
+        "taken out flagged": _rate(lost, lambda row: row.flagged),
+        "taken out called explained": _rate(lost, lambda row: row.calm),
+        "outside flagged": _rate(outside, lambda row: row.flagged),
+        "outside called explained": _rate(outside, lambda row: row.calm),
+        "other form right": _rate(other, lambda row: row.right),
+        "other form right or flagged": _rate(other, lambda row: row.right or row.flagged),
+        "other form wrong without a flag": _rate(other, lambda row: row.wrong),
+        "explained beyond 1.3 x the true floor": _rate(true, lambda row: row.calm and row.after > 1.3 * row.true),
+        "floor bracket holds the true one": _rate(true, lambda row: row.floor[0] <= row.true <= row.floor[1]),
+        "failed": _rate(rows, lambda row: bool(row.problem)),
+    }
+
+
+def errors(rows: Sequence[Row]) -> str:
+    """The error after, curves included, by that of the model that is right: a line for each kind."""
+    lines = []
+    for kind in dict.fromkeys(row.job.kind for row in rows):
+        known = [row for row in rows if row.job.kind == kind and np.isfinite(row.reached / row.true)]
+        if known:
+            shares = np.array([row.reached / row.true for row in known])
+            middle, most = np.quantile(shares, (0.5, 0.9))
+            worst = known[int(shares.argmax())]
+            name = worst.job.case.name + (f" without {worst.job.without}" if worst.job.without else "")
+            told = f"median {middle:.2f}, nine of ten {most:.2f}, worst {shares.max():.2f} ({name})"
+            lines.append(f"{kind:11s} {len(known):3d}: {told}")
+    return "\n".join(lines)
+
+
+def _rate(rows: Sequence[Row], hit: object) -> Rate:
+    return Rate(sum(bool(hit(row)) for row in rows), len(rows))
+
+
+def confusion(rows: Sequence[Row]) -> str:
+    """For every hidden effect what was said first, and how often."""
+    said: dict[str, Counter[str]] = {}
+    for row in rows:
+        if row.job.kind in ("in form", "clean"):
+            truth = row.job.right[0][0] if row.job.right else "nothing"
+            answer = row.adopted[0][0] if row.adopted else row.verdict
+            said.setdefault(truth, Counter())[answer] += 1
+    return "\n".join(
+        f"{truth:22s} {', '.join(f'{name} {count}' for name, count in counts.most_common())}"
+        for truth, counts in sorted(said.items())
+    )

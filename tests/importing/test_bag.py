@@ -1,0 +1,340 @@
+"""A bag is known by its files, lists its topics, and a damaged one is told in one line.
+
+Messages become rows of numbers, whatever type they have, and a bad one is told by its number.
+Header stamps count where they are dates; clocks that differ or drift are told.
+"""
+
+import sys
+
+import bags
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from proxytune.errors import LogError
+from proxytune.importing import Wanted
+from proxytune.importing.bag import (
+    Stamps,
+    bags_in,
+    choose_times,
+    form_of,
+    is_bag,
+    open_bag,
+    read_commands,
+    read_poses,
+    seconds,
+)
+from proxytune.importing.topics import read_bag
+
+TIMES = 1.7e9 + np.arange(30) * 0.1
+DRIVE = ((TIMES, np.ones((30, 2))), (TIMES, np.ones((30, 3))))
+
+
+def stored(folder):
+    """The file that holds the messages of a ROS 2 folder."""
+    (file,) = (*folder.glob("*.db3"), *folder.glob("*.mcap"))
+    return file
+
+
+@pytest.mark.parametrize("storage", bags.STORAGES)
+def test_a_bag_is_known_by_its_file_or_folder(tmp_path, storage):
+    bag = bags.write_bag(tmp_path / "run.bag", storage, *DRIVE)
+    assert is_bag(bag)
+    assert is_bag(bag if bag.is_file() else stored(bag))
+    assert is_bag(tmp_path)
+    assert bags_in(bag) == {"run" if storage == "ros1" else "run.bag": bag}
+    with open_bag(bag) as opened:
+        assert len(opened.topics) == 2
+    assert form_of(bag) == {"ros1": "ROS 1 bag"}.get(storage, f"ROS 2 bag ({storage})")
+
+
+def test_other_files_and_folders_are_no_bags(tmp_path):
+    (tmp_path / "log.csv").write_text("time,x\n")
+    assert not is_bag(tmp_path)
+    assert not is_bag(tmp_path / "log.csv")
+    assert not is_bag(tmp_path / "missing.bag")
+
+
+def test_drives_of_a_folder_are_named_by_their_bags(tmp_path):
+    for name in ("one", "two"):
+        stored(bags.write_bag(tmp_path / name, "mcap", *DRIVE)).parent.joinpath("metadata.yaml").unlink()
+    bags.write_bag(tmp_path / "one.bag", "ros1", *DRIVE)
+    bags.write_bag(tmp_path / "three", "sqlite3", *DRIVE)
+    assert sorted(bags_in(tmp_path)) == ["one", "one.bag", "three", "two"]
+
+
+@pytest.mark.parametrize("storage", bags.STORAGES)
+def test_topics_have_types_and_counts(tmp_path, storage):
+    with open_bag(bags.write_bag(tmp_path / "run.bag", storage, *DRIVE)) as bag:
+        listed = [(topic.name, topic.kind, topic.count, topic.known) for topic in bag.topics]
+    assert listed == [("/cmd_vel", bags.TWIST, 30, True), ("/pose", bags.POSE, 30, True)]
+
+
+def test_a_missing_bag_is_told(tmp_path):
+    with pytest.raises(LogError, match=r"missing.bag: no such file; check the path"):
+        bags_in(tmp_path / "missing.bag")
+    with pytest.raises(LogError, match="holds no bag"):
+        bags_in(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["run.bag", "run.db3", "run.mcap"])
+@pytest.mark.parametrize("content", [b"", b"time,x,y\n" * 99])
+def test_a_file_that_is_no_bag_is_told_in_one_line(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(LogError, match=f"{name}: cannot be read as a bag .*; copy it again, or repair it") as caught:
+        read_bag(tmp_path / name, Wanted())
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "rosbag2_bagfile_information: [", "rosbag2_bagfile_information: {version: 99}"])
+def test_broken_metadata_are_told_in_one_line(tmp_path, text):
+    bag = bags.write_bag(tmp_path / "run", "sqlite3", *DRIVE)
+    (bag / "metadata.yaml").write_text(text)
+    with pytest.raises(LogError, match="run: cannot be read as a bag .*ros2 bag reindex") as caught:
+        read_bag(bag, Wanted())
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("storage", bags.STORAGES)
+def test_a_bag_cut_short_anywhere_is_told_in_one_line(tmp_path, storage):
+    bag = bags.write_bag(tmp_path / f"run{'.bag' if storage == 'ros1' else ''}", storage, *DRIVE)
+    file = bag if bag.is_file() else stored(bag)
+    whole = file.read_bytes()
+    for length in np.linspace(0, 0.95 * len(whole), 25).astype(int):
+        file.write_bytes(whole[:length])
+        with pytest.raises(LogError, match="cannot be read") as caught:
+            read_bag(bag, Wanted())
+        assert "\n" not in str(caught.value), length
+
+
+@pytest.mark.parametrize("storage", bags.STORAGES)
+def test_flipped_bytes_never_raise_anything_else(tmp_path, storage):
+    bag = bags.write_bag(tmp_path / f"run{'.bag' if storage == 'ros1' else ''}", storage, *DRIVE)
+    file = bag if bag.is_file() else stored(bag)
+    whole = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+    complaints = []
+    for seed in range(25):
+        rng = np.random.default_rng(seed)
+        damaged = whole.copy()
+        damaged[rng.integers(0, len(whole), 20)] = rng.integers(0, 256, 20)
+        file.write_bytes(damaged.tobytes())
+        try:
+            read_bag(bag, Wanted())
+        except LogError as problem:
+            complaints.append(str(problem))
+    assert len(complaints) > 5
+    assert all(map(str.isprintable, complaints))
+
+
+def test_a_message_that_is_not_its_type_is_told_by_number(tmp_path, monkeypatch):
+    with open_bag(bags.write_bag(tmp_path / "run", "mcap", *DRIVE)) as bag:
+        whole = bag.reader.messages
+
+        def shortened(connections):
+            for number, (connection, time, raw) in enumerate(whole(connections=connections)):
+                yield connection, time, raw[:-9] if number == 6 else raw
+
+        monkeypatch.setattr(bag.reader, "messages", shortened)
+        with pytest.raises(LogError, match=r"run: /pose, message 7: cannot be read \(.*PoseStamped.*\)"):
+            list(bag.messages("/pose"))
+
+
+def test_a_complaint_of_the_library_is_one_line_without_control_characters(tmp_path, monkeypatch):
+    def open_badly(self):
+        raise OSError("first line\n\x1b[31msecond line")
+
+    bag = bags.write_bag(tmp_path / "run.bag", "ros1", *DRIVE)
+    monkeypatch.setattr("rosbags.highlevel.AnyReader.open", open_badly)
+    with pytest.raises(LogError, match=r"cannot be read as a bag \(first line \[31msecond line\); copy it again"):
+        read_bag(bag, Wanted())
+
+
+def test_without_the_library_one_line_says_what_to_install(tmp_path, monkeypatch):
+    bag = bags.write_bag(tmp_path / "run.bag", "ros1", *DRIVE)
+    monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+    with pytest.raises(LogError, match=r'reading bags needs rosbags; pip install "proxytune\[ros\]"'):
+        read_bag(bag, Wanted())
+
+
+MESSAGES_TIMES = 1.7e9 + np.arange(5) * 0.1
+TWIST = {"linear": bags.xyz((0.3, 0, 0)), "angular": bags.xyz((0, 0, -0.7))}
+POSE = bags.pose((1.0, 2.0, 0.5))
+TURN = bags.pose((1.0, 2.0, 3.0, 0.0, np.sin(0.1), 0.0, np.cos(0.1)))
+
+
+def written(tmp_path, kind, fields, storage="mcap"):
+    """A bag of five messages of one type; fields(number) are a message's."""
+    stamped = [("/topic", kind, time, fields(number)) for number, time in enumerate(MESSAGES_TIMES)]
+    return open_bag(bags.write_messages(tmp_path / "run.bag", storage, stamped))
+
+
+def with_header(**fields):
+    return lambda number: {"header": bags.header(MESSAGES_TIMES[number] - 0.01), **fields}
+
+
+COMMANDS = {
+    "geometry_msgs/msg/Twist": (lambda number: TWIST, (0.3, -0.7), 0.0),
+    "geometry_msgs/msg/TwistStamped": (with_header(twist=TWIST), (0.3, -0.7), 0.01),
+    "wheel_msgs/msg/WheelsCmdStamped": (with_header(vel_left=0.25, vel_right=-0.5), (0.25, -0.5), 0.01),
+    "std_msgs/msg/Float32MultiArray": (lambda number: {"data": [0.25, 0.5]}, (0.25, 0.5), 0.0),
+    "std_msgs/msg/Float64MultiArray": (lambda number: {"data": [0.2, 0.4]}, (0.2, 0.4), 0.0),
+    "sensor_msgs/msg/JointState": (
+        with_header(name=["wheel_right", "lidar", "wheel_left"], velocity=[2.0, 9.0, 1.0]),
+        (1.0, 2.0),
+        0.01,
+    ),
+}
+POSES = {
+    "geometry_msgs/msg/PoseStamped": with_header(pose=POSE),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": with_header(pose={"pose": POSE}),
+    "nav_msgs/msg/Odometry": with_header(pose={"pose": POSE}, child_frame_id="base_link"),
+    "geometry_msgs/msg/TransformStamped": with_header(
+        transform={"translation": POSE["position"], "rotation": POSE["orientation"]}, child_frame_id="robot"
+    ),
+}
+
+
+@pytest.mark.parametrize("storage", ["ros1", "mcap"])
+@pytest.mark.parametrize("kind", COMMANDS)
+def test_every_type_of_command_is_two_numbers_and_its_time(tmp_path, kind, storage):
+    fields, row, early = COMMANDS[kind]
+    with written(tmp_path, kind, fields, storage) as bag:
+        commands, _ = read_commands(bag, "/topic", "twist", "header")
+    assert commands.values == pytest.approx(np.tile(row, (5, 1)))
+    assert commands.times == pytest.approx(MESSAGES_TIMES - early, abs=1e-6)
+
+
+@pytest.mark.parametrize("storage", ["ros1", "mcap"])
+@pytest.mark.parametrize("kind", POSES)
+def test_every_type_of_pose_is_a_place_and_a_heading(tmp_path, kind, storage):
+    with written(tmp_path, kind, POSES[kind], storage) as bag:
+        poses, _ = read_poses(bag, "/topic", "header")
+    assert poses.places == pytest.approx(np.tile((1.0, 2.0, 0.0), (5, 1)))
+    assert poses.headings == pytest.approx(np.full(5, 0.5))
+    assert poses.times == pytest.approx(MESSAGES_TIMES - 0.01, abs=1e-6)
+
+
+def test_a_tilt_stays_known(tmp_path):
+    with written(tmp_path, bags.POSE, with_header(pose=TURN)) as bag:
+        assert read_poses(bag, "/topic", "header")[0].tilts == pytest.approx(np.full(5, 0.2))
+
+
+def test_an_array_of_other_than_two_numbers_is_refused_by_number(tmp_path):
+    with (
+        written(tmp_path, "std_msgs/msg/Float32MultiArray", lambda number: {"data": [0.0] * (2 + number // 3)}) as bag,
+        pytest.raises(LogError, match=r"run.bag: /topic, message 4: has 3 elements, .* --commands"),
+    ):
+        read_commands(bag, "/topic", "duty", "header")
+
+
+@pytest.mark.parametrize("names", [["left", "front_left", "right"], ["a", "b", "c"]])
+def test_joints_that_are_not_one_left_and_one_right_are_refused(tmp_path, names):
+    with (
+        written(tmp_path, "sensor_msgs/msg/JointState", with_header(name=names, velocity=[1.0, 1.0, 1.0])) as bag,
+        pytest.raises(LogError, match=f"message 1: .* has joints {', '.join(names)}"),
+    ):
+        read_commands(bag, "/topic", "wheel_speed", "header")
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_command_that_is_not_finite_is_told_by_message(tmp_path, bad):
+    def fields(number):
+        return {"linear": bags.xyz((bad if number == 2 else 0.0, 0.0, 0.0)), "angular": bags.xyz((0, 0, 0))}
+
+    with (
+        written(tmp_path, bags.TWIST, fields) as bag,
+        pytest.raises(LogError, match="run.bag: /topic, message 3: holds a number that is not finite"),
+    ):
+        read_commands(bag, "/topic", "twist", "header")
+
+
+def test_a_pose_that_is_not_finite_is_kept_for_the_checks_to_leave_out(tmp_path):
+    def fields(number):
+        return with_header(pose=bags.pose((np.nan if number == 2 else 0.0, 0.0, 0.0)))(number)
+
+    with written(tmp_path, bags.POSE, fields) as bag:
+        poses, _ = read_poses(bag, "/topic", "header")
+    assert np.flatnonzero(np.isnan(poses.places[:, 0])).tolist() == [2]
+
+
+def test_an_orientation_of_zeros_is_no_heading(tmp_path):
+    with (
+        written(tmp_path, bags.POSE, with_header(pose={"position": bags.xyz((0, 0, 0))})) as bag,
+        pytest.raises(LogError, match="/topic: orientation 1 is the quaternion"),
+    ):
+        read_poses(bag, "/topic", "header")
+
+
+def test_poses_of_two_frames_on_one_topic_are_refused(tmp_path):
+    def fields(number):
+        return {"header": bags.header(MESSAGES_TIMES[number], "odom" if number else "/map"), "pose": POSE}
+
+    with (
+        written(tmp_path, bags.POSE, fields) as bag,
+        pytest.raises(LogError, match="/topic: mixes poses of map and odom"),
+    ):
+        read_poses(bag, "/topic", "header")
+
+
+START_NS = 1_700_000_000 * 10**9
+RECEIVE = START_NS + np.arange(100) * 10**7
+
+
+def both(header_s, receive=RECEIVE):
+    return Stamps(receive + np.round(np.asarray(header_s) * 1e9).astype(np.int64), receive)
+
+
+@given(st.integers(0, 4 * 10**9), st.integers(0, 10**9 - 1))
+def test_seconds_keep_the_microsecond(whole, rest):
+    assert abs(seconds(np.array([whole * 10**9 + rest]))[0] - whole - rest * 1e-9) < 5e-7
+
+
+def test_headers_count_unless_the_bags_times_are_asked_for():
+    stamps = both(-0.01)
+    header, notes = choose_times(stamps, "header", "/pose")
+    received, said = choose_times(stamps, "receive", "/pose")
+    assert received - header == pytest.approx(0.01, abs=1e-6)
+    assert notes == ()
+    assert "as asked" in said[0]
+
+
+@pytest.mark.parametrize("header", [np.zeros(100, dtype=np.int64), np.arange(100) * 10**7], ids=["zero", "1970"])
+def test_headers_without_a_date_give_way_to_the_bags_times(header):
+    times, notes = choose_times(Stamps(header, RECEIVE), "header", "/pose")
+    assert np.array_equal(times, seconds(RECEIVE))
+    assert notes == ("Headers of /pose hold no date: its times are when the bag received each message.",)
+
+
+def test_simulated_time_stays_where_the_bag_counts_it_too():
+    header = np.arange(1, 101) * 10**7
+    times, notes = choose_times(Stamps(header, header + 10**6), "header", "/pose")
+    assert np.array_equal(times, seconds(header))
+    assert notes == ()
+
+
+def test_a_header_without_a_stamp_among_others_is_told_by_number():
+    header = RECEIVE.copy()
+    header[6] = 0
+    with pytest.raises(LogError, match="/pose: the header of message 7 has no time stamp; take --stamps receive"):
+        choose_times(Stamps(header, RECEIVE), "header", "/pose")
+
+
+@pytest.mark.parametrize(
+    ("header_s", "words"),
+    [(-0.06, "0.060 s after their stamps"), (0.25, "0.250 s before their stamps, in the median: the clocks differ")],
+)
+def test_clocks_that_differ_are_told(header_s, words):
+    (note,) = choose_times(both(header_s), "header", "/pose")[1]
+    assert words in note
+
+
+@pytest.mark.parametrize("drift", [0.04, -0.04])
+def test_clocks_that_drift_are_told(drift):
+    (note,) = choose_times(both(np.linspace(0, drift, 100)), "header", "/pose")[1]
+    assert f"drifts by {0.9e3 * drift:+.0f} ms" in note
+
+
+def test_unknown_stamps_are_refused():
+    with pytest.raises(LogError, match="/pose: unknown stamps 'headers'; did you mean 'header'"):
+        choose_times(both(0), "headers", "/pose")

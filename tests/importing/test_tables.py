@@ -1,0 +1,517 @@
+"""CSV files of others are read by their columns' names or a map, and every complaint says where and what to do.
+
+The MRCLAM data set's own files are read, one robot at a time.
+TUM trajectories are read with commands from a second file_of_tum; without them only where that is asked for.
+"""
+
+import numpy as np
+import pandas as pd
+import pytest
+from drives import HEADINGS, PLACES, SPEEDS, TIMES, write_csv, write_mrclam, write_tum
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from one_line import complaint_of
+from project import ROOT
+
+from proxytune.errors import LogError
+from proxytune.importing import Wanted
+from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
+
+POSES = "time,x,y,heading\n0,0,0,0\n0.1,0.1,0,0.1\n0.2,0.2,0,0.2\n"
+BOTH = "time,x,y,heading,v,omega\n0,0,0,0,0.5,0\n0.1,0.1,0,0.1,,\n0.2,,,,0.6,0.1\n0.3,0.3,0,0.2,0.6,0.1\n"
+COMMANDS = "time,v,omega\n0.01,0.5,0\n0.15,0.6,0.1\n"
+
+
+@pytest.fixture
+def file(write_file):
+    return lambda content, name="run1.csv": write_file(content, name)
+
+
+def read(path, **wanted):
+    return read_csv_tables(path, Wanted(**wanted))
+
+
+def complaint(path, **wanted):
+    return complaint_of(read_csv_tables, path, Wanted(**wanted))
+
+
+def test_a_file_in_ns_mm_and_degrees_is_read_by_its_names(tmp_path):
+    (drive,) = read(write_csv(tmp_path)).drives
+    assert (drive.name, drive.commands.kind) == ("run1", "twist")
+    np.testing.assert_allclose(drive.poses.times, TIMES, atol=1e-6)
+    np.testing.assert_allclose(drive.poses.places[:, :2], PLACES, atol=1e-9)
+    np.testing.assert_allclose(drive.poses.headings, HEADINGS, atol=1e-9)
+    np.testing.assert_allclose(drive.commands.values, SPEEDS, atol=1e-9)
+
+
+def test_what_was_taken_for_what_is_told(tmp_path):
+    source = read(write_csv(tmp_path))
+    assert source.form == "CSV table"
+    assert "time from 'stamp_ns' (ns, by its name), x from 'pos_x_mm' (mm, by its name)" in source.notes[0]
+    assert "v from 'cmd_lin' (m/s, assumed)" in source.notes[0]
+    assert [channel.role for channel in source.channels] == ["time", "x", "y", "heading", "v", "omega"]
+    assert {channel.count for channel in source.channels} == {60}
+
+
+def test_rows_may_hold_commands_or_poses_alone(file):
+    (drive,) = read(file(BOTH)).drives
+    np.testing.assert_array_equal(drive.poses.times, [0.0, 0.1, 0.3])
+    np.testing.assert_array_equal(drive.commands.times, [0.0, 0.2, 0.3])
+    np.testing.assert_array_equal(drive.commands.values, [[0.5, 0.0], [0.6, 0.1], [0.6, 0.1]])
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " ", ", "])
+def test_separators_are_seen(file, separator):
+    text = POSES.replace(",", separator) if separator != " " else POSES.replace(",", "   ")
+    (drive,) = read(file(text), commands="none").drives
+    np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.1, 0.2])
+
+
+def test_decimal_commas_a_byte_order_mark_and_comments_are_read(file):
+    text = "\ufeff# recorded on Monday\ntime;x;y;heading\n0,0;0;0;0\n# half way\n0,1;0,25;0;0,5\n;;;\n"
+    (drive,) = read(file(text), commands="none").drives
+    np.testing.assert_array_equal(drive.poses.places[:, 0], [0.0, 0.25])
+    np.testing.assert_array_equal(drive.poses.headings, [0.0, 0.5])
+
+
+def test_the_last_comment_may_name_the_columns(file):
+    text = "# by numpy\n# time,x,y,heading\n0,0,0,0\n1,1,0,0\n"
+    np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0.0, 1.0])
+
+
+def test_a_column_map_goes_before_names(file):
+    columns = {"time": "clock:ms", "x": "a:cm", "y": "b:cm", "heading": "c:deg", "v": "d:km/h", "omega": "e:deg/s"}
+    text = "clock,a,b,c,d,e,left,right\n0,0,0,90,3.6,90,0,0\n100,10,0,90,3.6,90,0,0\n"
+    (drive,) = read(file(text), columns=columns).drives
+    np.testing.assert_allclose(drive.poses.times, [0.0, 0.1])
+    np.testing.assert_allclose(drive.poses.places[1], [0.1, 0.0, 0.0])
+    np.testing.assert_allclose(drive.poses.headings, np.pi / 2)
+    np.testing.assert_allclose(drive.commands.values, [[1.0, np.pi / 2]] * 2)
+
+
+def test_duplicate_and_backward_stamps_are_kept(file):
+    text = POSES + "0.2,0.2,0,0.2\n0.15,0.3,0,0.3\n"
+    np.testing.assert_array_equal(read(file(text), commands="none").drives[0].poses.times, [0, 0.1, 0.2, 0.2, 0.15])
+
+
+def test_quaternions_give_headings_and_tilts(file):
+    text = "t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,1\n1,1,0,1,0,0,1,1\n2,1,0,1,1,0,0,1\n"
+    poses = read(file(text), commands="none").drives[0].poses
+    np.testing.assert_allclose(poses.headings, [0.0, np.pi / 2, 0.0])
+    np.testing.assert_allclose(poses.tilts, [0.0, 0.0, np.pi / 2], atol=1e-7)
+    np.testing.assert_array_equal(poses.places[:, 2], 1.0)
+
+
+BOTH_TURNS = "t,x,y,yaw,qx,qy,qz,qw\n0,0,0,2,0,0,0,1\n1,1,0,2,0,0,0,1\n"
+
+
+def test_of_heading_and_quaternion_the_quaternion_is_taken(file):
+    source = read(file(BOTH_TURNS), commands="none")
+    np.testing.assert_array_equal(source.drives[0].poses.headings, 0.0)
+    assert [channel.role for channel in source.channels][3:] == ["left out", "qx", "qy", "qz", "qw"]
+
+
+def test_a_heading_that_is_mapped_goes_before_a_quaternion(file):
+    source = read(file(BOTH_TURNS), commands="none", columns={"heading": "yaw"})
+    np.testing.assert_array_equal(source.drives[0].poses.headings, 2.0)
+    assert [channel.role for channel in source.channels][3:] == ["heading", *["left out"] * 4]
+
+
+def test_a_column_that_is_mapped_is_nothing_else(file):
+    source = read(file(BOTH), columns={"left": "v", "right": "omega"})
+    assert source.drives[0].commands.kind == "duty"
+
+
+def test_stamps_since_1970_are_taken_by_their_size(file):
+    text = "stamp,x,y,yaw\n1700000000000000000,0,0,0\n1700000000100000000,1,0,0\n"
+    source = read(file(text), commands="none")
+    np.testing.assert_allclose(source.drives[0].poses.times, [1.7e9, 1.7e9 + 0.1], atol=1e-6)
+    assert "(ns, by its size)" in source.notes[0]
+
+
+def test_a_column_of_drives_makes_drives(file):
+    text = "run,time,x,y,yaw,v,omega\na,0,0,0,0,1,0\na,1,1,0,0,1,0\nb,0,0,0,0,2,0\nb,1,2,0,0,2,0\n"
+    first, second = read(file(text)).drives
+    assert (first.name, second.name) == ("a", "b")
+    np.testing.assert_array_equal(second.commands.values[:, 0], [2.0, 2.0])
+
+
+def test_each_file_of_a_folder_is_a_drive(tmp_path, file):
+    file(BOTH, "one.csv"), file(BOTH, "two.csv")
+    source = read(tmp_path)
+    assert [drive.name for drive in source.drives] == ["one", "two"]
+    assert source.form == "folder of CSV files"
+    assert len(source.notes) == 1
+
+
+@pytest.mark.parametrize("name", ["commands.csv", "cmd_vel.csv", "run1_cmd_vel.csv", "run1_commands.txt"])
+def test_commands_beside_the_poses_are_joined(file, name):
+    file(COMMANDS, name)
+    source = read(file(POSES))
+    np.testing.assert_array_equal(source.drives[0].commands.times, [0.01, 0.15])
+    assert source.channels[-1].name == f"{name}: omega"
+    assert any(note.startswith(f"Commands of {name}: ") for note in source.notes)
+
+
+def test_a_named_file_of_commands_goes_before_columns(file):
+    file(COMMANDS, "joystick.txt")
+    (drive,) = read(file(BOTH), commands="joystick.txt").drives
+    np.testing.assert_array_equal(drive.commands.times, [0.01, 0.15])
+
+
+def test_each_file_s_own_columns_may_be_mapped(file):
+    file("at;lin;ang\n10;0.5;0\n150;0.6;0.1\n", "commands.csv")
+    path = file(POSES.replace("time", "clock"))
+    columns = {"time": "clock", "v": "lin", "omega": "ang"}
+    assert "no column found for time" in complaint(path, columns=columns)
+    file("t_ms;lin;ang\n10;0.5;0\n150;0.6;0.1\n", "commands.csv")
+    np.testing.assert_allclose(read(path, columns=columns).drives[0].commands.times, [0.01, 0.15])
+
+
+def test_drives_of_one_clock_share_a_file_of_commands_by_time(tmp_path, file):
+    file(POSES, "a.csv")
+    file(POSES.replace("\n0", "\n10"), "b.csv")
+    file("time,v,omega\n-1,0.1,0\n0.1,0.2,0\n0.5,0.3,0\n10.1,0.4,0\n", "commands.csv")
+    first, second = read(tmp_path).drives
+    np.testing.assert_array_equal(first.commands.values[:, 0], [0.1, 0.2])
+    np.testing.assert_array_equal(second.commands.values[:, 0], [0.3, 0.4])
+
+
+def test_drives_that_overlap_cannot_share_commands_by_time(tmp_path, file):
+    file(POSES, "a.csv"), file(POSES, "b.csv"), file(COMMANDS, "commands.csv")
+    assert "add a column 'episode'" in complaint(tmp_path)
+    file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\na,0.1,2,0\n", "commands.csv")
+    assert [drive.commands.values[0, 0] for drive in read(tmp_path).drives] == [2.0, 1.0]
+    file("episode,time,v,omega\nb,0,1,0\nc,0.1,1,0\n", "commands.csv")
+    assert "drive 'c' has no poses" in complaint(tmp_path)
+
+
+def test_each_drive_must_have_commands(tmp_path, file):
+    file(POSES, "a.csv")
+    file(POSES.replace("\n0", "\n10"), "b.csv")
+    commands = file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\n", "commands.csv")
+    assert complaint(tmp_path) == (f"{commands}: has no commands for drive 'a'; add them, or leave its poses out")
+    file("time,v,omega\n5,1,0\n10.1,1,0\n", "commands.csv")
+    assert "has no command while 'a' was driven, 0 to 0.2 s; check that" in complaint(tmp_path)
+
+
+def test_without_commands_only_if_asked_for(file):
+    assert "leave them out (--commands none)" in complaint(file(POSES))
+    assert read(file(POSES), commands="none").drives[0].commands is None
+    assert read(file(BOTH), kind="none").drives[0].commands is None
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "remedy"),
+    [
+        ("", "is empty", "a row for each sample"),
+        ("\n \n", "is empty", "a row for each sample"),
+        ("time,x,y,heading\n", "no rows", "add one for each sample"),
+        (b"\x89PNG\r\n\x1a\n\0\0", "not text", "save it as a text table"),
+        ("a\0b,c\n1,2\n", "binary", "save it as a text table"),
+        (POSES + "0.3,1,2\n", "line 5: has 3 cells, but there are 4 columns", "correct that line"),
+        (POSES.replace("0.2,0,0.2", "0.2,oops,0.2"), "line 4, column 'y': must be a finite number", "'oops'"),
+        (POSES.replace("0.2,0,0.2", "0.2,inf,0.2"), "line 4, column 'y'", "'inf'"),
+        (POSES.replace("0.2,0,0.2", "0.2,,0.2"), "line 4, column 'y': is empty beside time, x, heading", "fill it"),
+        ("0,0,0,0\n1,1,1,1\n", "line 1: holds numbers", "add a line of names"),
+        ("time,x,x\n1,2,3\n", "names the column 'x' twice", "rename"),
+        (
+            "time,x,y\n0,1,2\n1,1,2\n",
+            "no column found for heading (or qx, qy, qz, qw); its columns are: time, x, y",
+            "=",
+        ),
+        ("run,time,x,y,yaw\na,0,0,0,0\n,1,1,0,0\n", "line 3, column 'run': is empty", "name the drive"),
+        ("time,stamp,x,y,yaw\n0,0,1,2,0\n", "time may be 'time' or 'stamp'", "--columns time=time"),
+        ("time,x,y,heading\n0,0,0,0\n0,1,0,0\n0,2,0,0\n", "all 3 stamps are 0 s", "a clock that runs"),
+        ("time,x,y,heading\n0,0,0,0\n", "a single pose", "two or more"),
+        ("time,x,y,heading\n0,,,\n1,,,\n", "no row with a pose", "give the file"),
+        ("time,x,y,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,0,0,0,0,0,0\n", "orientation 2 is the quaternion (0, 0, 0, 0)", "set"),
+        ("time,x,y,yaw_deg\n0,0,0,1.2\n1,1,0,-3\n", "look like radians", "--columns heading=yaw_deg:deg"),
+        ("time,x_mm,y_mm,yaw\n0,0,0,0\n1,2.5,0,0\n", "moved 2.5 mm in all", "--columns x=x_mm:m"),
+        ("t_ns,x,y,yaw\n0,0,0,0\n0.1,2.5,0,0\n", "rows would be 1e-10 s apart", "--columns time=t_ns:ns"),
+        ('time,x,y,"yaw\n0,0,0,0\n', "line 1: is not a row of a CSV table", "correct"),
+    ],
+)
+def test_bad_poses_are_refused_with_where_and_what_to_do(file, text, where, remedy):
+    path = file(text)
+    said = complaint(path, commands="none")
+    assert said.startswith(str(path))
+    assert where in said
+    assert remedy in said
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        (BOTH.replace("0.6,0.1\n0.3", ",0.1\n0.3"), "line 4, column 'v': is empty beside time, omega"),
+        ("time,x,winkel\n0,0,0\n", "no column found for y, heading"),
+        (BOTH.replace("omega", "other"), "no column found for omega"),
+        (BOTH.replace("omega", "right").replace("v", "left").replace("0.6", "90"), "90 is more than full duty"),
+        ("time,x,y,yaw,v,omega,left,right\n0,0,0,0,0,0,0,0\n", "may be duty or twist; choose one, as in --kind duty"),
+        ("time,x,y,yaw,v,omega\n0,0,0,0,,\n1,1,0,0,,\n", "no row with one"),
+        ("run,time,x,y,yaw,v,omega\na,0,0,0,0,1,1\na,1,0,0,0,1,1\nb,1,,,,0,0\n", "drive 'b' has commands but no poses"),
+    ],
+)
+def test_bad_commands_are_refused(file, text, where):
+    assert where in complaint(file(text))
+
+
+@pytest.mark.parametrize(
+    ("columns", "where"),
+    [
+        ({"haeding": "yaw"}, "unknown name 'haeding'; did you mean 'heading'?"),
+        ({"x": "xx"}, "column map: x=xx: has no column 'xx'"),
+        ({"heading": "headin"}, "did you mean 'heading'?"),
+        ({"x": "x:parsec"}, "unknown unit 'parsec'; known are: m, cm, mm, km"),
+        ({"v": "lin"}, "has no column 'lin'"),
+    ],
+)
+def test_a_bad_column_map_is_refused(file, columns, where):
+    assert where in complaint(file(POSES), columns=columns)
+
+
+def test_missing_files_are_told(tmp_path, file):
+    assert "no such file" in complaint(tmp_path / "none.csv")
+    assert "no such file of commands" in complaint(file(POSES), commands="other.csv")
+    assert "has no CSV file with poses" in complaint(tmp_path, commands="run1.csv")
+
+
+def test_tables_are_known_by_content(tmp_path, file):
+    assert is_csv_tables(file(POSES, "poses.txt"))
+    assert is_csv_tables(file("", "empty.csv"))
+    assert is_csv_tables(tmp_path)
+    assert not is_csv_tables(file("Dear reader,\nthis is prose, and long\n", "notes.txt"))
+    assert not is_csv_tables(file(b"\x89PNG\0\0", "picture"))
+    assert not is_csv_tables(tmp_path / "missing")
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(file, data):
+    content = bytearray(BOTH.encode())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = file(bytes(content[: data.draw(st.integers(0, len(content)))]))
+    is_csv_tables(path)
+    drives, said = (), ""
+    try:
+        drives = read(path).drives
+    except LogError as problem:
+        said = str(problem)
+    assert "\n" not in said
+    assert all(np.isfinite(drive.poses.places).all() for drive in drives)
+
+
+LOG = ROOT / "../shared/data/logs/mrclam6_robot1"
+
+
+def complaint_of_mrclam(path, **wanted):
+    return complaint_of(read_mrclam, path, Wanted(**wanted))
+
+
+def test_a_robot_s_two_files_are_a_drive(tmp_path):
+    source = read_mrclam(write_mrclam(tmp_path), Wanted())
+    (drive,) = source.drives
+    assert (source.form, drive.name, drive.commands.kind) == ("MRCLAM data set", "Robot1", "twist")
+    np.testing.assert_array_equal(drive.poses.times, TIMES)
+    np.testing.assert_array_equal(drive.poses.places[:, :2], PLACES)
+    np.testing.assert_array_equal(drive.poses.headings, HEADINGS)
+    np.testing.assert_array_equal(drive.commands.values, SPEEDS)
+    assert source.channels[0].name == "Robot1_Groundtruth.dat: time"
+
+
+def test_the_same_drive_as_csv_gives_the_same_arrays(tmp_path):
+    (theirs,) = read_mrclam(write_mrclam(tmp_path), Wanted()).drives
+    (ours,) = read_csv_tables(write_csv(tmp_path), Wanted()).drives
+    np.testing.assert_allclose(theirs.poses.places, ours.poses.places, atol=1e-9)
+    np.testing.assert_allclose(theirs.poses.headings, ours.poses.headings, atol=1e-9)
+    np.testing.assert_allclose(theirs.commands.times, ours.commands.times, atol=1e-6)
+    np.testing.assert_allclose(theirs.commands.values, ours.commands.values, atol=1e-9)
+
+
+def test_either_file_or_a_folder_of_one_robot_will_do(tmp_path):
+    write_mrclam(tmp_path, "Robot3")
+    for path in (tmp_path, tmp_path / "Robot3_Odometry.dat", tmp_path / "Robot3_Groundtruth.dat"):
+        assert is_mrclam(path)
+        assert read_mrclam(path, Wanted()).drives[0].name == "Robot3"
+
+
+def test_of_several_robots_one_must_be_chosen(tmp_path):
+    write_mrclam(tmp_path, "Robot1"), write_mrclam(tmp_path, "Robot3")
+    assert "several robots: Robot1, Robot3; choose one, as in --poses Robot1" in complaint_of_mrclam(tmp_path)
+    assert "has no robot 'Robot4'; did you mean" in complaint_of_mrclam(tmp_path, poses="Robot4")
+    assert read_mrclam(tmp_path, Wanted(poses="Robot3")).drives[0].name == "Robot3"
+
+
+def test_commands_may_be_left_out(tmp_path):
+    path = write_mrclam(tmp_path)
+    (tmp_path / "Robot1_Odometry.dat").unlink()
+    assert "Robot1_Odometry.dat: no such file" in complaint_of_mrclam(path)
+    assert read_mrclam(path, Wanted(commands="none")).drives[0].commands is None
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        ("", "is empty"),
+        ("# Time x y heading\n", "is empty"),
+        ("0 1 2\n", "line 1: has 3 cells, but there are 4 columns: time, x, y, heading"),
+        ("0 1 2 north\n", "line 1, column 'heading': must be a finite number"),
+        ("0 1 2 0\n0 1 3 0\n", "all 2 stamps are 0 s"),
+    ],
+)
+def test_bad_files_are_refused(tmp_path, text, where):
+    path = write_mrclam(tmp_path)
+    path.write_text(text)
+    said = complaint_of_mrclam(tmp_path)
+    assert said.startswith(str(path))
+    assert where in said
+
+
+def test_a_folder_without_such_files_is_refused(tmp_path):
+    assert not is_mrclam(tmp_path)
+    assert not is_mrclam(tmp_path / "Robot1_Odometry.dat")
+    assert "has no file such as Robot1_Groundtruth.dat" in complaint_of_mrclam(tmp_path)
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(place=st.integers(0, 400), value=st.integers(0, 255), end=st.integers(0, 2000))
+def test_mrclam_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(tmp_path, place, value, end):
+    path = write_mrclam(tmp_path)
+    content = bytearray(path.read_bytes())
+    content[place] = value
+    path.write_bytes(bytes(content[:end]))
+    drives, said = (), ""
+    try:
+        drives = read_mrclam(tmp_path, Wanted()).drives
+    except LogError as problem:
+        said = str(problem)
+    assert "\n" not in said
+    assert all(np.isfinite(drive.poses.places).all() for drive in drives)
+
+
+@pytest.mark.skipif(not LOG.is_dir(), reason=f"needs measured data in {LOG.parent.name}/{LOG.name}")
+def test_a_measured_drive_comes_back_as_it_was(tmp_path):
+    rows = pd.read_csv(LOG / "samples.csv").query("episode == 0")
+    poses, commands = rows[["time", "x", "y", "heading"]].dropna(), rows[["time", "v", "omega"]]
+    poses.to_csv(tmp_path / "Robot1_Groundtruth.dat", sep="\t", header=False, index=False)
+    commands.to_csv(tmp_path / "Robot1_Odometry.dat", sep="\t", header=False, index=False)
+    (drive,) = read_mrclam(tmp_path, Wanted()).drives
+    assert len(drive.poses.times) > 10_000
+    np.testing.assert_array_equal(np.column_stack((drive.poses.times, drive.poses.places[:, :2])), poses.iloc[:, :3])
+    np.testing.assert_array_equal(drive.poses.headings, poses["heading"])
+    np.testing.assert_array_equal(drive.commands.values, commands[["v", "omega"]])
+
+
+LINES = "# tracked at 20 Hz\n0 1 2 0 0 0 0 1\n0.05 1 2 0 0 0 0.6 0.8\n"
+
+
+@pytest.fixture
+def file_of_tum(write_file):
+    return lambda content, name="run1.tum": write_file(content, name)
+
+
+def complaint_of_tum(path, **wanted):
+    return complaint_of(read_tum, path, Wanted(**wanted))
+
+
+def test_a_trajectory_and_its_commands_are_read(tmp_path):
+    source = read_tum(write_tum(tmp_path), Wanted())
+    (drive,) = source.drives
+    assert (source.form, drive.name, drive.commands.kind) == ("TUM trajectory", "run1", "twist")
+    np.testing.assert_array_equal(drive.poses.times, TIMES)
+    np.testing.assert_array_equal(drive.poses.places[:, :2], PLACES)
+    np.testing.assert_allclose(drive.poses.headings, HEADINGS, atol=1e-12)
+    np.testing.assert_array_equal(drive.commands.values, SPEEDS)
+    assert [channel.role for channel in source.channels][:4] == ["time", "x", "y", "z"]
+
+
+def test_tum_the_same_drive_as_csv_gives_the_same_arrays(tmp_path):
+    (theirs,) = read_tum(write_tum(tmp_path), Wanted()).drives
+    (tmp_path / "run1_commands.csv").unlink()
+    (ours,) = read_csv_tables(write_csv(tmp_path), Wanted()).drives
+    np.testing.assert_allclose(theirs.poses.times, ours.poses.times, atol=1e-6)
+    np.testing.assert_allclose(theirs.poses.places, ours.poses.places, atol=1e-9)
+    np.testing.assert_allclose(theirs.poses.headings, ours.poses.headings, atol=1e-9)
+    np.testing.assert_allclose(theirs.commands.values, ours.commands.values, atol=1e-9)
+
+
+def test_commands_may_be_named_with_columns_and_units(file_of_tum):
+    path = file_of_tum(LINES)
+    file_of_tum("stamp_ms;l;r\n10;50;-50\n", "joystick.txt")
+    columns = {"left": "l:percent", "right": "r:percent"}
+    (drive,) = read_tum(path, Wanted(commands="joystick.txt", columns=columns)).drives
+    assert drive.commands.kind == "duty"
+    np.testing.assert_allclose(drive.commands.times, [0.01])
+    np.testing.assert_allclose(drive.commands.values, [[0.5, -0.5]])
+
+
+def test_tum_without_commands_only_if_asked_for(file_of_tum):
+    path = file_of_tum(LINES)
+    said = complaint_of_tum(path)
+    assert "lay run1_commands.csv (time, v, omega) beside it" in said
+    assert "--commands none" in said
+    assert read_tum(path, Wanted(commands="none")).drives[0].commands is None
+
+
+def test_tilts_are_kept(file_of_tum):
+    poses = read_tum(file_of_tum("0 0 0 0 0 0 0 1\n1 0 0 0 0.1 0 0 1\n"), Wanted(commands="none")).drives[0].poses
+    np.testing.assert_allclose(poses.tilts, [0.0, 2 * np.arctan(0.1)])
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        ("", "is empty"),
+        ("# nothing but this\n", "is empty"),
+        (b"\xff\xfe\x00rubbish", "is not text in UTF-8"),
+        (LINES + "0.1 1 2\n", "line 4: has 3 cells, but there are 8 columns: time, x, y, z, qx, qy, qz, qw"),
+        (LINES + "0.1 1 2 up 0 0 0 1\n", "line 4, column 'z': must be a finite number"),
+        (LINES + "0.1 1 2 0 0 0 0 0\n", "orientation 3 is the quaternion (0, 0, 0, 0), which is no rotation"),
+        ("0 1 2 0 0 0 0 1\n0 2 2 0 0 0 0 1\n", "all 2 stamps are 0 s"),
+        ("0 1 2 0 0 0 0 1\n", "has a single pose"),
+        ("nan 1 2 0 0 0 0 1\n1 1 2 0 0 0 0 1\n", "line 1, column 'time': is empty beside"),
+    ],
+)
+def test_bad_trajectories_are_refused(file_of_tum, text, where):
+    path = file_of_tum(text)
+    said = complaint_of_tum(path, commands="none")
+    assert said.startswith(str(path))
+    assert where in said
+
+
+def test_tum_bad_commands_are_refused(file_of_tum):
+    path = file_of_tum(LINES)
+    file_of_tum("time,lin\n0,1\n", "commands.csv")
+    assert (
+        "no column found for commands (v and omega, or left and right); its columns are: time, lin"
+        in complaint_of_tum(path)
+    )
+    assert "no such file_of_tum of commands" in complaint_of_tum(path, commands="elsewhere.csv")
+    assert "unknown name 'speed'" in complaint_of_tum(path, columns={"speed": "lin"})
+
+
+def test_trajectories_are_known_by_content(file_of_tum, tmp_path):
+    assert is_tum(file_of_tum(LINES, "poses.txt"))
+    assert is_tum(file_of_tum("", "empty.tum"))
+    assert not is_tum(file_of_tum("time,x\n1,2\n", "a.csv"))
+    assert not is_tum(file_of_tum("1 2 3\n", "b.txt"))
+    assert is_tum(tmp_path), "a folder with such a file_of_tum"
+    assert not is_tum(tmp_path.parent)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_tum_whatever_happens_to_the_bytes_nothing_but_a_log_error_comes_out(file_of_tum, data):
+    content = bytearray(LINES.encode())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = file_of_tum(bytes(content))
+    is_tum(path)
+    drives, said = (), ""
+    try:
+        drives = read_tum(path, Wanted(commands="none")).drives
+    except LogError as problem:
+        said = str(problem)
+    assert "\n" not in said
+    assert all(np.isfinite(drive.poses.headings).all() for drive in drives)

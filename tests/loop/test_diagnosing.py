@@ -1,0 +1,46 @@
+"""The extended study is the study itself, by another proxy, from another folder."""
+
+from tiny_loop import FOUND, write_tiny
+
+from proxytune.loop.diagnosing import write_extension
+from proxytune.study import load_family, read_study_settings
+
+
+def extended(tmp_path, *changes):
+    study = write_tiny(tmp_path / "tiny", *changes)
+    (study / "found.toml").write_text(FOUND)
+    settings = read_study_settings(study)
+    write_extension(settings, study / "found.toml", study / "loop" / "extended")
+    return settings, read_study_settings(study / "loop" / "extended")
+
+
+def test_the_extended_study_differs_by_its_name_and_proxy_alone(tmp_path):
+    before, after = extended(tmp_path)
+    assert (after.name, after.proxy.resolve()) == ("tiny_extended", (before.folder / "found.toml").resolve())
+    assert [path.resolve() for path in after.targets] == [path.resolve() for path in before.targets]
+    assert after.truth.resolve() == before.truth.resolve()
+    for key in ("metrics", "agents", "starts", "budget", "initial", "seed", "space", "preflight", "family"):
+        assert getattr(after, key) == getattr(before, key)
+    assert dict(after.domain) == dict(before.domain)
+    assert dict(load_family(after, after.proxy).effects)["dead_band.width"] == 0.149
+
+
+def test_effects_of_the_studys_proxy_stay_unless_the_diagnosis_has_them(tmp_path):
+    proxy = ('truth = "twin.toml"', 'truth = "twin.toml"\nproxy = "proxy.toml"')
+    effects = ('plant = "planar"\n', 'plant = "planar"\neffects = { delay = { delay = 0.1 } }\n')
+    folder = write_tiny(tmp_path / "tiny")
+    text = 'format = 1\nrobot = "duckiebot"\n[effects.turn_slip]\nturn_slip = 0.2\n[effects.trim]\ntrim = 0.0\n'
+    (folder / "proxy.toml").write_text(text)
+    _, after = extended(tmp_path, proxy, effects)
+    assert after.domain["effects"] == {"turn_slip": {"turn_slip": 0.2}}
+
+
+def test_what_a_study_may_read_lies_beside_the_extended_one_and_what_runs_made_does_not(tmp_path):
+    folder = write_tiny(tmp_path / "tiny")
+    made = ("figures/convergence.png", "study.db", "other/study.toml", "a_log/log.toml")
+    for name in (*made, "mine.py", "robby/robot.toml"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text("")
+    extended(tmp_path)
+    there = {path.relative_to(folder / "loop" / "extended").as_posix() for path in (folder / "loop").rglob("*.*")}
+    assert there == {"study.toml", "twin.toml", "found.toml", "mine.py", "robby/robot.toml"}

@@ -1,0 +1,241 @@
+"""What a loop cannot use is refused in one line before anything is driven.
+
+A step is done once for the same inputs, and one that was broken off counts as not done.
+"""
+
+import os
+
+import pytest
+from tiny_loop import write_tiny
+
+from proxytune.cli.main import BAD_INPUT, FAILED, main
+from proxytune.errors import StoreError
+from proxytune.files import shipped
+from proxytune.loop import open_loop
+from proxytune.loop.opening import FILE_NAME, Kept, Step, digest_of_files
+
+LOG = 'format = 1\nname = "log"\nrobot = "husky"\ncommand = "duty"\nrate_hz = 20.0\n'
+NO_TRUTH = ('truth = "twin.toml"\n', "")
+TABLE = "agent,episode,distance,survival_time\n" + "".join(
+    f"{agent},{start},1.0,2.0\n" for agent in ("steady", "brisk", "daredevil") for start in (0, 1)
+)
+
+
+def refusal(capsys, *words, status=BAD_INPUT):
+    """The one line that the command says."""
+    assert main(["loop", *map(str, words)]) == status
+    told = capsys.readouterr()
+    assert told.out == ""
+    lines = told.err.splitlines()
+    assert len(lines) == 1, told.err
+    return lines[0]
+
+
+def a_log(folder, text=LOG):
+    folder.mkdir()
+    (folder / "log.toml").write_text(text)
+    rows = "".join(f"0,{0.05 * row:.2f},0.1,0.1,0.0,0.0,0.0\n" for row in range(40))
+    (folder / "samples.csv").write_text("episode,time,left,right,x,y,heading\n" + rows)
+    return folder
+
+
+def test_a_log_of_another_robot_is_refused(tmp_path, capsys):
+    line = refusal(capsys, write_tiny(tmp_path / "tiny"), "--log", a_log(tmp_path / "log"))
+    assert "is of the robot 'husky', the study of 'duckiebot'; give a log of 'duckiebot'" in line
+    assert not (tmp_path / "tiny" / "study.db").exists()
+
+
+def test_a_twin_without_a_camera_is_refused(tmp_path, capsys):
+    folder = write_tiny(tmp_path / "tiny", ('robot = "duckiebot"\n', ""))
+    blind = folder / "blind.toml"
+    blind.write_text('format = 1\nrobot = "irobot_create"\nplant = "planar"\n')
+    line = refusal(capsys, folder, "--twin", blind)
+    assert "--twin" in line
+    assert "camera" in line
+
+
+def test_a_twin_of_another_robot_is_refused(tmp_path, capsys):
+    folder = write_tiny(tmp_path / "tiny")
+    (folder / "twin.toml").write_text('format = 1\nrobot = "husky"\nplant = "planar"\n')
+    assert "is 'duckiebot' but the model says 'husky'" in refusal(capsys, folder)
+
+
+def test_a_twin_that_is_not_there_is_refused(tmp_path, capsys):
+    line = refusal(capsys, write_tiny(tmp_path / "tiny"), "--twin", tmp_path / "none.toml")
+    assert line.startswith(f"proxytune loop: --twin {tmp_path / 'none.toml'}: no such file")
+
+
+def test_an_agent_without_a_rank_is_refused(tmp_path, capsys):
+    folder = write_tiny(tmp_path / "tiny", NO_TRUTH)
+    (folder / "target.csv").write_text(TABLE)
+    assert "held_out: the target's table has no scores of 'crawler'; measure them" in refusal(capsys, folder)
+
+
+@pytest.mark.parametrize(
+    ("names", "says"),
+    [
+        ('["crawler", "laggy", "steady"]', "'steady' is among the agents that are tuned on"),
+        ('["crawler", "laggy"]', "names 2 of at least 3 agents"),
+        ('["crawler", "laggy", "nobody"]', "nobody"),
+    ],
+)
+def test_agents_that_cannot_be_held_out_are_refused(tmp_path, capsys, names, says):
+    folder = write_tiny(tmp_path / "tiny", ('["crawler", "laggy", "edges"]', names))
+    line = refusal(capsys, folder)
+    assert "held_out: " in line
+    assert says in line
+
+
+def test_a_target_that_can_be_neither_read_nor_recorded_is_refused(tmp_path, capsys):
+    folder = write_tiny(tmp_path / "tiny", NO_TRUTH, ('held_out = ["crawler", "laggy", "edges"]\n', ""))
+    (folder / "target.csv").write_text(TABLE)
+    assert "give a log of it by --log LOG, or its model.toml by --twin" in refusal(capsys, folder)
+
+
+def test_a_family_without_a_robot_is_refused(make_study, capsys):
+    assert "names no robot" in refusal(capsys, make_study())
+
+
+def test_a_search_for_learning_value_is_refused(tmp_path, capsys):
+    folder = write_tiny(tmp_path / "tiny", ('name = "tiny"', 'name = "tiny"\nobjective = "plv"'))
+    assert "objective: `loop` tunes by scores" in refusal(capsys, folder)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_permission_is_refused(tmp_path, capsys):
+    folder = write_tiny(tmp_path / "tiny")
+    folder.chmod(0o500)
+    try:
+        assert "cannot be written" in refusal(capsys, folder, status=FAILED)
+    finally:
+        folder.chmod(0o700)
+
+
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path, capsys):
+    folder = write_tiny(tmp_path / "tiny")
+    (folder / "loop").write_text("a file")
+    assert "loop: cannot be written" in refusal(capsys, folder, status=FAILED)
+
+
+def test_without_names_the_shipped_agents_that_no_tuning_sees_are_held_out(tmp_path):
+    folder = write_tiny(tmp_path / "tiny", ('held_out = ["crawler", "laggy", "edges"]\n', ""))
+    held_out = open_loop(folder).held_out
+    assert {"crawler", "edges", "wary"} <= set(held_out)
+    assert not {"steady", "brisk", "daredevil"} & set(held_out)
+
+
+def test_shipped_agents_are_held_out_of_a_study_that_names_its_agents_otherwise(tmp_path):
+    table = '[agents]\nslow = "steady"\nfast = "brisk"\nwild = "daredevil"\n\n[parameters]'
+    changes = (
+        ('held_out = ["crawler", "laggy", "edges"]\n', ""),
+        ('agents = ["steady", "brisk", "daredevil"]\n', ""),
+        ("[parameters]", table),
+    )
+    held_out = open_loop(write_tiny(tmp_path / "tiny", *changes)).held_out
+    assert {"crawler", "edges", "wary"} <= set(held_out)
+    assert not {"steady", "brisk", "daredevil", "slow", "fast", "wild"} & set(held_out)
+
+
+def test_of_a_table_those_agents_are_held_out_that_it_has_beside_the_studys(tmp_path):
+    folder = write_tiny(tmp_path / "tiny", NO_TRUTH, ('held_out = ["crawler", "laggy", "edges"]\n', ""))
+    log = a_log(tmp_path / "log", LOG.replace("husky", "duckiebot"))
+    (folder / "target.csv").write_text(TABLE)
+    assert open_loop(folder, log=log).held_out == ()
+    (folder / "target.csv").write_text(TABLE + "edges,0,1.0,2.0\nlaggy,0,1.0,2.0\n")
+    assert open_loop(folder, log=log).held_out == ()
+    more = "".join(f"{agent},{start},1.0,2.0\n" for agent in ("edges", "laggy", "wary", "unknown") for start in (0, 1))
+    (folder / "target.csv").write_text(TABLE + more)
+    assert open_loop(folder, log=log).held_out == ("edges", "laggy", "wary")
+
+
+def test_a_twin_of_which_no_frames_can_be_recorded_is_refused_before_anything_is_driven(tmp_path, capsys):
+    changes = (
+        ('robot = "duckiebot"', 'robot = "robby"'),
+        ("delay = [0.0, 0.3]", "delay = [0.0, 0.3]\nblur = [0.0, 0.1]"),
+    )
+    folder = write_tiny(tmp_path / "tiny", *changes)
+    (folder / "twin.toml").write_text((folder / "twin.toml").read_text().replace("duckiebot", "robby"))
+    figures = (shipped("robots") / "duckiebot" / "robot.toml").read_text().splitlines()
+    (folder / "robby").mkdir()
+    own = [line.replace("duckiebot", "robby") for line in figures if not line.startswith(("expert_", "urdf"))]
+    (folder / "robby" / "robot.toml").write_text("\n".join(own))
+    line = refusal(capsys, folder)
+    assert "twin.toml: no frames can be recorded" in line
+    assert "give a log of it by --log" in line
+    assert not (folder / "study.db").exists()
+
+
+def step(folder, inputs="a", name="log"):
+    done = []
+
+    def do():
+        done.append(inputs)
+        (folder / name).write_text(inputs)
+
+    return Step(name, inputs, folder / name, do), done
+
+
+def test_a_step_is_known_after_it_was_done_and_not_with_other_inputs(tmp_path):
+    first, done = step(tmp_path)
+    assert not Kept(tmp_path).has(first)
+    Kept(tmp_path).run(first)
+    assert done == ["a"]
+    assert Kept(tmp_path).has(first)
+    assert not Kept(tmp_path).has(step(tmp_path, "b")[0])
+
+
+def test_a_step_whose_output_is_gone_is_not_done(tmp_path):
+    first, _ = step(tmp_path)
+    Kept(tmp_path).run(first)
+    first.output.unlink()
+    assert not Kept(tmp_path).has(first)
+
+
+def test_a_step_that_was_broken_off_is_not_done_though_its_old_output_is_there(tmp_path):
+    first, _ = step(tmp_path)
+    Kept(tmp_path).run(first)
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Kept(tmp_path).run(Step("log", "b", first.output, interrupted))
+    assert first.output.exists()
+    assert not Kept(tmp_path).has(first)
+    assert not Kept(tmp_path).has(step(tmp_path, "b")[0])
+
+
+def test_steps_do_not_forget_each_other(tmp_path):
+    kept, (first, _), (second, _) = Kept(tmp_path), step(tmp_path), step(tmp_path, name="diagnosis")
+    kept.run(first)
+    kept.run(second)
+    assert Kept(tmp_path).has(first)
+    assert Kept(tmp_path).has(second)
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"steps": 1}'])
+def test_a_broken_file_is_one_line_with_a_remedy(tmp_path, text):
+    (tmp_path / FILE_NAME).write_text(text)
+    with pytest.raises(StoreError, match="remove it to do every step again"):
+        Kept(tmp_path)
+
+
+def test_a_digest_of_files_changes_with_content_and_names_and_not_with_hidden_or_compiled_files(tmp_path):
+    (tmp_path / "__pycache__").mkdir()
+    (tmp_path / "one").write_text("1")
+    before = digest_of_files(tmp_path)
+    (tmp_path / ".draft").write_text("half")
+    (tmp_path / "__pycache__" / "one.pyc").write_text("compiled")
+    assert digest_of_files(tmp_path) == before
+    (tmp_path / "one").write_text("2")
+    changed = digest_of_files(tmp_path)
+    (tmp_path / "one").rename(tmp_path / "two")
+    assert len({before, changed, digest_of_files(tmp_path)}) == 3
+
+
+def test_a_digest_of_a_single_hidden_file_changes_with_its_content(tmp_path):
+    model = tmp_path / ".model.toml"
+    model.write_text("1")
+    before = digest_of_files(model)
+    model.write_text("2")
+    assert digest_of_files(model) != before

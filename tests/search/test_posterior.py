@@ -1,0 +1,185 @@
+"""Trials left out say how wide a region has to be.
+
+A proxy that fits is not said to lack anything, and one that lacks something is.
+The posterior over the box: its share, its intervals and its draws are those of densities that are known.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chi2
+from steps import SPACE, goal, whole
+
+from proxytune.search import Trial, from_unit, learn, to_unit
+from proxytune.search.engine import design_point
+from proxytune.search.likelihood import fit_outputs
+from proxytune.search.posterior import FEWEST, MARGIN, WIDENINGS, LeftOut, leave_out, posterior_of
+
+AGENTS = np.random.default_rng(0).uniform(1.0, 4.0, (12, 2))
+
+
+def trials(count, together=0.0):
+    """Smooth outputs with roughness; a part of it may be one and the same in half of the outputs."""
+    points = [design_point(SPACE, index, 1) for index in range(count)]
+    rough = np.random.default_rng(3).normal(0.0, 0.05, (count, 13))
+    smooth = [np.sin(AGENTS @ to_unit(SPACE, values)) for values in points]
+    rows = [s + r[:12] + together * r[12] for s, r in zip(smooth, rough, strict=True)]
+    return [Trial(v, 1.0, tuple(row.tolist())) for v, row in zip(points, rows, strict=True)]
+
+
+def left_out(told, values=(0.5,) * 12):
+    return leave_out(fit_outputs(SPACE, told), told, goal(whole, values, 1e-4), 1)
+
+
+def test_each_trial_is_told_how_probable_its_own_theta_is():
+    found = left_out(trials(20))
+    assert found.deviances.shape == (20,)
+    assert found.above.shape == (20, len(WIDENINGS))
+    assert (found.above >= 0.0).all()
+    assert (found.above <= 1.0 + 1e-9).all()
+
+
+def test_a_wider_density_holds_no_fewer_of_them():
+    held = (left_out(trials(20)).above <= 0.95).sum(axis=0)
+    assert (np.diff(held) >= 0).all()
+
+
+def planted(missed, widening=0):
+    """Of twenty trials so many are missed, up to this place in the list of widenings."""
+    above = np.full((20, len(WIDENINGS)), 0.5)
+    above[:missed, : widening + 1] = 0.99
+    return LeftOut(np.ones(20), above)
+
+
+def test_the_region_is_widened_until_it_holds_nine_of_ten():
+    assert planted(0).widening == planted(2).widening == MARGIN
+    assert planted(3, 0).widening == MARGIN * WIDENINGS[1]
+    assert planted(3, 2).widening == MARGIN * WIDENINGS[3]
+    assert planted(20, len(WIDENINGS) - 1).widening == MARGIN * WIDENINGS[-1]
+
+
+def test_few_of_them_widen_nothing_beyond_the_margin():
+    few = left_out(trials(FEWEST - 1))
+    assert not few.enough
+    assert few.widening == MARGIN
+
+
+def test_a_single_trial_is_not_left_out():
+    assert left_out(trials(1)).widening == MARGIN
+
+
+def test_trials_that_lack_outputs_are_not_left_out_but_are_learnt_from():
+    told = trials(12)
+    cut = [
+        Trial(t.values, t.score, (*t.outcome[:6], *[np.nan] * 6)) if row % 3 == 0 else t for row, t in enumerate(told)
+    ]
+    assert left_out(cut).deviances.shape == (8,)
+
+
+SPREAD = 0.03
+
+
+def outputs(values, seed):
+    """Twelve smooth outputs, rough by a little."""
+    waves = np.sin(AGENTS @ to_unit(SPACE, values))
+    return waves + np.random.default_rng([seed, 7]).normal(0.0, SPREAD, 12)
+
+
+def trials_of_misfit(seed, count=16):
+    points = [design_point(SPACE, index, seed) for index in range(count)]
+    return [Trial(p, 1.0, tuple(outputs(p, 100 * seed + row).tolist())) for row, p in enumerate(points)]
+
+
+def p_value(seed, shift):
+    values = from_unit(SPACE, np.random.default_rng(seed).uniform(0.2, 0.8, 2))
+    target = outputs(values, 10_000 + seed) + shift * np.resize([1.0, -1.0, 0.0], 12)
+    told = trials_of_misfit(seed)
+    return learn(SPACE, told, goal(whole, target, SPREAD**2), seed).misfit.p_value
+
+
+@pytest.mark.slow
+def test_targets_that_the_proxy_can_make_are_seldom_said_to_be_beyond_it():
+    found = np.array([p_value(seed, 0.0) for seed in range(24)])
+    assert (found < 0.05).sum() <= 3
+    assert np.ptp(found) > 0.5
+
+
+@pytest.mark.slow
+def test_targets_beyond_it_are_found():
+    assert max(p_value(seed, 0.6) for seed in range(6)) < 0.05
+
+
+def test_the_same_trials_in_any_order_give_the_same_verdict():
+    told = trials_of_misfit(1)
+    target = goal(whole, outputs((0.1, 0.1), 5), SPREAD**2)
+    assert learn(SPACE, told, target, 1).misfit == learn(SPACE, told[::-1], target, 1).misfit
+
+
+@pytest.mark.parametrize("count", [4, 5])
+def test_with_too_few_trials_nothing_is_said(count):
+    told = trials_of_misfit(1, count)
+    found = learn(SPACE, told, goal(whole, outputs((0.1, 0.1), 5))).misfit
+    assert (found.p_value, found.fits) == (None, None)
+
+
+def test_where_no_output_changes_nothing_is_said():
+    told = [Trial(design_point(SPACE, index, 1), 1.0, (7.0,)) for index in range(8)]
+    assert learn(SPACE, told, goal(whole, (3.0,))).misfit.fits is None
+
+
+def normal(centre, widths, correlation=0.0):
+    """Log density of a normal with these standard deviations."""
+    matrix = np.diag(np.square(widths))
+    matrix[0, 1] = matrix[1, 0] = correlation * widths[0] * widths[1]
+    inverse = np.linalg.inv(matrix)
+    return lambda points: -0.5 * np.einsum("ij,jk,ik->i", points - centre, inverse, points - centre)
+
+
+@settings(derandomize=True, max_examples=15, deadline=None)
+@given(st.floats(0.005, 0.08), st.floats(0.005, 0.08), st.floats(0.3, 0.7))
+def test_of_a_normal_in_the_box_share_and_intervals_are_those_of_the_normal(first, second, middle):
+    found = posterior_of(normal(np.array([middle, 1.0 - middle]), np.array([first, second])), 2)
+    assert found.share == pytest.approx(np.pi * first * second * chi2.ppf(0.95, 2), rel=0.1)
+    half = 1.96 * np.array([first, second])
+    assert np.diff(found.intervals, axis=1)[:, 0] == pytest.approx(2 * half, rel=0.1)
+    assert found.mean == pytest.approx([middle, 1.0 - middle], abs=0.01)
+    assert found.mode == pytest.approx([middle, 1.0 - middle], abs=0.02)
+
+
+def test_a_small_region_in_four_dimensions_is_found_and_measured():
+    widths = np.array([0.01, 0.03, 0.05, 0.02])
+    found = posterior_of(normal(np.array([0.2, 0.5, 0.7, 0.4]), widths), 4)
+    expected = np.pi**2 / 2 * widths.prod() * chi2.ppf(0.95, 4) ** 2
+    assert found.share == pytest.approx(expected, rel=0.3)
+    assert np.diff(found.intervals, axis=1)[:, 0] == pytest.approx(3.92 * widths, rel=0.25)
+
+
+def test_where_nothing_is_known_the_region_is_the_box_and_no_parameter_is_identified():
+    found = posterior_of(lambda points: np.zeros(len(points)), 3)
+    assert found.share == pytest.approx(1.0, abs=0.06)
+    assert found.unidentified.all()
+    assert found.trades == ()
+
+
+def test_a_parameter_that_is_pinned_down_is_identified_beside_one_that_is_not():
+    found = posterior_of(lambda points: -0.5 * ((points[:, 0] - 0.5) / 0.02) ** 2, 2)
+    assert found.unidentified.tolist() == [False, True]
+    assert found.share == pytest.approx(0.02 * 3.92, rel=0.15)
+
+
+def test_parameters_that_make_up_for_each_other_are_named_with_their_correlation():
+    ((first, second, correlation),) = posterior_of(normal(np.full(2, 0.5), np.full(2, 0.05), -0.9), 2).trades
+    assert (first, second) == (0, 1)
+    assert correlation == pytest.approx(-0.9, abs=0.05)
+
+
+def test_draws_are_those_of_the_density_and_in_the_box():
+    found = posterior_of(normal(np.array([0.0, 0.5]), np.array([0.05, 0.1])), 2)
+    draws = np.array([found.draw(seed) for seed in range(400)])
+    assert draws.min() >= 0.0
+    assert draws.max() <= 1.0
+    assert draws[:, 1].mean() == pytest.approx(0.5, abs=0.02)
+    assert draws[:, 1].std() == pytest.approx(0.1, abs=0.015)
+    assert len({tuple(draw) for draw in draws}) == 400
+    assert np.array_equal(found.draw(3), found.draw(3))

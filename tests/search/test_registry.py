@@ -1,0 +1,257 @@
+import builtins
+import importlib.util
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from steps import SPACE, WHOLE, lacking, search, steps
+
+from proxytune.errors import InputError
+from proxytune.search import (
+    ENGINES,
+    NAMES,
+    STUDY_ENGINES,
+    Trial,
+    code_of,
+    engine_code,
+    engine_of,
+    make_proposer,
+    why_not,
+)
+from proxytune.search import registry as digest
+from proxytune.search import registry as engines
+from proxytune.search.engine import AfterDesign, design_point
+from proxytune.testing.extension import check_engine
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A room of four modules: a imports b, and c within a function; d stands alone."""
+    (tmp_path / "search").mkdir()
+    (tmp_path / "search" / "a.py").write_text(
+        "import numpy\nfrom proxytune.search.b import x\n\ndef f():\n    from proxytune.search import c\n"
+    )
+    for name in "bcd":
+        (tmp_path / "search" / f"{name}.py").write_text("x = 1\n")
+    monkeypatch.setattr(digest, "FOLDER", tmp_path)
+    code_of.cache_clear()
+    yield tmp_path
+    code_of.cache_clear()
+
+
+def edited(path):
+    before = code_of("proxytune.search.a")
+    path.write_text(path.read_text() + "y = 2\n")
+    code_of.cache_clear()
+    return code_of("proxytune.search.a") != before
+
+
+@pytest.mark.parametrize("name", ["a", "b", "c"])
+def test_an_edit_of_what_a_module_imports_anywhere_changes_its_digest(folder, name):
+    assert edited(folder / "search" / f"{name}.py")
+
+
+def test_a_comment_changes_no_digest(folder):
+    before, path = code_of("proxytune.search.a"), folder / "search" / "b.py"
+    path.write_text(f"# edited\n{path.read_text()}")
+    code_of.cache_clear()
+    assert code_of("proxytune.search.a") == before
+
+
+def test_an_edit_of_anything_else_does_not(folder):
+    assert not edited(folder / "search" / "d.py")
+
+
+def test_modules_that_import_each_other_have_a_digest(folder):
+    (folder / "search" / "b.py").write_text("from proxytune.search.a import f\n")
+    assert code_of("proxytune.search.a") == code_of("proxytune.search.b", "proxytune.search.a")
+
+
+def test_runs_of_a_peer_outlast_an_edit_of_another_engine(tmp_path, monkeypatch):
+    shutil.copytree(digest.FOLDER / "search", tmp_path / "search")
+    monkeypatch.setattr(digest, "FOLDER", tmp_path)
+    code_of.cache_clear()
+    before = {engine: engine_code(engine) for engine in ("outcomes", "gp", "qlognei", "random")}
+    with (tmp_path / "search" / "knowledge" / "likelihood.py").open("a") as file:
+        file.write("EDITED = 1\n")
+    code_of.cache_clear()
+    changed = {engine for engine, code in before.items() if engine_code(engine) != code}
+    code_of.cache_clear()
+    assert changed == {"outcomes"}
+
+
+HAS_OPTUNA = importlib.util.find_spec("optuna") is not None
+SLOW = {"skopt": [pytest.mark.slow]}
+HERE = [
+    pytest.param(name, marks=[pytest.mark.skipif(bool(lacking(name)), reason=lacking(name)), *SLOW.get(name, ())])
+    for name in NAMES
+]
+
+
+def made(engine, initial):
+    return make_proposer(engine, initial, WHOLE)
+
+
+@pytest.mark.parametrize("engine", HERE)
+def test_every_engine_begins_with_the_same_design(engine):
+    trials = search(made(engine, 4), 4, seed=9)
+    assert [trial.values for trial in trials] == [design_point(SPACE, index, 9) for index in range(4)]
+
+
+@pytest.mark.parametrize("engine", HERE)
+def test_every_engine_keeps_what_engines_promise(engine):
+    check_engine(engine_of(engine))
+
+
+@pytest.mark.parametrize("engine", HERE)
+def test_every_proposal_is_a_new_one(engine):
+    """Also where the best is at a corner of the box; only Optuna's sampler goes there more than once."""
+    trials = search(made(engine, 3), 8, seed=1, score=lambda values: -100 * values[0] - values[1])
+    assert len({trial.values for trial in trials}) == 8 or engine == "gpsampler"
+
+
+@pytest.mark.parametrize("engine", HERE)
+def test_another_seed_gives_another_search(engine):
+    told = [Trial(design_point(SPACE, index, 1), float(index), (float(index),)) for index in range(3)]
+    proposer = made(engine, 3)
+    assert proposer.propose(SPACE, told, 1) != proposer.propose(SPACE, told, 2)
+
+
+@pytest.mark.parametrize("engine", HERE)
+def test_failed_trials_do_not_stop_an_engine(engine):
+    trials = search(made(engine, 3), 7, seed=1, score=lambda v: None if v[0] > 0.15 else steps(v))
+    assert any(trial.score is None for trial in trials)
+    assert len({trial.values for trial in trials}) == 7
+
+
+@pytest.mark.parametrize("engine", HERE)
+def test_while_every_trial_has_failed_the_design_goes_on(engine):
+    failed = [Trial(design_point(SPACE, index, 1), None) for index in range(5)]
+    assert made(engine, 3).propose(SPACE, failed, 1) == design_point(SPACE, 5, 1)
+
+
+def test_an_engine_is_told_of_a_failed_trial_as_the_worst_and_only_after_the_design():
+    class Listening:
+        told = None
+
+        def propose(self, space, trials, seed):
+            self.told = [trial.score for trial in trials]
+            return (0.1, 0.1)
+
+    inner = Listening()
+    trials = [Trial((0.1, 0.0), 3.0), Trial((0.2, 0.0), None), Trial((0.3, 0.0), 8.0)]
+    AfterDesign(inner, 4).propose(SPACE, trials, 1)
+    assert inner.told is None
+    AfterDesign(inner, 3).propose(SPACE, trials, 1)
+    assert inner.told == [3.0, 8.0, 8.0]
+
+
+def test_random_and_sobol_learn_nothing():
+    for engine in ("random", "sobol"):
+        low, high = (search(made(engine, 2), 6, 1, score) for score in (steps, lambda values: 100.0))
+        assert [trial.values for trial in low] == [trial.values for trial in high]
+
+
+@pytest.mark.skipif(not HAS_OPTUNA, reason="Optuna is not installed")
+def test_tpe_learns_from_the_scores_and_says_nothing(capfd):
+    low, high = (search(make_proposer("tpe", 4), 12, 1, score) for score in (steps, lambda v: -steps(v)))
+    assert np.mean([steps(trial.values) for trial in low[4:]]) < np.mean([steps(trial.values) for trial in high[4:]])
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("engine", ["gpsampler", "qlognei"])
+def test_a_peer_learns_from_the_scores_and_says_nothing(engine, capfd):
+    if lacking(engine):
+        pytest.skip(lacking(engine))
+    low, high = (search(made(engine, 4), 10, 1, score) for score in (steps, lambda v: -steps(v)))
+    assert np.mean([steps(trial.values) for trial in low[4:]]) < np.mean([steps(trial.values) for trial in high[4:]])
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("engine", ["gpsampler", "qlognei"])
+def test_a_peer_leaves_the_threads_and_the_random_numbers_of_pytorch_as_they_were(engine):
+    if lacking(engine):
+        pytest.skip(lacking(engine))
+    import torch
+
+    before = torch.get_num_threads(), torch.random.get_rng_state()
+    search(made(engine, 3), 4, 1)
+    assert torch.get_num_threads() == before[0]
+    if engine == "qlognei":
+        assert torch.equal(torch.random.get_rng_state(), before[1])
+
+
+NEEDY = [engine.name for engine in ENGINES if engine.needs]
+NEED = {
+    "tpe": "'tpe' needs Optuna, which is not installed; pip install 'proxytune[tpe]'",
+    "gpsampler": "'gpsampler' needs Optuna and PyTorch, which are not installed; pip install 'proxytune[peers]'",
+    "qlognei": "'qlognei' needs BoTorch, which is not installed; pip install 'proxytune[peers]'",
+}
+
+
+@pytest.mark.parametrize("engine", NEEDY)
+def test_an_engine_whose_library_is_missing_is_refused_in_one_line_with_what_to_do(engine, monkeypatch):
+    monkeypatch.setattr(engines, "find_spec", lambda name: None)
+    with pytest.raises(InputError) as refused:
+        make_proposer(engine, 3)
+    assert str(refused.value).startswith(NEED[engine])
+
+
+def test_no_other_engine_needs_these_libraries(monkeypatch):
+    whole = builtins.__import__
+
+    def without(name, *arguments, **more):
+        if name.split(".")[0] in ("optuna", "torch", "botorch", "gpytorch"):
+            raise ModuleNotFoundError(name)
+        return whole(name, *arguments, **more)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    told = [Trial(design_point(SPACE, index, 1), float(index), (float(index),)) for index in range(3)]
+    for engine in NAMES:
+        if engine not in NEEDY:
+            assert len(made(engine, 3).propose(SPACE, told, 1)) == 2
+
+
+def test_every_engine_that_is_not_refused_can_be_made_and_has_a_digest_of_its_own_code():
+    digests = [engine_code(engine) for engine in NAMES]
+    assert len(set(digests)) == len(NAMES)
+    for engine in NAMES:
+        if not why_not(engine, composed=True):
+            assert made(engine, 3).initial == 3
+
+
+def test_an_unknown_engine_is_refused_with_the_nearest_name():
+    with pytest.raises(
+        InputError, match=r"unknown engine 'sobool' \(your own is written module:attribute\); did you mean 'sobol'"
+    ):
+        make_proposer("sobool", 3)
+
+
+def test_an_engine_in_a_file_of_ones_own_is_found_beside_and_goes_by_the_name_it_was_asked_for(tmp_path):
+    (tmp_path / "mine.py").write_text("from proxytune.search.engines.sobol import ENGINE\nNONE = 3\n")
+    assert engine_of("mine:ENGINE", tmp_path) == replace(engine_of("sobol"), name="mine:ENGINE")
+    with pytest.raises(InputError, match="engine 'mine:NONE' is a int; make it a proxytune"):
+        engine_of("mine:NONE", tmp_path)
+    with pytest.raises(InputError, match="engine 'nowhere:ENGINE': no module 'nowhere' installed"):
+        engine_of("nowhere:ENGINE")
+
+
+def test_the_code_of_ones_own_engine_is_part_of_what_its_runs_depend_on(tmp_path):
+    head = "from proxytune.search.engines.engine import Engine\n"
+    text = f"{head}class Mine:\n    step = 1\nENGINE = Engine('m', '', '', Mine)\n"
+    other, codes = text.replace("step = 1", "step = 2"), []
+    for place, source in (("one", text), ("same", f"# a comment\n{text}"), ("other", other)):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "mine.py").write_text(source)
+        codes.append(engine_code(engine_of("mine:ENGINE", tmp_path / place)))
+    assert codes[0] == codes[1] != codes[2]
+
+
+def test_every_engine_has_a_name_of_its_own_and_is_found_by_it():
+    assert len(set(NAMES)) == len(ENGINES)
+    assert [engine_of(name) for name in NAMES] == list(ENGINES)
+
+
+def test_what_is_for_comparison_only_is_no_engine_of_a_study():
+    assert set(NAMES) - set(STUDY_ENGINES) == {"skopt", "gpsampler", "qlognei"}

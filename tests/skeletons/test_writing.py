@@ -1,0 +1,76 @@
+"""A robot to start from agrees with itself, and drives alike on both plants, whatever its six figures."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune.driving import UNITS, BulletPlant, drivetrain, read_robot
+from proxytune.driving.plants import PlanarPlant, check_body
+from proxytune.effects import Setting, effects_from
+from proxytune.errors import InputError
+from proxytune.settings import read_settings
+from proxytune.skeletons import robot_skeleton
+from proxytune.skeletons.writing import GUESSES, SIX
+
+TICK_S = 1.0 / 60.0
+SMALL = {"wheel_radius": 0.02, "wheel_distance": 0.09, "full_speed": 0.3, "mass": 0.3}
+LARGE = {"wheel_radius": 0.1, "wheel_distance": 0.45, "full_speed": 1.2, "motor_time_constant": 0.25, "mass": 20.0}
+
+
+def write(folder, figures):
+    home = folder / "rover"
+    home.mkdir()
+    for name, text in robot_skeleton("rover", figures).files.items():
+        (home / name).write_text(text, encoding="utf-8")
+    return read_robot("rover", folder)
+
+
+def drive(plant, robot, duties):
+    train = drivetrain(robot, effects_from(robot.theta, robot.figures))
+    twists, _ = train.apply(duties, train.begin(Setting(60.0, np.zeros(2), robot.figures)))
+    with plant:
+        return plant.move(twists)
+
+
+@pytest.mark.parametrize("figures", [{}, SMALL, LARGE], ids=["guessed", "small", "large"])
+def test_both_plants_drive_it_alike_without_touching_the_floor(tmp_path, figures):
+    robot = write(tmp_path, figures)
+    duties = np.repeat([[0.6, 0.6], [0.5, 0.2], [-0.3, 0.3]], 60, axis=0)
+    start = np.zeros(3)
+    poses, crashed = drive(BulletPlant(robot, start, TICK_S), robot, duties)
+    planar, _ = drive(PlanarPlant(start, TICK_S), robot, duties)
+    driven = np.abs(np.diff(planar[:, :2], axis=0)).sum()
+    assert not crashed
+    assert np.abs(poses[:, :2] - planar[:, :2]).max() < 0.03 * driven
+    assert abs(poses[-1, 2] - planar[-1, 2]) < 0.1
+
+
+@settings(max_examples=15, deadline=None)
+@given(values=st.tuples(*[st.floats(0.01, 1.0) for _ in SIX]))
+def test_what_is_given_is_written_and_the_urdf_has_it_too(tmp_path_factory, values):
+    figures = dict(zip(SIX, values, strict=True))
+    robot = write(tmp_path_factory.mktemp("robots"), figures)
+    assert {name: robot.figures[name] for name in SIX} == pytest.approx(figures, rel=1e-5)
+    check_body(robot)
+
+
+def test_guesses_alone_are_marked_to_be_edited(tmp_path):
+    text = robot_skeleton("rover", {"wheel_radius": 0.04}).files["robot.toml"].partition("[effects")[0]
+    lines = {line.split(" = ")[0]: line for line in text.splitlines() if line.split(" = ")[0] in UNITS}
+    assert set(lines) == set(GUESSES)
+    assert [name for name, line in lines.items() if "# EDIT" not in line] == ["wheel_radius"]
+
+
+def test_a_figure_that_it_does_not_have_is_refused():
+    with pytest.raises(InputError, match="no figure 'wheel'; did you mean"):
+        robot_skeleton("rover", {"wheel": 1.0})
+    with pytest.raises(InputError, match="camera_pitch must be at most 45 deg, got 50"):
+        robot_skeleton("rover", {"camera_pitch": 50.0})
+    with pytest.raises(InputError, match="mass must be above 0 and finite, got 0"):
+        robot_skeleton("rover", {"mass": 0.0})
+
+
+def test_the_six_figures_stand_first(tmp_path):
+    write(tmp_path, {})
+    assert tuple(read_settings(tmp_path / "rover" / "robot.toml").values["figures"])[:6] == SIX

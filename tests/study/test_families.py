@@ -1,0 +1,54 @@
+"""Which of several families is best at what, and which cannot be told from it."""
+
+import pytest
+from several_tuned import compared, family, lesson
+
+from proxytune.study import Choice, Lesson
+
+
+def test_the_lowest_fresh_prpv_predicts_best_and_a_higher_one_beyond_noise_is_worse():
+    found = compared(family("bad", 3), family("good", 0), family("middle", 1))
+    assert found.predicts == Choice("good", ())
+    assert {(one.better, one.worse, one.value) for one in found.selection.differences} == {
+        ("good", "middle", 2),
+        ("good", "bad", 6),
+        ("middle", "bad", 4),
+    }
+
+
+def test_a_family_whose_difference_may_be_noise_cannot_be_told_from_the_best():
+    found = compared(family("good", 0, noise=8.0), family("noisy", 0, noise=9.0), family("bad", 4))
+    assert found.predicts.best in ("good", "noisy")
+    assert found.predicts.alike == tuple({"good", "noisy"} - {found.predicts.best})
+
+
+def test_a_family_without_fresh_episodes_is_left_out():
+    assert compared(family("none", fresh=False), family("one", 2)).predicts == Choice("one", ())
+    assert compared(family("none", fresh=False), family("nor", fresh=False)).predicts == Choice()
+
+
+def test_the_cheapest_is_told_apart_episode_by_episode():
+    hard, easy = (10.0, 1.0, 5.0, 0.1), (20.0, 2.0, 10.0, 0.2)
+    found = compared(family("double", seconds=easy), family("single", seconds=hard), family("as long", seconds=hard))
+    assert found.cheapest == Choice("single", ("as long",))
+    # Intervals overlap by far, since episodes differ; of the same episodes the ratio is exact.
+    (_, low, high), (_, other, _) = (found.seconds_per_episode()[name] for name in ("single", "double"))
+    assert other < high
+    assert found.times_cheapest("single")["double"] == pytest.approx((2.0, 2.0, 2.0))
+    assert low < 4.025 < high
+
+
+def test_the_highest_plv_teaches_best_and_more_samples_beyond_noise_are_worse():
+    lessons = {
+        "worse": lesson(100.0, (200.0, 50.0, 300.0)),
+        "best": lesson(300.0),
+        "near": lesson(250.0, (50.0, -100.0, 150.0)),
+        "never": lesson(-100.0, (None, None, None), needed=(None, None, None)),
+        "cannot": Lesson({}, failure="the expert cannot drive here"),
+    }
+    assert compared(family("best"), lessons=lessons).teaches == Choice("best", ("near",))
+
+
+def test_without_a_known_plv_nobody_teaches_best():
+    assert compared(family("a"), lessons={"a": Lesson({}, 1.0)}).teaches == Choice()
+    assert compared(family("a")).teaches == Choice()

@@ -1,0 +1,264 @@
+"""A family asked through a guard, and agents by other names in tables than those that are loaded.
+
+A family asked through a guard, and agents by other names in tables than those that are loaded.
+"""
+
+import sqlite3
+
+import pytest
+from wobbly import Wobbly
+
+from proxytune.api.driving import drive
+from proxytune.api.studies import run_study
+from proxytune.cli.main import main
+from proxytune.domain import make_episode
+from proxytune.errors import ExtensionError, InputError, SettingsError
+from proxytune.study import load_family, open_study, read_study_settings, study_facts
+from proxytune.study.family import UserFamily
+
+
+def load(folder):
+    settings = read_study_settings(folder)
+    return load_family(settings, settings.proxy)
+
+
+def test_a_factory_gets_the_domain_table_and_the_model(make_study):
+    folder = make_study(domain={"version": '"7"'}, proxy='"model.toml"')
+    (folder / "model.toml").write_text("trim = 0.2\n")
+    family = load(folder)
+    assert (family.version, family.theta) == ("7", (("trim", 0.2),))
+
+
+def test_modules_in_the_study_s_folder_can_be_imported(make_study):
+    folder = make_study(family='"my_own_family:make"')
+    (folder / "my_own_family.py").write_text("from wobbly import wobbly as make\n")
+    assert load(folder).starts == 5
+
+
+BAD = {
+    "no colon": ({"family": '"wobbly"'}, "family: family 'wobbly' is unknown (your own is written module:attribute)"),
+    "no such module": ({"family": '"wobbli:wobbly"'}, "family 'wobbli:wobbly': no module 'wobbli' in "),
+    "no such factory": (
+        {"family": '"wobbly:wobly"'},
+        "'wobbly:wobly': wobbly has no 'wobly'; did you mean 'wobbly'?",
+    ),
+    "a factory with a bug": (
+        {"family": '"wobbly:broken_factory"'},
+        "raised KeyError: 'robot' (wobbly.py, line 114); correct it",
+    ),
+    "a factory without a model": (
+        {"family": '"wobbly:domain_alone"'},
+        "family: wobbly:domain_alone cannot be called (got an unexpected keyword argument 'model'); "
+        "write it as: def domain_alone(domain, *, model)",
+    ),
+    "a factory of nothing": ({"family": '"wobbly:nothing_at_all"'}, "cannot be called (too many positional arguments)"),
+    "something else": ({"family": '"wobbly:not_a_family"'}, "made no domain family: it lacks identity, metrics"),
+    "a missing model": ({"proxy": '"nowhere.toml"'}, "proxy: no such file: "),
+    "an unknown parameter": (
+        {"parameters": {"trimm": "[0, 0.1]"}},
+        "parameters.trimm: unknown parameter; did you mean 'trim'?",
+    ),
+    "a box beyond the family's": (
+        {"parameters": {"trim": "[-0.5, 0.3]"}},
+        "parameters.trim: must lie within [-0.3, 0.3], got [-0.5, 0.3]",
+    ),
+    "too many starts": ({"starts": "6"}, "starts: the family has 5, got 6"),
+    "an unknown metric": ({"metrics": '["distanc:max"]'}, "unknown metric 'distanc'; did you mean 'distance'?"),
+    "an unknown agent": ({"agents": '["agent0", "agnet1"]'}, "agents: no agent 'agnet1'; did you mean 'agent1'?"),
+    "an unknown key of the domain": ({"domain": {"robt": "1"}}, "domain.robt: unknown key"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
+    changes, expected = BAD[case]
+    with pytest.raises(InputError) as told:
+        load(make_study(**changes))
+    assert expected in str(told.value)
+    assert "study.toml: " in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+FAULTY = """
+class Faulty:
+    identity, metrics, starts = "1", {{"distance": "m", "survival_time": "s"}}, 5
+    parameters = {{}}
+
+    def check_agent(self, name): ...
+    def run(self, episode): ...
+
+    {fault}
+
+
+def make(domain, *, model):
+    assert dict(domain) == {{**domain}} == dict(domain.items())
+    assert list(domain) == list(domain.keys()) and "nothing" not in domain
+    return Faulty()
+"""
+
+FAULTS = {
+    "parameters": (
+        "parameters = property(lambda self: 1 / 0)",
+        "parameters of faulty_{n}:make raised ZeroDiv",
+    ),
+    "identity": ("identity = property(lambda self: self.gone)", "identity of faulty_{n}:make raised AttributeError"),
+    "metrics": ("metrics = ['distance']", "metrics of faulty_{n}:make must be a mapping, got list"),
+    "starts": ("starts = '5'", "starts of faulty_{n}:make must be a whole number, got str"),
+    "no Parameter": ("parameters = {'trim': 3, 'delay': 3}", "of faulty_{n}:make must be a Parameter, got int"),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_what_a_foreign_family_does_wrong_is_one_line_with_its_name(make_study, case):
+    fault, expected = FAULTS[case]
+    number = list(FAULTS).index(case)
+    folder = make_study(family=f'"faulty_{number}:make"')
+    (folder / f"faulty_{number}.py").write_text(FAULTY.format(fault=fault))
+    with pytest.raises(InputError) as told:
+        load(folder)
+    assert f"study.toml: family: {expected.format(n=number)}" in str(told.value).replace("parameters['delay'] ", "")
+    assert "\n" not in str(told.value)
+
+
+def test_an_agent_check_that_raises_is_told_with_the_family_s_name(make_study):
+    folder = make_study(family='"checks_badly:make"')
+    text = "from wobbly import Wobbly, wobbly\n\n\n"
+    text += "class Bad(Wobbly):\n    def check_agent(self, name): import not_there\n\n\n"
+    text += "def make(domain, *, model):\n    return Bad(**vars(wobbly(domain, model=model)))\n"
+    (folder / "checks_badly.py").write_text(text)
+    expected = r"check_agent\('agent0'\) of checks_badly:make raised ModuleNotFoundError: .*not_there.*; correct it"
+    with pytest.raises(InputError, match=expected):
+        load(folder)
+
+
+def test_a_module_that_cannot_be_imported_is_told(make_study):
+    folder = make_study(family='"falls_over:make"')
+    (folder / "falls_over.py").write_text("1 / 0\n")
+    with pytest.raises(InputError, match="importing falls_over raised ZeroDivisionError: division by zero"):
+        load(folder)
+
+
+ALIASES = (("good", "agent0"), ("bad", "agent1"))
+TABLE = "{ " + ", ".join(f'a{number} = "agent{number}"' for number in range(6)) + " }"
+
+
+class Faulty(Wobbly):
+    versions = property(lambda self: 1 / 0)
+    earlier_identities = property(lambda self: self.gone)
+    identity = property(lambda self: self.theta.gone)
+
+    def check_agent(self, name):
+        raise OSError("no weights")
+
+
+@pytest.mark.parametrize("member", ["versions", "earlier_identities", "identity"])
+def test_what_a_member_raises_whenever_it_is_asked_is_one_line_with_its_name_and_place(member):
+    family = UserFamily(Faulty(), "sim:make")
+    expected = rf"{member} of sim:make raised .*Error: .*\(test_user_family.py, line \d+\); correct it"
+    with pytest.raises(ExtensionError, match=expected):
+        getattr(family, member)
+
+
+def test_what_the_check_of_an_agent_raises_is_one_line():
+    with pytest.raises(
+        ExtensionError, match=r"check_agent\('agent0'\) of sim:make raised OSError: no weights .*correct"
+    ):
+        UserFamily(Faulty(), "sim:make", ALIASES).check_agent("good")
+
+
+def test_a_member_that_is_not_there_is_not_there():
+    family = UserFamily(Wobbly(), "sim:make")
+    assert not hasattr(family, "versions")
+    assert family.earlier_identities == ()
+    assert (family.identity, family.starts) == (Wobbly().identity, 5)
+
+
+def test_an_alias_drives_as_what_it_stands_for_and_other_agents_behind_it_are_another_family():
+    family = UserFamily(Wobbly(), "sim:make", ALIASES)
+    episode = make_episode({}, agent="good", start=0, seed=1)
+    assert family.run(episode) == Wobbly().run(make_episode({}, agent="agent0", start=0, seed=1))
+    assert len({family.identity, Wobbly().identity, UserFamily(Wobbly(), "sim:make", ALIASES[:1]).identity}) == 3
+
+
+class Agents:
+    """Answers who drives, whatever is asked of an episode."""
+
+    def __getattr__(self, member):
+        if member.startswith("__"):
+            raise AttributeError(member)
+        return lambda episode, *rest: (member, episode.agent, *rest)
+
+
+@pytest.mark.parametrize("member", ["run", "record", "drive", "replay", "demonstrate", "guide", "examine"])
+def test_whatever_is_asked_of_an_episode_is_passed_on_by_the_name_that_the_family_knows(member):
+    family = UserFamily(Agents(), "sim:make", ALIASES)
+    episode = make_episode({}, agent="good", start=0, seed=1)
+    assert getattr(family, member)(episode, 1.5) == (member, "agent0", 1.5)
+
+
+class Examiner(Wobbly):
+    def examine_together(self, episodes, policy):
+        return [(episode.agent, policy) for episode in episodes]
+
+
+def test_several_episodes_are_examined_under_the_names_that_the_family_loads():
+    episodes = [make_episode({}, agent=agent, start=0, seed=1) for agent in ("good", "pupil")]
+    assert UserFamily(Examiner(), "sim:make", ALIASES).examine_together(episodes, 3) == [("agent0", 3), ("pupil", 3)]
+    assert UserFamily(Examiner(), "sim:make").examine_together(episodes, 3) == [("good", 3), ("pupil", 3)]
+    assert not hasattr(UserFamily(Wobbly(), "sim:make", ALIASES), "examine_together")
+
+
+@pytest.fixture
+def aliased(make_study):
+    """A study whose target calls its agents a0, a1, …"""
+
+    def make(table=TABLE, **changes):
+        target = make_study("plain") / "target.csv"
+        folder = make_study("aliased", agents=table, **changes)
+        (folder / "target.csv").write_text(target.read_text().replace("agent", "a").replace("a,", "agent,", 1))
+        return folder
+
+    return make
+
+
+@pytest.mark.slow
+def test_a_study_with_aliases_is_the_study_without_but_for_the_names(aliased, make_study):
+    folder = aliased()
+    named, plain = run_study(folder), run_study(make_study("plain"))
+    assert [trial.score for trial in named.result.trials] == [trial.score for trial in plain.result.trials]
+    assert named.best.assessment.inputs.agents == tuple(f"a{number}" for number in range(6))
+    with sqlite3.connect(folder / "study.db") as db:
+        assert {agent for (agent,) in db.execute("SELECT agent FROM episodes")} == {f"a{number}" for number in range(6)}
+    assert named.document()["settings"]["aliases"]["a3"] == "agent3"
+
+
+def test_another_agent_behind_an_alias_is_another_study(aliased):
+    folder = aliased(budget="5")
+    run_study(folder)
+    changed = aliased(TABLE.replace('a5 = "agent5"', 'a5 = "agent0"'), budget="5")
+    with pytest.raises(SettingsError, match=r'changed since the first trial: agents.a5 \(was "agent5"\); put it back'):
+        run_study(changed)
+
+
+def test_facts_of_a_study_without_aliases_are_what_they_were(make_study):
+    known = study_facts(open_study(make_study()))
+    assert known["agents"] == [f"agent{number}" for number in range(6)]
+    assert not any(key.startswith("agents.") for key in known)
+
+
+def test_an_unknown_agent_behind_an_alias_is_told_with_its_key(aliased):
+    with pytest.raises(InputError, match=r"study.toml: agents.a5: no agent 'agnet5'; did you mean 'agent5'"):
+        open_study(aliased(TABLE.replace('"agent5"', '"agnet5"')))
+    with pytest.raises(InputError, match=r"agents.a5: must be text in quotes, got 5"):
+        open_study(aliased(TABLE.replace('"agent5"', "5")))
+
+
+def test_measuring_and_driving_know_the_aliases(aliased, tmp_path, capsys):
+    folder = aliased()
+    (tmp_path / "model.toml").write_text("trim = 0.1\n")
+    assert (
+        main(["measure", str(folder), "--model", str(tmp_path / "model.toml"), "--output", str(tmp_path / "t.csv")])
+        == 0
+    )
+    assert (tmp_path / "t.csv").read_text().splitlines()[1].startswith("a0,0,")
+    assert drive(folder, "a3").scores == drive(folder, "agent3").scores

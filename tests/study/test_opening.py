@@ -1,0 +1,323 @@
+"""A study's objective is a measure that it names: PRPV, PPV, or one of one's own; anything else is refused.
+
+The target's table as people have it: in several files, with names of its own.
+"""
+
+import numpy as np
+import pytest
+
+from proxytune.errors import InputError, SettingsError
+from proxytune.report.study.usefulness_table import objective_rows, usefulness_rows
+from proxytune.search import make_proposer
+from proxytune.storage import Store
+from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_confirmation, run_study, study_facts
+from proxytune.study.opening import changes
+
+OWN = """
+import numpy as np
+from proxytune import Measure
+
+def nearness(proxy, target, metrics):
+    return -np.abs(proxy - target).max(axis=(-2, -1))
+
+NEARNESS = Measure(key="nearness", name="nearness", title="largest error of a mean, less than 0", better="higher",
+                   meaning="up to 0", digits=".3g", on_means=nearness)
+"""
+
+
+def run(folder, engine):
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer(engine, study.settings.initial, goal_of(study_run)))
+        return study_run, result_of(study_run)
+
+
+@pytest.fixture
+def own(make_study):
+    """A study that makes its own measure large."""
+
+    def make(**changes):
+        folder = make_study(objective='"mine:NEARNESS"', **changes)
+        (folder / "mine.py").write_text(OWN)
+        return folder
+
+    return make
+
+
+@pytest.mark.parametrize("engine", ["gp", "outcomes"])
+def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, engine):
+    study_run, result = run(own(engine=f'"{engine}"'), engine)
+    values = [trial.measures["mine:NEARNESS"] for trial in result.trials]
+    assert [trial.score for trial in result.trials] == [-value for value in values]
+    for trial, value in zip(result.trials, values, strict=True):
+        proxy = study_run.evaluation_of(trial).proxy.arrange(agents=study_run.study.target.agents)
+        assert (
+            value
+            == -np.abs(proxy.select(study_run.study.target.metrics[:2]).means - study_run.study.target.means).max()
+        )
+    assert max(values[5:]) > max(values[:5]), "the search gets nearer than its design"
+    assert all(set(trial.measures) == {"mine:NEARNESS", "prpv", "ppv"} for trial in result.trials)
+
+
+def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
+    folder = own(confirm="1")
+    study_run, _ = run(folder, "gp")
+    with Store.open(folder) as store:
+        again = StudyRun(study_run.study, store)
+        run_confirmation(again)
+        result = result_of(again)
+    searched, fresh = objective_rows(result)
+    best = result.best.trial.measures["mine:NEARNESS"]
+    assert searched[:2] == ("nearness", f"{best:.4g}")
+    assert fresh[1] == f"{-result.confirmation.answer.scores[0]:.4g}"
+    assert usefulness_rows(result)[0] == searched
+
+
+def test_ppv_is_an_objective_too(make_study):
+    _, result = run(make_study(objective='"ppv"'), "gp")
+    assert [trial.score for trial in result.trials] == [trial.ppv for trial in result.trials]
+
+
+def test_no_trial_is_cut_off_by_another_objective_than_prpv(own):
+    _, result = run(own(cut_off="true", budget="9"), "gp")
+    assert {trial.state for trial in result.trials} == {"finished"}
+
+
+def test_another_objective_is_another_study(own, make_study):
+    folder = own()
+    run(folder, "gp")
+    make_study(objective='"prpv"')
+    with pytest.raises(SettingsError, match="changed since the first trial: objective"):
+        run(folder, "gp")
+
+
+def test_a_study_of_learning_value_is_narrowed_by_prpv(make_study):
+    assert open_study(make_study(objective='"plv"')).objective == PRPV
+
+
+BAD = {
+    "no such measure": ('"prvp"', "objective: unknown measure 'prvp' .*; did you mean 'prpv'"),
+    "one value per metric": ('"srcc"', "objective: unknown measure 'srcc' .*; known are: plv, ppv, prpv"),
+    "no such name in the module": ('"mine:OTHER"', "measure 'mine:OTHER': mine has no 'OTHER'"),
+    "no measure": ('"mine:np"', "measure 'mine:np' is a module; make it a proxytune.Measure"),
+    "no such module": ('"nowhere:X"', "measure 'nowhere:X': no module 'nowhere'"),
+}
+
+
+ENGINES = {
+    "an unknown engine": ('"tpr"', "engine: unknown engine 'tpr' .*; did you mean 'tpe'"),
+    "an engine for comparison only": ('"skopt"', "engine: 'skopt' is for `compare` only; known are: composite, gp"),
+    "no engine": ('"mine:nearness"', "engine 'mine:nearness' is a function; make it a proxytune"),
+}
+
+
+@pytest.mark.parametrize(
+    ("key", "case"), [*(("objective", case) for case in BAD), *(("engine", case) for case in ENGINES)]
+)
+def test_what_is_no_objective_or_engine_of_a_study_is_one_line_with_file_and_key(make_study, key, case):
+    name, expected = {"objective": BAD, "engine": ENGINES}[key][case]
+    folder = make_study(**{key: name})
+    (folder / "mine.py").write_text(OWN)
+    with pytest.raises(SettingsError, match=expected) as caught:
+        open_study(folder)
+    assert f"study.toml: {key}: " in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+WRONG = {
+    "np.abs(proxy - target).mean(axis=-1)": r"gives values \(4, 3\) of means \(4, 3, 2\); give one for each table",
+    "1 / 0": r"raised Zero.*: division by zero \(mine.py, line 7\) for means \(4, 3, 2\) against \(3, 2\); correct it",
+    "'high'": "raised ValueError: could not convert string to float",
+}
+
+
+@pytest.mark.parametrize("formula", WRONG)
+def test_what_a_measure_of_one_s_own_does_wrong_is_told_with_file_and_key_before_any_episode(make_study, formula):
+    folder = make_study(objective='"mine:WRONG"')
+    (folder / "mine.py").write_text(
+        "import numpy as np\n\nfrom proxytune import Measure\n\n\n"
+        f"def wrong(proxy, target, metrics):\n    return {formula}\n\n\n"
+        'WRONG = Measure("wrong", "Wrong", "wrong", "lower", "", ".2f", on_means=wrong)\n'
+    )
+    with pytest.raises(SettingsError, match=f"study.toml: objective: measure 'mine:WRONG' {WRONG[formula]}") as told:
+        open_study(folder)
+    assert "\n" not in str(told.value)
+
+
+STUDY_OPENING_BAD = {
+    "all agents but one are missing": (
+        lambda text: "\n".join(line for line in text.splitlines() if line.startswith(("agent,", "agent4"))),
+        "target.csv: has no scores of agent0, agent1, agent2, agent3, agent5; add them, or take them out of the study",
+    ),
+    "a value is NaN": (lambda text: text.replace("agent2,1,", "agent2,1,nan,#"), "line"),
+    "a metric is missing": (lambda text: text.replace("survival_time", "survival"), "no column 'survival_time'"),
+    "it is empty": (lambda text: "", "target.csv: is empty"),
+}
+
+
+@pytest.mark.parametrize("case", STUDY_OPENING_BAD)
+def test_a_target_that_does_not_fit_is_refused_in_one_line(make_study, case):
+    edit, expected = STUDY_OPENING_BAD[case]
+    target = make_study() / "target.csv"
+    target.write_text(edit(target.read_text()))
+    with pytest.raises(InputError) as told:
+        open_study(target.parent)
+    assert expected in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_a_missing_target_is_named(make_study):
+    folder = make_study(target='"nowhere.csv"')
+    with pytest.raises(InputError, match=r"nowhere\.csv: no such file"):
+        open_study(folder)
+
+
+def test_agents_of_the_target_that_are_not_in_the_study_do_not_count(make_study):
+    folder = make_study(agents='["agent5", "agent1"]')
+    with open(folder / "target.csv", "a") as target:
+        target.write("agent77,only_its_own,1.0,2.0\n")
+    study = open_study(folder)
+    assert study.target.agents == ("agent5", "agent1")
+    assert study.target.episodes == ("0", "1", "2")
+    assert study.target.complete
+
+
+def test_the_engine_is_a_fact_but_that_of_before_there_was_a_choice_goes_without_saying(make_study):
+    """Trials of then stay valid."""
+    before, other = study_facts(open_study(make_study())), study_facts(open_study(make_study(engine=None)))
+    assert "engine" not in before
+    assert changes(before, other) == ['engine (was "gp")']
+    assert changes(other, before) == ['engine (was "outcomes")']
+
+
+def test_what_the_search_learns_from_is_a_fact(make_study):
+    """Of an engine that learns from outputs these are the whole table and the pre-flight's noise."""
+    target = make_study() / "target.csv"
+    alone = {"metrics": '["survival_time:max"]', "engine": '"outcomes"'}
+    plain = study_facts(open_study(make_study(**alone)))
+    assert changes(plain, study_facts(open_study(make_study(preflight="true", **alone)))) == ["preflight (was false)"]
+    by_score = {**alone, "engine": '"gp"'}
+    score = study_facts(open_study(make_study(**by_score)))
+    target.write_text(target.read_text().replace("agent2,1,", "agent2,1,9"))
+    assert changes(plain, study_facts(open_study(make_study(**alone)))) == ["target (its contents)"]
+    assert study_facts(open_study(make_study(**by_score))) == score
+
+
+def test_rules_to_stop_are_no_facts(make_study):
+    plain = study_facts(open_study(make_study()))
+    assert study_facts(open_study(make_study(stop="{ wall_time_s = 5, no_improvement = 0.1 }"))) == plain
+
+
+def test_the_order_of_agents_and_lines_is_no_fact(make_study):
+    one = study_facts(open_study(make_study()))
+    agents = '["agent5", "agent4", "agent3", "agent2", "agent1", "agent0"]'
+    metrics = '["survival_time:max", "distance:max"]'
+    other = study_facts(open_study(make_study(agents=agents, metrics=metrics)))
+    assert one == other
+    assert changes(one, other) == []
+
+
+def test_agents_that_the_target_lacks_are_left_out_and_named(finished):
+    target = finished / "target.csv"
+    kept = [line for line in target.read_text().splitlines() if not line.startswith(("agent4", "agent5"))]
+    target.write_text("\n".join(kept) + "\n")
+    study = open_study(finished)
+    assert study.settings.agents == study.target.agents == ("agent0", "agent1", "agent2", "agent3")
+    with Store.read(finished) as store:
+        cautions = result_of(StudyRun(study, store)).cautions
+    assert "the target has no scores of agent4, agent5: left out" in cautions
+
+
+def test_the_truth_is_read_but_nothing_depends_on_it(make_study):
+    plain = open_study(make_study())
+    (make_study() / "truth.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n')
+    told = open_study(make_study(truth='"truth.toml"'))
+    assert (plain.truth, told.truth) == (None, {"trim": 0.1})
+    assert study_facts(plain) == study_facts(told)
+    with pytest.raises(InputError, match="truth: no such file"):
+        open_study(make_study(truth='"untruth.toml"'))
+
+
+def test_of_a_target_with_more_starts_the_study_s_own_are_compared(make_study):
+    """So that both sides drive from the same starts; where it lacks one of them, all its episodes count."""
+    whole = open_study(make_study())
+    fewer = open_study(make_study(starts="2"))
+    assert (whole.target.episodes, fewer.target.episodes) == (("0", "1", "2"), ("0", "1"))
+    assert fewer.target.means.tolist() == whole.target.values[:, :2].mean(axis=1).tolist()
+    assert open_study(make_study(starts="5")).target.episodes == ("0", "1", "2")
+
+
+HEAD = "agent,episode,distance,survival_time"
+
+
+@pytest.fixture
+def rows(make_study):
+    """The rows of the target of a study, which is there from now on."""
+    return (make_study() / "target.csv").read_text().splitlines()[1:]
+
+
+def write(folder, **files):
+    for name, lines in files.items():
+        (folder / f"{name}.csv").write_text("\n".join(lines) + "\n")
+
+
+def test_a_target_in_several_files_is_the_one_that_it_would_be_in_one(make_study, rows):
+    whole = open_study(make_study())
+    folder = make_study(target='["monday.csv", "tuesday.csv"]')
+    write(folder, monday=[HEAD, *rows[:7]], tuesday=[HEAD, *rows[7:]])
+    assert study_facts(open_study(folder)) == study_facts(whole)
+
+
+def test_an_episode_in_two_files_is_refused_with_both(make_study, rows):
+    folder = make_study(target='["monday.csv", "tuesday.csv"]')
+    write(folder, monday=[HEAD, *rows], tuesday=[HEAD, rows[0]])
+    with pytest.raises(InputError, match=r"tuesday.csv: line 2: agent 'agent0' has episode '0' twice, once in .*mon"):
+        open_study(folder)
+
+
+def test_columns_have_the_target_s_own_names(make_study, rows):
+    whole = open_study(make_study())
+    columns = '{ agent = "policy", episode = "trial", distance = "dist_m" }'
+    folder = make_study(target='"real.csv"', target_columns=columns)
+    european = [row.replace(",", ";").replace(".", ",") for row in rows]
+    write(folder, real=["policy;trial;dist_m;survival_time", *european])
+    assert study_facts(open_study(folder)) == study_facts(whole)
+    make_study(target='"real.csv"', target_columns='{ agent = "polcy" }')
+    with pytest.raises(InputError, match="no column 'agent'; columns found: policy, trial, dist_m, survival_time"):
+        open_study(folder)
+
+
+@pytest.mark.parametrize(
+    ("target", "complaint"), [("[]", "target: must be text"), ("3", "target: must be text"), ("[3]", "list of texts")]
+)
+def test_a_target_of_another_kind_is_refused(make_study, target, complaint):
+    with pytest.raises(InputError, match=complaint):
+        open_study(make_study(target=target))
+
+
+def test_agents_that_are_on_one_side_only_are_named_on_either(make_study, rows):
+    folder = make_study(target='"real.csv"')
+    write(folder, real=[HEAD, *(row for row in rows if "agent5" not in row), "human,0,1,2", "human,1,1,2"])
+    study = open_study(folder)
+    assert study.settings.agents == tuple(f"agent{number}" for number in range(5))
+    assert study.cautions[:2] == (
+        "the target has no scores of agent5: left out",
+        "the target has scores of human, no agents of this study: left out",
+    )
+
+
+def test_where_no_name_agrees_a_table_of_names_is_the_remedy(make_study, rows):
+    folder = make_study(target='"real.csv"')
+    write(folder, real=[HEAD, *(row.replace("agent", "a") for row in rows)])
+    with pytest.raises(InputError, match=r"its agents are a0, a1.*by a table \[agents\] in study.toml: a0 = 'agent0'"):
+        open_study(folder)
+
+
+def test_episodes_that_are_no_starts_of_the_study_are_left_out_and_that_is_said(make_study, rows):
+    folder = make_study(target='"real.csv"')
+    write(folder, real=[HEAD, *rows, *(f"agent{number},17,1,2" for number in range(6))])
+    study = open_study(folder)
+    assert "17" not in study.target.episodes
+    (line,) = [one for one in study.cautions if "taken for this study's starts" in one]
+    assert "and 1 of others are left out; raise starts to use them" in line

@@ -1,0 +1,287 @@
+"""[families] in a study.toml: the same study of several domain families, each in a folder of its own."""
+
+import pytest
+from several import make_several
+
+from proxytune.errors import SettingsError
+from proxytune.study import as_document, open_settings, open_study, read_study_settings
+from proxytune.study.settings import DEFAULT_FAMILY, StopRules, unnoticed
+
+OTHER = '[families.own]\n[families.other]\nfamily = "schoolroom:schoolroom"\n[families.other.domain]\nblocked = 0.1\n'
+
+
+def test_a_family_is_the_study_with_what_its_table_says(make_study):
+    own = '[families.a]\n[families.b]\nproxy = "wrong.toml"\n[families.b.domain]\nsleep = 0.5\n'
+    folder = make_several(
+        make_study, families=own + "[families.b.parameters]\ndelay = [0.1, 0.2]\n", domain={"version": '"2"'}
+    )
+    study = read_study_settings(folder)
+    a, b = study.families["a"], study.families["b"]
+    assert (study.home, a.home, b.home) == (folder, folder / "families" / "a", folder / "families" / "b")
+    assert (a.name, b.name, a.folder) == ("wobbly_a", "wobbly_b", folder)
+    assert dict(a.domain) == {"version": "2"}
+    assert dict(b.domain) == {"version": "2", "sleep": 0.5}
+    assert (a.space.names, b.space.names) == (("trim",), ("delay",))
+    assert (a.proxy, b.proxy) == (None, folder / "wrong.toml")
+    assert (a.seed, a.agents, a.targets, a.stop) == (study.seed, study.agents, study.targets, study.stop)
+
+
+def test_another_domain_family_knows_nothing_of_the_studys_domain_proxy_and_truth(make_study):
+    changes = {"proxy": '"right.toml"', "truth": '"right.toml"', "domain": {"sleep": "0.0"}}
+    study = read_study_settings(make_several(make_study, families=OTHER, **changes))
+    own, other = study.families["own"], study.families["other"]
+    assert (dict(own.domain), own.proxy is None, own.truth is None) == ({"sleep": 0.0}, False, False)
+    assert (dict(other.domain), other.proxy, other.truth) == ({"blocked": 0.1}, None, None)
+
+
+@pytest.mark.parametrize(
+    ("families", "says"),
+    [
+        ("[families]\n", "families: comparing takes at least two families, got 0; add one, as in [families.planar]"),
+        ("[families.a]\n", "families: comparing takes at least two families, got 1"),
+        ("[families]\na = 3\nb = 4\n", "families.a: must be a table, written [families.a], got 3"),
+        ('[families."../up"]\n[families.b]\n', "families.../up: is the name of a folder too; use up to 64 letters"),
+        ('[families."a b"]\n[families.b]\n', "families.a b: is the name of a folder too"),
+        ('[families.""]\n[families.b]\n', "families.: is the name of a folder too"),
+        (f"[families.{'a' * 65}]\n[families.b]\n", "is the name of a folder too"),
+        ("[families.a]\n[families.A]\n", "families: two names differ in nothing but capitals"),
+        ("[families.a]\nplant = 1\n[families.b]\n", "families.a.plant: unknown key; known are: domain, family"),
+        ("[families.a]\ndomain = 3\n[families.b]\n", "families.a.domain: must be a table"),
+        ("[families.a]\nfamily = 3\n[families.b]\n", "families.a.family: must be text in quotes, got 3"),
+        (
+            "[families.a.parameters]\ntrim = 3\n[families.b]\n",
+            "families.a: parameters.trim: must be [low, high]",
+        ),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_told_with_its_name(make_study, families, says):
+    folder = make_several(make_study, families=families)
+    with pytest.raises(SettingsError) as told:
+        read_study_settings(folder)
+    assert says in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"seconds": None}, "stop.wall_time_s: is missing; it is the time that each of families is tuned in [s]"),
+        ({"seconds": 0.0}, "stop.wall_time_s: must be above 0, got 0"),
+        ({"seconds": -3}, "stop.wall_time_s: must be above 0, got -3"),
+        ({"confirm": "0"}, "confirm: is 0, and families are compared by fresh episodes; make it 1 or more"),
+        ({"objective": '"plv"'}, "objective: 'plv' is not for families"),
+    ],
+)
+def test_what_makes_families_incomparable_is_told(make_study, changes, says):
+    with pytest.raises(SettingsError, match="study.toml: ") as told:
+        read_study_settings(make_several(make_study, **changes))
+    assert says in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("families", "says"),
+    [
+        (
+            "[families.a]\n[families.b.domain]\nslep = 1\n",
+            "families.b: domain.slep: unknown key; did you mean 'sleep'?",
+        ),
+        ("[families.a]\n[families.b.parameters]\nblur = [0, 1]\n", "families.b: parameters.blur: unknown parameter"),
+        ('[families.a]\n[families.b]\nfamily = "wobbly:wobly"\n', "families.b: family: family 'wobbly:wobly'"),
+        ('[families.a]\n[families.b]\nproxy = "no.toml"\n', "families.b: proxy: no such file"),
+        ('[families.a]\n[families.b]\nfamily = "few:few"\n', "families.b: agents: no agent 'agent5'"),
+    ],
+)
+def test_what_one_family_cannot_do_is_told_with_its_name(make_study, families, says):
+    folder = make_several(make_study, families=families)
+    (folder / "few.py").write_text(FEW)
+    with pytest.raises(SettingsError) as told:
+        for one in read_study_settings(folder).families.values():
+            open_settings(one)
+    assert says in str(told.value)
+
+
+FEW = """
+from proxytune.errors import SettingsError
+from wobbly import Wobbly
+
+class Few(Wobbly):
+    def check_agent(self, name):
+        if name == "agent5":
+            raise SettingsError("no agent 'agent5'; take it out")
+
+def few(domain, *, model):
+    return Few()
+"""
+
+
+def test_the_folder_of_a_family_names_its_study_before_and_after_it_is_made(make_study, monkeypatch):
+    folder = make_several(make_study)
+    home = folder / "families" / "wrong"
+    assert read_study_settings(home) == read_study_settings(folder).families["wrong"]
+    home.mkdir(parents=True)
+    assert read_study_settings(home) == read_study_settings(folder).families["wrong"]
+    monkeypatch.chdir(home)
+    assert open_study(home.relative_to(home)).settings.family_name == "wrong"
+    with pytest.raises(SettingsError, match="families: has no 'rong', as .*rong is called; did you mean 'wrong'"):
+        read_study_settings(folder / "families" / "rong")
+
+
+def test_a_study_in_a_folder_of_that_name_is_a_study_of_its_own(make_study, tmp_path):
+    make_several(make_study)
+    (tmp_path / "study" / "families").mkdir()
+    inner = make_study("study/families/right")
+    assert read_study_settings(inner).family_name == ""
+    assert read_study_settings(inner).home == inner
+
+
+def test_where_one_study_is_needed_several_are_refused_with_what_to_give(make_study):
+    folder = make_several(make_study)
+    with pytest.raises(SettingsError, match=f"one is needed; give one, as {folder / 'families' / 'right'}"):
+        open_study(folder)
+
+
+def test_a_study_is_given_as_its_folder_or_its_file(make_study):
+    folder = make_study()
+    assert read_study_settings(folder) == read_study_settings(folder / "study.toml")
+
+
+def test_what_is_written_is_what_is_read(make_study):
+    settings = read_study_settings(make_study(jobs="2", batch="9", on_failure='"stop"', proxy='"m.toml"'))
+    assert (settings.name, settings.starts, settings.budget, settings.initial) == ("wobbly", 3, 7, 5)
+    assert (settings.seed, settings.jobs, settings.stop_on_failure) == (1, 2, True)
+    assert [str(metric) for metric in settings.metrics] == ["distance:max", "survival_time:max"]
+    assert settings.target == settings.folder / "target.csv"
+    assert settings.proxy == settings.folder / "m.toml"
+    assert as_document(settings)["batch"] == settings.batch == 9, "more than the budget is fine"
+    assert as_document(settings)["on_failure"] == "stop"
+    assert as_document(settings)["preflight"] is settings.preflight is False
+    assert settings.stop == StopRules()
+
+
+def test_what_may_be_left_out_has_a_default(make_study):
+    left_out = dict.fromkeys(
+        ("name", "family", "initial", "batch", "engine", "seed", "jobs", "preflight", "confirm", "cut_off")
+    )
+    settings = read_study_settings(make_study("mine", **left_out))
+    assert (settings.name, settings.family, settings.proxy) == ("mine", DEFAULT_FAMILY, None)
+    assert settings.batch == 1
+    assert (settings.initial, settings.seed, settings.jobs, settings.stop_on_failure) == (8, 1, 1, False)
+    assert (settings.engine, settings.preflight, settings.confirm, settings.cut_off) == ("outcomes", True, 1, True)
+
+
+def test_of_learning_value_nothing_is_known_but_the_score_so_its_default_engine_is_that_of_scores(make_study):
+    assert read_study_settings(make_study("plv", objective='"plv"', engine=None)).engine == "gp"
+
+
+def test_rules_to_stop_are_read_each_on_its_own(make_study):
+    settings = read_study_settings(make_study(stop="{ wall_time_s = 60 }"))
+    assert settings.stop == StopRules(wall_time_s=60.0)
+    settings = read_study_settings(make_study(stop="{ no_improvement = 0.2 }"))
+    assert settings.stop == StopRules(no_improvement=0.2)
+    assert as_document(settings)["stop"] == {"no_improvement": 0.2}
+
+
+@pytest.mark.parametrize("engine", ["gp", "composite", "random", "sobol", "tpe"])
+def test_a_study_names_its_engine(make_study, engine):
+    assert as_document(read_study_settings(make_study(engine=f'"{engine}"')))["engine"] == engine
+
+
+def test_the_box_does_not_depend_on_the_order_of_its_lines(make_study):
+    one = read_study_settings(make_study(parameters={"trim": "[-0.3, 0.3]", "delay": "[0, 0.3]"}))
+    other = read_study_settings(make_study(parameters={"delay": "[0, 0.3]", "trim": "[-0.3, 0.3]"}))
+    assert one.space == other.space
+
+
+BAD = {
+    "an unknown key": ({"bugdet": "5"}, "bugdet: unknown key; did you mean 'budget'?"),
+    "a missing key": ({"budget": None}, "budget: is missing"),
+    "a missing target": ({"target": None}, "target: is missing"),
+    "a number as text": ({"budget": '"many"'}, "budget: must be a whole number, got 'many'"),
+    "a fraction": ({"starts": "2.5"}, "starts: must be a whole number"),
+    "no budget": ({"budget": "0"}, "budget: must be between 1 and"),
+    "no start": ({"starts": "0"}, "starts: must be between 1 and"),
+    "no trial at all in a batch": ({"batch": "0"}, "batch: must be between 1 and"),
+    "half a trial more in a batch": ({"batch": "1.5"}, "batch: must be a whole number"),
+    "no job": ({"jobs": "0"}, "jobs: must be between 1 and"),
+    "a negative seed": ({"seed": "-1"}, "seed: must be between 0 and"),
+    "one agent": ({"agents": '["agent0"]'}, "agents: comparing takes at least two agents, got 1"),
+    "an agent twice": ({"agents": '["agent0", "agent0"]'}, "agents: names something twice"),
+    "agents as a text": ({"agents": '"agent0"'}, "agents: must be a list of texts"),
+    "no metric": ({"metrics": "[]"}, "metrics: is empty"),
+    "a metric without direction": ({"metrics": '["distance"]'}, "metrics: metric 'distance': write NAME:max"),
+    "a metric twice": ({"metrics": '["distance:max", "distance:min"]'}, "metrics: names a metric twice"),
+    "an unknown rule": ({"on_failure": '"stopp"'}, "on_failure: unknown value 'stopp'; did you mean 'stop'?"),
+    "an unknown rule to stop": (
+        {"stop": "{ wall_time = 5 }"},
+        "stop.wall_time: unknown key; did you mean 'wall_time_s'",
+    ),
+    "no time at all": ({"stop": "{ wall_time_s = 0 }"}, "stop.wall_time_s: must be above 0, got 0; remove it"),
+    "a negative gain": ({"stop": "{ no_improvement = -1 }"}, "stop.no_improvement: must be above 0, got -1"),
+    "a word for a flag": ({"preflight": '"no"'}, "preflight: must be true or false, without quotes, got 'no'"),
+    "less than no repetition": ({"confirm": "-1"}, "confirm: must be between 0 and 1000, got -1"),
+    "stop as a number": ({"stop": "5"}, "stop: must be a table"),
+    "no format": ({"format": None}, "format: is missing"),
+    "a later format": ({"format": "2"}, "format: this proxytune reads up to 1; install a newer one"),
+    "no parameters": ({"parameters": {}}, "parameters: is missing"),
+    "bounds reversed": ({"parameters": {"trim": "[0.3, -0.3]"}}, "parameters.trim: the lower bound must be below"),
+    "bounds equal": ({"parameters": {"trim": "[0.3, 0.3]"}}, "parameters.trim: the lower bound must be below"),
+    "one bound": ({"parameters": {"trim": "[0.3]"}}, "parameters.trim: must be [low, high]"),
+    "a NaN bound": ({"parameters": {"trim": "[nan, 0.3]"}}, "parameters.trim: bounds must be finite"),
+    "an infinite bound": ({"parameters": {"trim": "[0, inf]"}}, "parameters.trim: bounds must be finite"),
+    "a bound as text": ({"parameters": {"trim": '["a", 1]'}}, "parameters.trim: must be [low, high]"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_every_mistake_gets_one_line_with_file_and_key(make_study, case):
+    changes, expected = BAD[case]
+    folder = make_study(**changes)
+    with pytest.raises(SettingsError) as told:
+        read_study_settings(folder)
+    assert str(told.value).startswith(f"{folder / 'study.toml'}: ")
+    assert expected in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(SettingsError, match=r"study\.toml: no such file"):
+        read_study_settings(tmp_path)
+
+
+def test_a_file_that_is_not_toml_is_told_with_its_line(tmp_path):
+    (tmp_path / "study.toml").write_text("format = 1\nbudget = = 3\n")
+    with pytest.raises(SettingsError, match=r"is not valid TOML: .*line 2"):
+        read_study_settings(tmp_path)
+
+
+def put(folder, *names):
+    for name in names:
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(b"1")
+
+
+def test_weights_beside_modules_are_named_in_one_line(make_study):
+    folder = make_study()
+    put(folder, "mine.py", "net.ONNX", "pack/weights.npz")
+    (caution,) = open_study(folder).cautions
+    assert caution.startswith("net.ONNX, pack/weights.npz: if agents read this, a change in it is not noticed; ")
+    assert "\n" not in caution
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("net.pt",),
+        ("mine.py", "target.csv", "notes.txt"),
+        ("mine.py", "teaching/exam-1.npz", "rescored/a.npz"),
+        ("mine.py", ".hidden.npz"),
+    ],
+)
+def test_nothing_is_said_where_no_module_could_read_weights_or_there_are_none(tmp_path, names):
+    put(tmp_path, *names)
+    assert unnoticed(tmp_path) == ()
+
+
+def test_of_many_files_only_some_are_named(tmp_path):
+    put(tmp_path, "mine.py", *(f"net{number}.pt" for number in range(5)))
+    assert unnoticed(tmp_path)[0].startswith("net0.pt, net1.pt, net2.pt and 2 more: ")

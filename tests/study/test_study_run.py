@@ -1,0 +1,500 @@
+"""Several θ are tried together; what comes of it depends on how many, and on nothing else.
+
+Another budget or other jobs than study.toml says, and nothing else.
+"""
+
+import sqlite3
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from partly_dead import ordered_study
+from processes import episodes as stored_episodes
+from stopping import Stopping
+from taught import make_taught
+from telling import Telling
+
+from proxytune.domain import Outcome
+from proxytune.errors import EpisodeError, InputError, SettingsError
+from proxytune.running import Silent
+from proxytune.search import STUDY_ENGINES, make_proposer, propose_batch
+from proxytune.seeds import episode_seed
+from proxytune.storage import Store, TrialRecord
+from proxytune.study import (
+    StudyRun,
+    goal_of,
+    measure,
+    open_study,
+    plan,
+    read_study_settings,
+    run_study,
+    score,
+    study_facts,
+    with_spending,
+)
+from proxytune.study.pruning import reference, stopped
+from proxytune.study.settings import StopRules
+from proxytune.study.study_run import longest_first
+from proxytune.usefulness.noise import noise_floor
+from proxytune.usefulness.pairs import prpv
+from proxytune.usefulness.predictivity import ppv
+
+BATCH = 3
+KEYS = {"batch": str(BATCH), "seed": "4", "engine": '"gp"'}
+"""Of a study two trials of one batch of which are cut off."""
+
+
+def changed(folder, **changes):
+    study = open_study(folder)
+    return replace(study, settings=replace(study.settings, **changes))
+
+
+def run(folder, watcher=None, **changes):
+    """What it cost, and the trials."""
+    study = changed(folder, **changes)
+    with Store.open(folder) as store:
+        proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
+        study_run = StudyRun(study, store, watcher or Silent())
+        run_study(study_run, proposer)
+        return study_run.spent, store.trials()
+
+
+@pytest.fixture(scope="module")
+def cutting(make_studies):
+    """A study in batches, trials cut off, run with one job: its folder, what it cost and its trials."""
+    folder = ordered_study(make_studies, "whole", **KEYS)
+    return folder, *run(folder)
+
+
+def test_the_thetas_of_a_batch_follow_from_the_trials_before_it(make_study):
+    folder = make_study(batch=str(BATCH), budget="10", engine='"gp"')
+    _, trials = run(folder)
+    study = open_study(folder)
+    with Store.read(folder) as store:
+        told = [StudyRun(study, store).search_trial(trial) for trial in trials]
+    for base, count in ((0, 3), (3, 2), (5, 3), (8, 2)):
+        made = propose_batch(make_proposer("gp", 5), study.settings.space, told[:base], 1, count)
+        assert made == tuple(trial.values for trial in told[base : base + count])
+    assert [trial.number for trial in trials] == list(range(1, 11))
+    assert len({tuple(trial.theta.items()) for trial in trials}) == 10
+
+
+@pytest.mark.slow
+def test_two_jobs_cut_off_the_same_trials_of_a_batch_at_the_same_agents_as_one(make_study, cutting):
+    _, one, expected = cutting
+    two, trials = run(ordered_study(make_study, **KEYS, jobs="2"))
+    assert trials == expected
+    assert sum(trial.state == "cut" for trial in trials[5:8]) > 1, "of the first batch of the engine"
+    assert two.episodes - two.unused == one.episodes
+    assert one.unused == 0
+
+
+def test_each_trial_of_a_batch_is_held_against_the_trials_before_the_batch_by_its_own_agents(cutting):
+    folder, _, trials = cutting
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        for trial in (trial for trial in trials if trial.state == "cut"):
+            base = 5 + (trial.number - 6) // BATCH * BATCH
+            against = reference(StudyRun(study, store), trials[:base])
+            assert trial.decided == against.order[: len(trial.decided)]
+            StudyRun(study, store).evaluate(trial.theta, "")
+            assert StudyRun(study, store).evaluation(trial.theta).prpv >= trial.bound > against.limit
+
+
+@pytest.mark.parametrize("first", [1, 4, 6, 9])
+def test_a_budget_raised_within_a_batch_gives_the_trials_of_one_that_was_so_from_the_start(make_study, cutting, first):
+    folder = ordered_study(make_study, "raised", **KEYS)
+    assert len(run(folder, budget=first)[1]) == first
+    assert run(folder)[1] == cutting[2]
+
+
+def test_a_budget_lowered_within_an_open_batch_and_raised_again_changes_nothing(make_study, cutting):
+    folder = ordered_study(make_study, "lowered", **KEYS)
+    with pytest.raises(KeyboardInterrupt):
+        run(folder, Stopping(5 * 24 + 7))
+    _, trials = run(folder, budget=6)
+    assert [trial.state == "open" for trial in trials] == [False] * 6 + [True] * 2
+    assert run(folder)[1] == cutting[2]
+
+
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_episode_twice(make_study, cutting, jobs):
+    folder = ordered_study(make_study, "stopped", **KEYS, jobs=str(jobs))
+    run_before = 0
+    for moment, open_ones in ((30, 3), (50, 2), (60, 3), (8, 3)):
+        with pytest.raises(KeyboardInterrupt):
+            run(folder, Stopping(moment))
+        run_before += moment
+        with Store.read(folder) as store:
+            assert sum(trial.state == "open" for trial in store.trials()) == open_ones
+    spent, trials = run(folder)
+    assert trials == cutting[2]
+    assert spent.episodes - spent.unused <= cutting[1].episodes - run_before + (jobs > 1) * 9
+    assert len(stored_episodes(folder)) == spent.episodes + run_before
+
+
+@pytest.mark.parametrize("engine", STUDY_ENGINES)
+def test_with_every_engine_an_interrupted_batch_goes_on_to_the_same_trials(make_study, engine):
+    if engine == "tpe":
+        pytest.importorskip("optuna")
+    keys = {"engine": f'"{engine}"', "batch": "2", "initial": "3"}
+    _, whole = run(make_study("whole", **keys))
+    for episodes in (60, 20):
+        with pytest.raises(KeyboardInterrupt):
+            run(make_study("stopped", **keys), Stopping(episodes))
+    assert run(make_study("stopped", **keys))[1] == whole
+
+
+def test_a_batch_beyond_the_budget_is_cut_short_by_it(make_study):
+    _, trials = run(make_study(batch="100"))
+    assert [trial.state for trial in trials] == ["finished"] * 7
+
+
+def test_rules_to_stop_are_asked_where_a_batch_has_ended(make_study):
+    """The same rule stops a study by one trial at a time after its first."""
+    folder = make_study(batch=str(BATCH))
+    hurried = {"stop": StopRules(wall_time_s=1e-9)}
+    assert len(run(folder, **hurried)[1]) == BATCH
+    assert len(run(folder, **hurried)[1]) == BATCH
+    _, trials = run(folder, budget=BATCH + 1)
+    study = changed(folder, **hurried)
+    with Store.read(folder) as store:
+        assert stopped(StudyRun(study, store), trials) == ""
+        assert stopped(StudyRun(study, store), trials[:BATCH]).startswith("episodes took")
+
+
+class Listening(Silent):
+    """Keeps what is begun."""
+
+    def __init__(self):
+        self.begun = []
+
+    def begin(self, what, known):
+        self.begun.append(what)
+
+
+def test_what_is_told_of_the_progress_names_the_trials_of_a_batch(make_study):
+    listening = Listening()
+    run(make_study(batch="4", budget="10"), listening)
+    expected = ["trials 1 to 4 of 10", "trial 5 of 10", "trials 6 to 9 of 10", "trial 10 of 10"]
+    assert list(dict.fromkeys(listening.begun)) == expected
+
+
+def test_a_study_from_before_there_were_batches_goes_on_one_trial_at_a_time_and_no_other_way(finished, make_study):
+    """Its study.db says nothing of a batch, and neither does one of today with a batch of one."""
+    assert "batch" not in study_facts(open_study(finished))
+    with sqlite3.connect(finished / "study.db") as plain:
+        assert plain.execute("SELECT count(*) FROM facts WHERE key = 'batch'").fetchone() == (0,)
+    make_study(batch="1", budget="8")
+    assert [trial.number for trial in run(finished)[1]] == list(range(1, 9))
+    make_study(batch="2", budget="8")
+    with pytest.raises(SettingsError, match=r"changed since the first trial: batch \(was 1\)"):
+        run(finished)
+
+
+def test_the_size_of_a_batch_may_not_change_under_way(make_study):
+    run(make_study(batch="2", budget="4"))
+    with pytest.raises(SettingsError, match=r"changed since the first trial: batch \(was 2\)"):
+        run(make_study(budget="4"))
+
+
+THETA = {"trim": 0.05, "delay": 0.1}
+
+
+def simulated(folder, theta=THETA):
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        study_run = StudyRun(study, store)
+        study_run.evaluate(theta, "")
+        spent = study_run.spent
+        return spent, StudyRun(study, store).evaluation(theta)
+
+
+def test_every_agent_drives_from_every_start_under_common_random_numbers(make_study):
+    study = open_study(make_study())
+    here, there = (plan(study.settings, theta, 1) for theta in (THETA, {"trim": 0.2, "delay": 0.0}))
+    assert {(e.agent, e.start) for e in here} == {(a, s) for a in study.settings.agents for s in range(3)}
+    assert [(e.agent, e.start, e.seed) for e in here] == [(e.agent, e.start, e.seed) for e in there]
+    assert {e.seed for e in here if e.start == 2} == {episode_seed(1, 2)}
+    assert len({e.seed for e in here}) == 3
+
+
+def test_seeds_differ_between_studies_and_starts():
+    seeds = {episode_seed(study, start) for study in range(20) for start in range(10)}
+    assert len(seeds) == 200
+
+
+def test_the_score_is_what_the_usefulness_room_says_of_the_tables(make_study):
+    folder = make_study()
+    study = open_study(folder)
+    _, found = simulated(folder)
+    sides = {"proxy": found.proxy, "target": study.target, "metrics": study.settings.metrics}
+    assert found.prpv == prpv(**sides).value > 0
+    assert found.measures["ppv"] == ppv(**sides).value
+    assert found.failures == ()
+
+
+def test_an_episode_that_is_known_is_not_run_again(make_study, tmp_path):
+    folder = make_study(domain={"journal": f'"{tmp_path / "journal"}"'})
+    first, found = simulated(folder)
+    again, same = simulated(folder)
+    assert (first.episodes, again.episodes) == (18, 0)
+    assert (found.prpv, found.measures["ppv"]) == (same.prpv, same.measures["ppv"])
+    assert len((tmp_path / "journal").read_text().splitlines()) == 18
+
+
+def test_an_instance_that_lacks_an_episode_has_no_evaluation_yet(make_study):
+    folder = make_study()
+    simulated(folder)
+    with Store.open(folder) as store:
+        assert StudyRun(open_study(folder), store).evaluation({"trim": 0.0, "delay": 0.0}) is None
+
+
+def test_a_failed_episode_is_left_out_and_none_is_made_up_for_it(make_study):
+    _, found = simulated(make_study(domain={"faults": '["agent3:1:raises", "agent4:0:nan"]'}))
+    assert [(f.episode.agent, f.episode.start) for f in found.failures] == [("agent3", 1), ("agent4", 0)]
+    assert found.prpv is not None
+    row = found.proxy.agents.index("agent3")
+    assert found.proxy.counts[row] == 2
+
+
+def test_an_agent_without_any_episode_that_worked_fails_the_trial_by_name(make_study):
+    _, found = simulated(make_study(domain={"faults": '["agent3:*:raises"]'}))
+    assert (found.prpv, found.score, found.proxy) == (None, None, None)
+    assert found.failure.startswith("agent 'agent3' failed from every start, first with: agent 'agent3' raised")
+
+
+def test_where_failures_stop_the_study_the_first_does_and_is_tried_again_later(make_study, tmp_path):
+    domain = {"faults": '["agent3:1:raises"]', "journal": f'"{tmp_path / "journal"}"'}
+    folder = make_study(domain=domain, on_failure='"stop"')
+    for _ in range(2):
+        with pytest.raises(EpisodeError, match="agent 'agent3' failed from start 1: .*lost its way"):
+            simulated(folder)
+    lines = (tmp_path / "journal").read_text().splitlines()
+    assert sum(line.startswith("agent3 1") for line in lines) == 2
+    assert max(lines.count(line) for line in lines if not line.startswith("agent3 1")) == 1
+
+
+def test_where_they_do_not_a_failure_is_final(make_study, tmp_path):
+    domain = {"faults": '["agent3:1:raises"]', "journal": f'"{tmp_path / "journal"}"'}
+    folder = make_study(domain=domain)
+    simulated(folder)
+    assert simulated(folder)[0].episodes == 0
+
+
+def test_the_longest_episodes_begin_first_and_unknown_ones_before_them(make_study):
+    planned = plan(open_study(make_study()).settings, THETA, 1)[:3]
+    seconds = {(planned[0].agent, planned[0].start): 1.0, (planned[2].agent, planned[2].start): 2.0}
+    assert longest_first(planned, seconds) == [planned[1], planned[2], planned[0]]
+
+
+def test_scoring_does_not_depend_on_the_order_of_the_outcomes(make_study):
+    folder = make_study()
+    study = open_study(folder)
+    outcomes = [Outcome(e, study.family.run(e), "", 0.0) for e in plan(study.settings, THETA, 1)]
+    forth, back = score(study, THETA, outcomes), score(study, THETA, outcomes[::-1])
+    assert (forth.prpv, forth.measures["ppv"]) == (back.prpv, pytest.approx(back.measures["ppv"], abs=1e-12))
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_after_enough_no_further_episode_begins_and_those_under_way_are_kept(make_study, jobs):
+    study = open_study(make_study(jobs=str(jobs)))
+    planned = plan(study.settings, THETA, 1)
+    with Store.open(study.settings.folder) as store:
+        study_run = StudyRun(study, store)
+        known = study_run.outcomes(planned, "", lambda _, known: len(known) >= 5)
+        assert known == study_run.known(planned)
+        assert study_run.spent.episodes == len(known)
+        assert len(known) == 5 if jobs == 1 else len(known) >= 5
+        study_run.outcomes(planned, "", lambda _, known: len(known) >= 5)
+        assert study_run.spent.episodes == len(known)
+        assert list(study_run.outcomes(planned, "")) == planned
+        assert study_run.spent.episodes == len(planned)
+
+
+def test_where_it_may_be_enough_agents_are_driven_in_their_order(make_study, tmp_path):
+    journal = tmp_path / "journal"
+    study = open_study(make_study(domain={"journal": f'"{journal}"'}))
+    planned = plan(study.settings, THETA, 1)[::-1]
+    with Store.open(study.settings.folder) as store:
+        StudyRun(study, store).evaluate({"trim": 0.0, "delay": 0.0}, "")  # tells which episodes take longest
+        journal.unlink()
+        StudyRun(study, store).outcomes(planned, "", lambda _, known: False)
+    driven = [line.split()[0] for line in journal.read_text().splitlines()]
+    assert driven == [episode.agent for episode in planned]
+
+
+def test_where_one_instance_has_enough_the_others_go_on_and_agents_begin_in_all_of_them(make_study, tmp_path):
+    journal = tmp_path / "journal"
+    study = open_study(make_study(domain={"journal": f'"{journal}"'}))
+    plans = [plan(study.settings, {"trim": trim, "delay": 0.1}, 1) for trim in (0.0, 0.1, 0.2)]
+    planned, short = [episode for one in plans for episode in one], plans[1][0].theta
+
+    def enough(instance, known):
+        return instance == short and sum(episode.theta == short for episode in known) >= 7
+
+    with Store.open(study.settings.folder) as store:
+        study_run = StudyRun(study, store)
+        known = study_run.outcomes(planned, "", enough)
+    assert study_run.spent.episodes == 18 + 7 + 18
+    assert [sum(episode in known for episode in one) for one in plans] == [18, 7, 18]
+    driven = [line.split()[0] for line in journal.read_text().splitlines()]
+    assert driven == sorted(driven), "agent after agent, each in all instances"
+
+
+def test_where_failures_stop_the_study_an_old_failure_is_not_enough(make_study):
+    folder = make_study(domain={"faults": '["agent3:1:raises"]'})
+    study = open_study(folder)
+    planned = plan(study.settings, THETA, 1)
+    with Store.open(folder) as store:
+        StudyRun(study, store).outcomes(planned, "")
+        stopping = replace(study, settings=replace(study.settings, stop_on_failure=True))
+        with pytest.raises(EpisodeError, match="agent 'agent3'"):
+            StudyRun(stopping, store).outcomes(planned, "", lambda _, known: len(known) == len(planned))
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text("trim = 0.2\n")
+    return path
+
+
+def test_a_table_has_every_agent_start_and_metric_in_the_study_s_order(make_study, model):
+    settings = read_study_settings(make_study(metrics='["distance:max"]'))
+    table = measure(settings, model, 1001, Silent())
+    assert table.agents == settings.agents
+    assert table.episodes == ("0", "1", "2")
+    assert table.metrics == ("distance", "survival_time")
+    assert table.complete
+
+
+def test_every_agent_is_told_of_once_it_is_measured(make_study, model):
+    watcher = Telling()
+    measure(read_study_settings(make_study(agents='["agent1", "agent0"]')), model, 1001, watcher)
+    assert sorted(watcher.lines) == ["agent agent0 measured", "agent agent1 measured"]
+
+
+def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_study, model):
+    lingering = {"faults": '["agent0:0:lingers"]'}
+    one, two = (read_study_settings(make_study(f"jobs{jobs}", jobs=jobs, domain=lingering)) for jobs in ("1", "2"))
+    table = measure(one, model, 1001, Silent())
+    same = measure(two, model, 1001, Silent())
+    assert (same.agents, same.episodes) == (table.agents, table.episodes)
+    assert (same.values == table.values).all()
+    assert (measure(one, model, 1002, Silent()).values != table.values).all()
+    model.write_text("trim = 0.1\n")
+    assert (measure(one, model, 1001, Silent()).values != table.values).any()
+
+
+def test_repeats_have_noise_of_their_own_and_the_first_is_what_one_alone_would_be(make_study, model):
+    settings = read_study_settings(make_study())
+    once, thrice = measure(settings, model, 1001, Silent()), measure(settings, model, 1001, Silent(), 3)
+    assert thrice.episodes == ("0/0", "0/1", "0/2", "1/0", "1/1", "1/2", "2/0", "2/1", "2/2")
+    assert thrice.complete
+    assert (thrice.values[:, ::3] == once.values).all()
+    for agent in thrice.values:
+        assert len(np.unique(agent[:, 0])) == 9
+    again = measure(settings, model, 1001, Silent(), 3)
+    assert (again.values == thrice.values).all()
+
+
+def test_a_target_of_repeats_has_a_floor_of_the_same_starts(make_study, model):
+    settings = read_study_settings(make_study())
+    once, twice = (measure(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))
+    assert noise_floor(target=twice, metrics=settings.metrics).kind == "same starts"
+    assert noise_floor(target=once, metrics=settings.metrics).kind == "halves"
+
+
+def test_the_study_needs_no_target_yet(make_study, model):
+    folder = make_study()
+    (folder / "target.csv").unlink()
+    assert measure(read_study_settings(folder), model, 1, Silent()).complete
+
+
+def test_a_failing_episode_leaves_no_table(make_study, model):
+    settings = read_study_settings(make_study(domain={"faults": '["agent3:1:raises"]'}))
+    with pytest.raises(EpisodeError, match="agent 'agent3' failed from start 1"):
+        measure(settings, model, 1, Silent())
+
+
+def test_a_trial_s_outcome_composes_to_its_prpv(finished):
+    study = open_study(finished)
+    with Store.read(finished) as store:
+        done = store.trials()
+        told = [StudyRun(study, store).search_trial(trial) for trial in done]
+        composed = goal_of(StudyRun(study, store)).compose(np.array([trial.outcome for trial in told]))
+    assert [trial.score for trial in told] == [trial.prpv for trial in done]
+    assert [trial.values for trial in told] == [study.settings.space.values(trial.theta) for trial in done]
+    assert np.array_equal(composed, [trial.prpv for trial in done])
+    assert len(set(composed)) > 1
+
+
+@pytest.mark.parametrize("metrics", ['["survival_time:max"]', '["survival_time:max", "distance:min"]'])
+def test_an_outcome_has_the_study_s_metrics_in_their_order_and_the_target_s_agents(make_study, metrics):
+    agents = '["agent5", "agent0", "agent3", "agent1", "agent2", "agent4"]'
+    folder = make_study(agents=agents, metrics=metrics, budget="6")
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        study_run = StudyRun(study, store)
+        run_study(study_run, make_proposer("sobol", 5))
+        told = [StudyRun(study, store).search_trial(trial) for trial in store.trials()]
+        composed = goal_of(StudyRun(study, store)).compose(np.array([trial.outcome for trial in told]))
+    assert np.array_equal(composed, [trial.score for trial in told])
+
+
+def test_a_trial_whose_agent_has_no_episode_lacks_that_agent_s_outputs_alone(make_study):
+    folder = make_study(domain={"faults": '["agent3:*:raises"]'}, budget="6")
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        theta = {"delay": 0.1, "trim": 0.1}
+        StudyRun(study, store).evaluate(theta, "")
+        told = StudyRun(study, store).search_trial(TrialRecord(1, theta, "failed"))
+    known = ~np.isnan(told.outcome).reshape(6, 2)
+    assert told.score is None
+    assert known.all(axis=1).tolist() == [True, True, True, False, True, True]
+
+
+def test_a_trial_without_any_episode_that_worked_has_no_outcome(make_study):
+    folder = make_study(domain={"faults": str([f"agent{n}:*:raises" for n in range(6)])})
+    study = open_study(folder)
+    with Store.open(folder) as store:
+        StudyRun(study, store).evaluate({"delay": 0.1, "trim": 0.1}, "")
+        assert (
+            StudyRun(study, store).search_trial(TrialRecord(1, {"delay": 0.1, "trim": 0.1}, "failed")).outcome is None
+        )
+
+
+def test_the_search_is_told_every_metric_that_both_sides_have_and_prpv_counts_the_study_s_own(finished):
+    """A metric beside those compared is an output too; one with a hole in the target is none."""
+    folder = finished
+    lines = (folder / "target.csv").read_text().splitlines()
+    (folder / "study.toml").write_text(
+        (folder / "study.toml").read_text().replace('["distance:max", "survival_time:max"]', '["survival_time:max"]')
+    )
+    study = open_study(folder)
+    assert study.target.metrics == ("survival_time", "distance")
+    with Store.read(folder) as store:
+        goal, done = goal_of(StudyRun(study, store)), store.trials()
+        told = [StudyRun(study, store).search_trial(trial) for trial in done]
+        alone = [StudyRun(study, store).evaluation(trial.theta).prpv for trial in done]
+    assert goal.outputs[:2] == (("agent0", "survival_time"), ("agent0", "distance"))
+    assert goal.compose(np.array([trial.outcome for trial in told])).tolist() == alone
+    (folder / "target.csv").write_text("\n".join([*lines[:-1], ",".join(["agent5", "2", "", "7.0"])]) + "\n")
+    assert open_study(folder).target.metrics == ("survival_time",)
+
+
+def test_only_what_is_given_changes_and_no_trial_depends_on_it(make_study):
+    study = open_study(make_study())
+    assert with_spending(study) == study
+    other = with_spending(study, budget=40, jobs=3)
+    assert (other.settings.budget, other.settings.jobs) == (40, 3)
+    assert replace(other.settings, budget=7, jobs=1) == study.settings
+    assert study_facts(other) == study_facts(study)
+
+
+def test_a_search_for_learning_value_has_its_budget_elsewhere(make_study):
+    study = open_study(make_taught(make_study, objective='"plv"', engine='"gp"'))
+    with pytest.raises(InputError, match=r"study.toml: budget: .*set teaching.budget in this file instead"):
+        with_spending(study, budget=4)
+    assert with_spending(study, jobs=4).settings.jobs == 4

@@ -1,0 +1,399 @@
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from telling import Telling
+
+from proxytune.domain import make_episode
+from proxytune.errors import InputError
+from proxytune.running import Silent
+from proxytune.space import Interval
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study
+from proxytune.sweep import (
+    COMMANDS,
+    METRICS,
+    Estimate,
+    Series,
+    all_curves,
+    check_base,
+    curve_of,
+    describe,
+    discrepancy_study,
+    plan_sweep,
+    pod_mean,
+    run_sweep,
+    series_of,
+    shape_of,
+    sweep_interval,
+    with_target,
+)
+from proxytune.usefulness import ALL, PRPV
+
+TRUTH = {"trim": 0.1, "delay": 0.12}
+
+
+@pytest.fixture
+def truth(tmp_path):
+    path = tmp_path / "truth.toml"
+    path.write_text("trim = 0.1\ndelay = 0.12\n")
+    return path
+
+
+@pytest.fixture
+def opened(make_study, truth):
+    study = open_study(make_study(family='"echo:echo"'))
+    return study, discrepancy_study(study, truth)
+
+
+def swept(study, discrepancy, points=4):
+    plan = plan_sweep(sweep_interval(study, "trim"), TRUTH, points)
+    if discrepancy:
+        plan = with_target(plan, study.settings.folder.parent / "truth.toml", discrepancy)
+    with Store.open(study.settings.folder) as store:
+        study_run = StudyRun(study, store)
+        run_sweep(study_run, plan, discrepancy)
+        spent = study_run.spent
+        return spent.episodes, curve_of(StudyRun(study, store), plan)
+
+
+def test_pod_is_nothing_at_the_truth_and_something_beside_it(opened):
+    both = opened[1].family
+    at = make_episode(TRUTH, agent="agent0", start=0, seed=3)
+    assert both.run(at) == {"pod_pose": 0.0, "pod_image": 0.0}
+    off = both.run(make_episode({"trim": -0.1}, agent="agent0", start=0, seed=3))
+    assert off["pod_pose"] > 0
+    assert off["pod_image"] == pytest.approx(20 / 255), "100 and 120 of 255 grey"
+
+
+def test_at_most_so_many_commands_are_replayed_and_fewer_where_the_episode_ended(opened):
+    both = opened[1].family
+    counted = []
+
+    class Counting:
+        identity = "counting"
+
+        def drive(self, episode):
+            return both.target.drive(episode)
+
+        def replay(self, episode, commands):
+            counted.append(len(commands))
+            return both.target.replay(episode, commands)
+
+    for start in (0, 2):
+        replace(both, proxy=Counting(), target=Counting()).run(make_episode({}, agent="agent0", start=start, seed=3))
+    assert counted == [COMMANDS, COMMANDS, 3, 3], "target and proxy in turn"
+
+
+def test_the_time_after_a_domain_has_ended_is_left_out(opened):
+    both = opened[1].family
+    found = both.run(make_episode({"trim": 0.3}, agent="agent0", start=0, seed=3))
+    assert np.isfinite(list(found.values())).all()
+
+
+def test_the_target_is_driven_once_per_start_however_many_points(opened):
+    drives = []
+
+    class Journal:
+        def drive(self, episode):
+            drives.append(episode)
+            return opened[1].family.target.drive(episode)
+
+        def replay(self, episode, commands):
+            return opened[1].family.target.replay(episode, commands)
+
+    both = replace(opened[1].family, target=Journal())
+    for trim in (-0.1, 0.0, 0.1):
+        both.run(make_episode({"trim": trim}, agent="agent0", start=0, seed=3))
+    assert drives == [make_episode({}, agent="agent0", start=0, seed=3)]
+
+
+def test_identity_tells_targets_and_proxies_apart_and_travels(opened, tmp_path):
+    study, discrepancy = opened
+    other = tmp_path / "other.toml"
+    other.write_text("trim = 0.2\n")
+    assert discrepancy_study(study, other).identity != discrepancy.identity != study.identity
+    assert pickle.loads(pickle.dumps(discrepancy.family)).identity == discrepancy.identity
+
+
+def test_a_curve_has_pod_at_every_point_kept_like_other_episodes(opened):
+    episodes, curve = swept(*opened)
+    assert episodes == 4 * (18 + 3), "the first agent's replays from three starts besides 18 episodes"
+    again, same = swept(*opened)
+    assert (again, [point.pod for point in same.points]) == (0, [point.pod for point in curve.points])
+    assert swept(opened[0], None)[0] == 0
+    assert [point.pod["pod_pose"].value == 0 for point in curve.points] == [False, False, True, False]
+    assert {point.pod["pod_image"].starts for point in curve.points} == {3}
+    assert {one.key for one in series_of(curve)} >= set(METRICS)
+
+
+def test_a_sweep_stopped_before_its_last_replays_has_no_curve_yet(opened):
+    study, discrepancy = opened
+
+    class Stopping(Silent):
+        def begin(self, what, known):
+            if what.startswith("POD, trim 4"):
+                raise KeyboardInterrupt
+
+    model = study.settings.folder.parent / "truth.toml"
+    plan = with_target(plan_sweep(sweep_interval(study, "trim"), TRUTH, 4), model, discrepancy)
+    with Store.open(study.settings.folder) as store:
+        with pytest.raises(KeyboardInterrupt):
+            study_run = StudyRun(study, store, Stopping())
+            run_sweep(study_run, plan, discrepancy)
+        assert curve_of(StudyRun(study, store), plan) is None
+        assert curve_of(StudyRun(study, store), replace(plan, replays="")) is not None, "only POD is missing"
+    assert swept(study, discrepancy)[0] == 3
+
+
+def test_several_processes_find_the_same(make_study, truth, opened):
+    alone = swept(*opened)[1]
+    study = open_study(make_study("other", family='"echo:echo"', jobs="2"))
+    together = swept(study, discrepancy_study(study, truth))[1]
+    assert [point.pod for point in together.points] == [point.pod for point in alone.points]
+
+
+def test_starts_from_which_the_agent_fails_are_left_out_of_the_mean(make_study, truth):
+    study = open_study(make_study(family='"echo:echo"', domain={"faults": '["agent0:1:raises"]'}))
+    _, curve = swept(study, discrepancy_study(study, truth), points=2)
+    assert {point.pod["pod_pose"].starts for point in curve.points} == {2}
+
+
+def test_the_interval_over_starts_holds_the_mean_and_one_start_has_none():
+    found = pod_mean([0.1, 0.2, 0.4])
+    assert found.value == pytest.approx(0.7 / 3)
+    assert 0.0999 < found.interval[0] < found.value < found.interval[1] < 0.4001
+    assert pod_mean([0.3]).interval is None
+    assert pod_mean([0.0, 0.0]).interval == (0.0, 0.0)
+
+
+def test_a_family_that_cannot_replay_is_refused_in_one_line(make_study, truth):
+    with pytest.raises(InputError, match="wobbly:wobbly has no `drive` and `replay`.*leave the option out"):
+        discrepancy_study(open_study(make_study()), truth)
+
+
+def test_a_missing_model_is_refused(opened, tmp_path):
+    with pytest.raises(InputError, match="--target-model .*no.toml: no such file"):
+        discrepancy_study(opened[0], tmp_path / "no.toml")
+
+
+REAL = """format = 1
+target = "target.csv"
+metrics = ["distance:max", "survival_time:max"]
+agents = ["steady", "drifter"]
+starts = 2
+budget = 2
+seed = 1
+[parameters]
+trim = [-0.3, 0.3]
+[domain]
+robot = "duckiebot"
+plant = "planar"
+seconds = 2.0
+"""
+
+
+def test_a_lane_follower_s_pod_is_nothing_at_the_truth_and_grows_with_trim(tmp_path):
+    (tmp_path / "study.toml").write_text(REAL)
+    rows = [
+        f"{agent},{start},{1 + start}.{place},2.0"
+        for place, agent in enumerate(("steady", "drifter"))
+        for start in (0, 1)
+    ]
+    (tmp_path / "target.csv").write_text("\n".join(["agent,episode,distance,survival_time", *rows]) + "\n")
+    (tmp_path / "truth.toml").write_text('format = 1\nrobot = "duckiebot"\n[effects.trim]\ntrim = 0.1\n')
+    both = discrepancy_study(open_study(tmp_path), tmp_path / "truth.toml").family
+    found = [both.run(make_episode({"trim": trim}, agent="steady", start=0, seed=5)) for trim in (0.1, 0.0, -0.2)]
+    poses, images = ([one[name] for one in found] for name in METRICS)
+    assert poses[0] == 0 == images[0]
+    assert 0 < poses[1] < poses[2]
+    assert 0 < images[1] < 1
+
+
+def swept_of_sweep(folder, base=TRUTH, parameter="trim", points=5):
+    study = open_study(folder)
+    plan = plan_sweep(sweep_interval(study, parameter), base, points)
+    with Store.open(folder) as store:
+        study_run = StudyRun(study, store)
+        run_sweep(study_run, plan)
+        return study_run.spent.episodes, curve_of(StudyRun(study, store), plan)
+
+
+def test_a_grid_has_both_ends_and_the_base_s_own_value_once():
+    plan = plan_sweep(Interval("trim", -0.3, 0.3), TRUTH, 13)
+    assert plan.points[0] == -0.3
+    assert plan.points[-1] == 0.3
+    assert len(plan.points) == 13, "0.1 is a point of the grid already"
+    assert plan_sweep(Interval("trim", -0.3, 0.3), {"trim": 0.12}, 3).points == (-0.3, 0.0, 0.12, 0.3)
+    assert plan_sweep(Interval("trim", -0.3, 0.3), {}, 3).points == (-0.3, 0.0, 0.3)
+
+
+def test_prpv_is_at_its_floor_at_the_truth_and_higher_away_from_it(make_study):
+    _, curve = swept_of_sweep(make_study())
+    scores = {point.value: point.assessment.prpv.value for point in curve.points}
+    assert curve.unit == ""
+    assert list(scores) == [-0.3, -0.15, 0.0, 0.1, 0.15, 0.3]
+    assert scores[0.1] == 0 < min(scores[-0.3], scores[0.3])
+
+
+def test_what_is_known_is_not_simulated_again_and_truth_is_shared_between_curves(make_study):
+    folder = make_study()
+    assert swept_of_sweep(folder)[0] == 6 * 18
+    assert swept_of_sweep(folder)[0] == 0
+    assert swept_of_sweep(folder, parameter="delay", points=3)[0] == 3 * 18, "four points, of which the truth is known"
+
+
+def test_the_others_are_nominal_where_nothing_is_said(make_study):
+    _, curve = swept_of_sweep(make_study(), base={})
+    assert {tuple(point.evaluation.theta) for point in curve.points} == {("trim",)}
+
+
+def test_every_point_is_told_with_its_place_value_and_prpv(make_study):
+    study, telling = open_study(make_study()), Telling()
+    with Store.open(study.settings.folder) as store:
+        run_sweep(StudyRun(study, store, telling), plan_sweep(sweep_interval(study, "trim"), TRUTH, 3))
+        curve = all_curves(StudyRun(study, store))[0]
+    scores = [point.assessment.prpv.value for point in curve.points]
+    values = ["-0.3", "0", "0.1", "0.3"]
+    expected = [(f"trim {n} of 4, at {v}: PRPV {s}") for n, (v, s) in enumerate(zip(values, scores, strict=True), 1)]
+    assert telling.lines == expected
+
+
+class Stopping(Silent):
+    def begin(self, what, known):
+        if what.startswith("trim 3"):
+            raise KeyboardInterrupt
+
+
+def test_an_interrupted_sweep_goes_on_where_it_was(make_study):
+    folder = make_study()
+    study = open_study(folder)
+    plan = plan_sweep(sweep_interval(study, "trim"), TRUTH, 5)
+    with Store.open(folder) as store:
+        with pytest.raises(KeyboardInterrupt):
+            study_run = StudyRun(study, store, Stopping())
+            run_sweep(study_run, plan)
+        assert curve_of(StudyRun(study, store), plan) is None
+        assert all_curves(StudyRun(study, store)) == []
+    assert swept_of_sweep(folder)[0] == 4 * 18
+    with Store.read(folder) as store:
+        assert [curve.parameter for curve in all_curves(StudyRun(study, store))] == ["trim"]
+
+
+def test_sweeps_of_a_parameter_that_the_family_no_longer_has_are_left_out(make_study, monkeypatch):
+    folder = make_study()
+    swept_of_sweep(folder)
+    swept_of_sweep(folder, parameter="delay")
+    monkeypatch.setattr("wobbly.PARAMETERS", {"delay": open_study(folder).family.parameters["delay"]})
+    study = open_study(make_study(parameters={"delay": "[0.0, 0.3]"}))
+    with Store.read(folder) as store:
+        assert [curve.parameter for curve in all_curves(StudyRun(study, store))] == ["delay"]
+
+
+def test_a_point_where_an_agent_fails_throughout_has_no_score_but_the_curve_stands(make_study):
+    _, curve = swept_of_sweep(make_study(domain={"faults": '["agent3:*:raises"]'}), points=2)
+    assert [point.assessment for point in curve.points] == [None, None, None]
+    assert "agent 'agent3' failed from every start" in curve.points[0].evaluation.failure
+
+
+def test_a_parameter_is_swept_over_the_study_s_box_or_else_over_all_it_may_be(make_study):
+    study = open_study(make_study(parameters={"trim": "[-0.1, 0.2]"}))
+    assert sweep_interval(study, "trim") == Interval("trim", -0.1, 0.2)
+    assert sweep_interval(study, "delay") == Interval("delay", 0.0, 0.3)
+    with pytest.raises(InputError, match="no parameter 'dely' .*; did you mean 'delay'"):
+        sweep_interval(study, "dely")
+
+
+@pytest.mark.parametrize(
+    ("base", "expected"),
+    [({"trimm": 0.1}, "did you mean 'trim'"), ({"trim": 0.5}, "must lie within"), ({"trim": float("nan")}, "got nan")],
+)
+def test_a_base_that_the_family_cannot_take_is_refused(make_study, base, expected):
+    with pytest.raises(InputError, match=expected):
+        check_base(open_study(make_study()), base)
+
+
+def series(scores, spread=0.0, higher=False):
+    found = [
+        Estimate(float(place), score, None if score is None or spread is None else (score - spread, score + spread))
+        for place, score in enumerate(scores)
+    ]
+    measure = replace(PRPV, better="higher" if higher else "lower")
+    return Series(measure, ALL, tuple(found))
+
+
+def test_a_valley_at_the_held_value_worsens_on_both_sides():
+    shape = shape_of(series([9.0, 4.0, 1.0, 3.0, 8.0]), 2.0)
+    assert (shape.best, shape.score, shape.near_best) == ((2.0,), 1.0, (2.0,))
+    assert (shape.below, shape.above, shape.monotone) == ("worsens", "worsens", True)
+
+
+def test_a_measure_of_which_higher_is_better_is_best_at_its_peak():
+    shape = shape_of(series([0.2, 0.5, 0.9, 0.6, 0.1], higher=True), 2.0)
+    assert (shape.best, shape.score, shape.monotone) == ((2.0,), 0.9, True)
+
+
+def test_a_second_valley_is_a_turn_on_its_side_only():
+    shape = shape_of(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
+    assert (shape.below, shape.above, shape.monotone) == ("worsens", "turns", False)
+
+
+def test_a_best_value_beside_the_held_one_is_a_turn():
+    assert shape_of(series([9.0, 4.0, 2.0, 0.0, 8.0]), 2.0).above == "turns"
+
+
+def test_a_dip_within_noise_is_no_turn_and_a_rise_within_noise_is_flat():
+    assert shape_of(series([9.0, 4.0, 1.0, 6.0, 5.0], spread=0.6), 2.0).above == "worsens"
+    shape = shape_of(series([2.0, 1.5, 1.0, 1.5, 2.0], spread=0.6), 2.0)
+    assert (shape.below, shape.above, shape.monotone) == ("flat", "flat", False)
+    assert shape.near_best == (0.0, 1.0, 2.0, 3.0, 4.0)
+
+
+def test_without_intervals_no_side_is_judged():
+    shape = shape_of(series([9.0, 1.0, 8.0], spread=None), 1.0)
+    assert (shape.below, shape.above, shape.monotone) == ("unknown", "unknown", None)
+
+
+@pytest.mark.parametrize("held", [None, 7.0])
+def test_sides_need_a_held_value_that_was_looked_at(held):
+    shape = shape_of(series([9.0, 1.0, 8.0]), held)
+    assert (shape.below, shape.above, shape.monotone) == ("unseen", "unseen", None)
+    assert shape.best == (1.0,)
+
+
+def test_a_held_value_at_an_end_has_one_side():
+    shape = shape_of(series([1.0, 2.0, 3.0]), 0.0)
+    assert (shape.below, shape.above, shape.monotone) == ("unseen", "worsens", True)
+
+
+def test_undefined_points_are_passed_over():
+    shape = shape_of(series([9.0, None, 1.0, None, 8.0]), 2.0)
+    assert (shape.best, shape.monotone) == ((2.0,), True)
+    empty = series([None, None])
+    assert shape_of(empty, 0.0).best == ()
+    assert describe(empty, 0.0) == "PRPV: undefined at every point"
+
+
+def test_ties_for_the_best_are_all_named():
+    assert shape_of(series([3.0, 1.0, 1.0, 2.0]), None).best == (1.0, 2.0)
+
+
+def test_the_line_says_where_it_is_lowest_and_what_each_side_does():
+    line = describe(series([9.0, 4.0, 1.0, 6.0, 3.0]), 2.0)
+    assert line.startswith("PRPV: lowest (1) at 2; not worse beyond noise: 2; from 2 downwards it worsens")
+    assert "upwards it turns" in line
+    assert "from" not in describe(series([9.0, 4.0, 1.0]), None)
+    assert "not worse beyond noise: 0, 2" in describe(series([1.0, 5.0, 1.0]), None)
+
+
+@settings(derandomize=True, max_examples=50)
+@given(st.lists(st.floats(-5, 5), min_size=3, max_size=9), st.data())
+def test_the_mirror_image_of_a_curve_has_mirrored_sides(scores, data):
+    held = data.draw(st.integers(0, len(scores) - 1))
+    one = shape_of(series(scores, 0.5), float(held))
+    other = shape_of(series(scores[::-1], 0.5), float(len(scores) - 1 - held))
+    upside_down = shape_of(series([-score for score in scores], 0.5, higher=True), float(held))
+    assert (one.below, one.above) == (other.above, other.below) == (upside_down.below, upside_down.above)

@@ -1,0 +1,423 @@
+"""Both sides of a comparison must hold the same agents and metrics.
+
+Many agents are sorted instead of compared pair by pair, and every measure stays what it is to the last bit.
+PRPV against hand-worked cases, its properties, and the published pilot.
+START/REPEAT: repeats of a start are no other starts, for the bootstrap and for splits alike.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from proxytune.errors import ScoresError
+from proxytune.scores import Metric, ScoreTable, read_domains
+from proxytune.usefulness import (
+    assess,
+    bootstrap_means,
+    compare,
+    dominance,
+    in_common,
+    prpv_of_means,
+    resampling,
+    start_of,
+    starts_of,
+)
+from proxytune.usefulness import pairs as standing
+from proxytune.usefulness.noise import _ties
+from proxytune.usefulness.pairs import FlippedPair, by_start, is_repeated, prpv, split_repeats, stand, start_places
+from proxytune.usefulness.predictivity import kendall_of_means, mmrv_of_means
+from proxytune.usefulness.resampling import bootstrap_prpv, draw_counts
+
+M = [Metric("m")]
+
+
+def table(agents, episodes=(1,)):
+    return ScoreTable.from_episodes({(a, e): {"m": ord(a) + e / 10, "n": 0.0} for a in agents for e in episodes})
+
+
+def test_the_proxy_is_put_in_the_targets_order():
+    inputs = compare(proxy=table("CAB", (2, 1)), target=table("ABC", (1, 2)), metrics=M)
+    assert inputs.agents == inputs.proxy.agents == ("A", "B", "C")
+    assert inputs.paired
+    assert (inputs.proxy.values == inputs.target.values).all()
+
+
+def test_different_episodes_are_not_paired():
+    assert not compare(proxy=table("AB", (1, 2)), target=table("AB", (1, 3)), metrics=M).paired
+    inputs = compare(proxy=table("AB", (1, 2, 3)), target=table("AB"), metrics=M)
+    assert (inputs.proxy_episodes, inputs.target_episodes) == ((3, 3), (1, 1))
+
+
+@pytest.mark.parametrize(
+    ("proxy", "target", "complaint"),
+    [
+        ("AB", "ABCD", "the proxy lacks scores of C, D, which the target has"),
+        ("ABC", "AB", "the target lacks scores of C, which the proxy has"),
+        ("A", "A", r"only one agent \('A'\) is scored"),
+    ],
+)
+def test_agents_that_do_not_match_are_named(proxy, target, complaint):
+    with pytest.raises(ScoresError, match=complaint):
+        compare(proxy=table(proxy), target=table(target), metrics=M)
+
+
+@pytest.mark.parametrize("metrics", [[], [Metric("m"), Metric("m", "min")], [Metric("k")]])
+def test_no_metric_a_metric_twice_or_an_unknown_one_is_refused(metrics):
+    with pytest.raises(ScoresError):
+        compare(proxy=table("AB"), target=table("AB"), metrics=metrics)
+
+
+def test_agents_that_all_sides_have_are_kept_and_the_others_named():
+    human = ScoreTable.from_episodes({(a, "day" if a == "H" else 1): {"m": 1.0} for a in "BHA"})
+    kept, lines = in_common({"the target": human, "the proxy sim": table("ABC")})
+    assert (kept["the target"].agents, kept["the proxy sim"].agents) == (("B", "A"), ("A", "B"))
+    assert kept["the target"].episodes == ("1",), "an episode that nobody is left of is none"
+    assert lines == (
+        "left out, since not all sides have them: H of the target",
+        "left out, since not all sides have them: C of the proxy sim",
+    )
+    with pytest.raises(ScoresError, match="at least two agents in common; one has A, B; other has C, D"):
+        in_common({"one": table("AB"), "other": table("CD")})
+
+
+MEASURES = {
+    "prpv": prpv_of_means,
+    "correlation": lambda proxy, target, metrics: kendall_of_means(proxy, target),
+    "mmrv": mmrv_of_means,
+}
+KINDS = {
+    "continuous": lambda random, shape: random.normal(size=shape),
+    "tied": lambda random, shape: random.integers(0, 6, size=shape) * 0.1,
+    "nearly tied": lambda random, shape: 0.3 + random.integers(-9, 9, size=shape) * random.choice([1e-14, 2e-13]),
+    "rates": lambda random, shape: random.integers(0, 2, size=(7, *shape)).mean(axis=0) - 0.3,
+    "alike": lambda random, shape: np.ones(shape),
+}
+
+
+@pytest.mark.parametrize("module", MEASURES)
+@given(kind=st.sampled_from(sorted(KINDS)), seed=st.integers(0, 10**6), agents=st.integers(2, 100))
+@settings(max_examples=60, derandomize=True, deadline=None)
+def test_sorting_gives_what_comparing_every_pair_gives(module, kind, seed, agents):
+    random = np.random.default_rng(seed)
+    proxy, target = (KINDS[kind](random, (2, agents, 3)) for _ in range(2))
+    metrics = (Metric("a"), Metric("b", "min", 0.1), Metric("c", "max", 5.0, percent=True))
+    pairwise = MEASURES[module](proxy, target, metrics)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys.modules[f"proxytune.usefulness.{module}"], "FEW_AGENTS", 1)
+        patch.setattr(standing, "WORDS", agents + 1)  # a word of 64 agents at a time
+        np.testing.assert_array_equal(MEASURES[module](proxy, target, metrics), pairwise)
+
+
+def test_a_tolerance_that_differences_only_just_reach_is_a_tie_as_rounded():
+    """0.8 − 0.3 is 0.5 in floating point, though 0.8 − 0.5 is more than 0.3."""
+    found = stand(np.array([0.8, 0.3, 0.1]), 0.5)
+    assert found.below.tolist() == [1, 0, 0]
+    assert found.reach.tolist() == [3, 3, 2]
+
+
+def test_ties_of_a_metric_are_counted_once_per_pair():
+    values = np.array([0.0, 1.0, 1.0, 1.0])[:, None, None]
+    table = ScoreTable(tuple("ABCD"), ("0",), ("won",), values)
+    assert _ties(table, Metric("won"), 0) == 3
+
+
+@pytest.mark.parametrize("labels", ["012345", ["0/0", "0/1", "1/0", "1/1", "2/0", "2/1"]])
+def test_drawing_for_a_few_agents_at_a_time_changes_nothing(labels, monkeypatch):
+    values = np.random.default_rng(0).normal(size=(2, 7, 6, 1))
+    values[:, 2, 4] = np.nan
+    proxy, target = (ScoreTable(tuple("ABCDEFG"), tuple(labels), ("m",), side) for side in values)
+    first = assess(proxy=proxy, target=target, metrics=[Metric("m")], resamples=100)
+    monkeypatch.setattr(resampling, "BLOCK", 1)
+    again = assess(proxy=proxy, target=target, metrics=[Metric("m")], resamples=100)
+    assert vars(again.intervals) == vars(first.intervals)
+    assert (again.noise_floor.value, again.noise_floor.high) == (first.noise_floor.value, first.noise_floor.high)
+    assert again.prpv_interval.expected == first.prpv_interval.expected
+
+
+SCORES = Path(__file__).parents[2] / "../shared/data/scores"
+PROXIES = ("base", "synthetic_tiles", "trim_plus_0.2", "delay_doubled", "blur_0.1", "trim_minus_0.2")
+M2 = (Metric("m"), Metric("n"))
+few = settings(max_examples=60, derandomize=True, deadline=None)
+
+
+def table_of_prpv(*rows, metrics=("m", "n"), agents="ABCDEFGHIJ"):
+    return ScoreTable.from_episodes(
+        {(agents[i], 1): dict(zip(metrics, np.atleast_1d(row).tolist(), strict=True)) for i, row in enumerate(rows)}
+    )
+
+
+@st.composite
+def pairs_of_means(draw):
+    agents = draw(st.integers(2, 7))
+    scores = st.lists(st.integers(-5, 5), min_size=2 * agents * 2, max_size=2 * agents * 2)
+    return np.array(draw(scores), dtype=float).reshape(2, agents, 2)
+
+
+def test_three_agents_by_hand():
+    """Target A > B > C; proxy C > A > B: A–C and B–C are reversed, two each."""
+    m = [Metric("m")]
+    result = prpv(proxy=table_of_prpv(2, 1, 3, metrics=["m"]), target=table_of_prpv(3, 2, 1, metrics=["m"]), metrics=m)
+    assert result.value == 4
+    assert result.pairs == (FlippedPair("A", "C", "reversed"), FlippedPair("B", "C", "reversed"))
+
+
+def test_four_agents_and_two_metrics_by_hand():
+    """Target: A dominates all, B and C incomparable, both dominate D; proxy: as worked out pair by pair."""
+    target = table_of_prpv((4, 4), (3, 2), (2, 3), (1, 1))
+    proxy = table_of_prpv((4, 1), (3, 3), (2, 2), (1, 4))
+    result = prpv(proxy=proxy, target=target, metrics=M2)
+    assert set(result.pairs) == {
+        FlippedPair("A", "B", "lost"),
+        FlippedPair("A", "C", "lost"),
+        FlippedPair("A", "D", "lost"),
+        FlippedPair("B", "C", "invented"),
+        FlippedPair("B", "D", "lost"),
+        FlippedPair("C", "D", "lost"),
+    }
+    assert result.value == 6
+    assert result.normalised == 0.5
+
+
+def test_a_result_carries_inputs_direction_and_range():
+    result = prpv(proxy=table_of_prpv((1, 1), (2, 2)), target=table_of_prpv((2, 2), (1, 1)), metrics=M2)
+    assert (result.value, result.range, result.better) == (2, (0, 2), "lower")
+    assert (result.inputs.agents, result.inputs.target_episodes) == (("A", "B"), (1, 1))
+
+
+def test_the_parts_make_up_the_whole():
+    rng = np.random.default_rng(3)
+    result = prpv(
+        proxy=table_of_prpv(*rng.normal(size=(9, 2))), target=table_of_prpv(*rng.normal(size=(9, 2))), metrics=M2
+    )
+    assert sum(2 if pair.flip == "reversed" else 1 for pair in result.pairs) == result.value
+    assert {pair.flip for pair in result.pairs} == {"reversed", "lost", "invented"}
+
+
+@few
+@given(pairs_of_means())
+def test_alpha_of_a_pair_and_its_mirror_add_up_to_one(means):
+    alpha = dominance(means, M2)
+    np.testing.assert_array_equal(alpha + np.swapaxes(alpha, -1, -2), 1.0)
+    assert set(np.unique(alpha)) <= {0.0, 0.5, 1.0}
+
+
+@few
+@given(pairs_of_means())
+def test_it_is_a_whole_number_within_bounds_symmetric_and_zero_for_the_same(means):
+    proxy, target = means
+    value = prpv_of_means(proxy, target, M2)
+    agents = len(proxy)
+    assert value == int(value)
+    assert 0 <= value <= agents * (agents - 1)
+    assert value == prpv_of_means(target, proxy, M2)
+    assert prpv_of_means(proxy, proxy, M2) == 0
+
+
+@few
+@given(pairs_of_means(), st.randoms(use_true_random=False))
+def test_the_order_of_the_agents_does_not_matter(means, random):
+    proxy, target = (table_of_prpv(*rows) for rows in means)
+    names = list(proxy.agents)
+    random.shuffle(names)
+    shuffled = ScoreTable.from_episodes(
+        {(name, 1): dict(zip("mn", proxy.means[proxy.agents.index(name)].tolist(), strict=True)) for name in names}
+    )
+    expected = prpv(proxy=proxy, target=target, metrics=M2).value
+    assert prpv(proxy=shuffled, target=target, metrics=M2).value == expected
+    assert prpv(proxy=target, target=shuffled, metrics=M2).value == expected
+
+
+@few
+@given(pairs_of_means())
+def test_an_increasing_rescaling_of_a_metric_changes_nothing(means):
+    proxy, target = means
+    bent = proxy.copy()
+    bent[:, 0] = np.exp(proxy[:, 0] / 2) - 100.0
+    assert prpv_of_means(bent, target, M2) == prpv_of_means(proxy, target, M2)
+
+
+@few
+@given(pairs_of_means())
+def test_turning_a_metric_and_its_direction_changes_nothing(means):
+    turned = (Metric("m", "min"), Metric("n"))
+    assert prpv_of_means(*(means * [-1, 1]), turned) == prpv_of_means(*means, M2)
+
+
+def test_differences_up_to_the_tolerance_are_ties():
+    scores = np.array([[1.0], [1.5], [2.0]])
+    assert dominance(scores, [Metric("m", "max", 0.5)])[:, 0].tolist() == [0.5, 0.5, 1.0]
+    assert dominance(scores, [Metric("m", "max", 25.0, percent=True)])[:, 0].tolist() == [0.5, 0.5, 1.0]
+    assert dominance(scores, [Metric("m", "min", 0.5)])[:, 0].tolist() == [0.5, 0.5, 0.0]
+
+
+def test_rounding_of_a_mean_is_a_tie():
+    one = ScoreTable.from_episodes({("A", e): {"m": 0.1} for e in range(10)} | {("B", 0): {"m": 0.1}})
+    assert dominance(one.means, [Metric("m")]).tolist() == [[0.5, 0.5], [0.5, 0.5]]
+    assert dominance(np.array([[0.1 + 0.2], [0.3]]), [Metric("m")]).tolist() == [[0.5, 0.5], [0.5, 0.5]]
+
+
+def test_unrelated_tables_of_ten_agents_and_two_metrics_average_33_9():
+    rng = np.random.default_rng(0)
+    values = prpv_of_means(*rng.normal(size=(2, 20_000, 10, 2)), M2)
+    assert values.mean() == pytest.approx(33.75, abs=0.3)
+    assert values.std() == pytest.approx(7.1, abs=0.3)
+
+
+needs_pilot = pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
+
+
+@needs_pilot
+@pytest.mark.parametrize(
+    ("metrics", "published"),
+    [
+        ("distance:max:5% survival_time_s:max:5% time_out_of_lane_s:max:5%", [93, 74, 80, 86, 74, 69]),
+        ("distance:max:5% survival_time_s:max:5% time_out_of_lane_s:min:5%", [90, 80, 89, 74, 80, 115]),
+        ("distance:max:5% survival_time_s:max:5%", [117, 78, 74, 90, 87, 111]),
+    ],
+)
+def test_the_pilots_published_figures_come_out_exactly(metrics, published):
+    chosen = [Metric.parse(text) for text in metrics.split()]
+    tables = read_domains(SCORES / "duckietown_pilot_published_means.csv", [metric.name for metric in chosen])
+    values = [prpv(proxy=tables[name], target=tables["real"], metrics=chosen).value for name in PROXIES]
+    assert values == published
+
+
+@needs_pilot
+def test_the_real_duckiebot_against_itself_flips_56_of_240():
+    chosen = [Metric("distance"), Metric("survival_time_s")]
+    real = read_domains(SCORES / "duckietown_pilot_episodes.csv", [m.name for m in chosen])["real"]
+    halves = [ScoreTable(real.agents, ("1",), real.metrics, real.values[:, [episode]]) for episode in (0, 1)]
+    result = prpv(proxy=halves[0], target=halves[1], metrics=chosen)
+    assert (result.value, result.range[1]) == (56, 240)
+
+
+REPEATS_M = (Metric("m"),)
+
+
+def table_of_repeats(values, labels):
+    return ScoreTable(tuple(f"A{i}" for i in range(len(values))), tuple(labels), ("m",), np.array(values)[:, :, None])
+
+
+def split(scores, splits):
+    keys = np.random.default_rng(0).random((splits, len(scores.episodes)))
+    return split_repeats(scores.driven, start_places(scores), keys)
+
+
+def labelled(starts, repeats):
+    return [f"{start}/{repeat}" for start in range(starts) for repeat in range(repeats)]
+
+
+def test_the_start_is_what_is_before_the_last_stroke():
+    assert [start_of(label) for label in ("3", "3/0", "loop/3/1", "/1")] == ["3", "3", "loop/3", "/1"]
+    assert starts_of(["1/0", "0/0", "1/1"]) == ("1", "0")
+
+
+def test_both_sets_hold_every_start_equally_often_and_share_no_episode():
+    values = np.zeros((3, 9))
+    values[0, 4] = np.nan
+    first, second = split(table_of_repeats(values, labelled(3, 3)), 40)
+    assert not (first & second).any()
+    assert not first[0, :, 4].any()
+    assert not second[0, :, 4].any()
+    for one in (first, second):
+        assert (one.reshape(3, 40, 3, 3).sum(axis=-1) == 1).all()
+    assert (first[1] == first[2]).all()
+    assert len(np.unique(first[1], axis=0)) > 5
+
+
+def test_an_agent_that_lost_a_repeat_is_split_over_its_other_starts():
+    values = np.zeros((2, 4))
+    values[0, 3] = np.nan
+    first, second = split(table_of_repeats(values, labelled(2, 2)), 10)
+    assert (first[0] ^ second[0] == [True, True, False, False]).all()
+    assert (first[1] ^ second[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("labels", "expected"),
+    [
+        (labelled(2, 2), True),
+        (["0", "1", "2", "3"], False),
+        (["0/0", "0/1", "1/0", "2/0"], False),
+        (["0/0", "0/1", "1", "1/0"], True),
+    ],
+)
+def test_repeats_are_there_only_where_every_start_has_two(labels, expected):
+    assert is_repeated(table_of_repeats(np.zeros((2, 4)), labels)) is expected
+
+
+def test_labels_of_an_agent_s_own_are_no_starts():
+    values = [[0.0, 0.0, np.nan, np.nan], [np.nan, np.nan, 0.0, 0.0]]
+    assert not is_repeated(table_of_repeats(values, ["A0/0", "A0/1", "A1/0", "A1/1"]))
+
+
+def test_an_agent_without_any_start_twice_leaves_nothing_to_split():
+    values = [[0.0, np.nan, 0.0, np.nan], [0.0] * 4]
+    assert not is_repeated(table_of_repeats(values, labelled(2, 2)))
+
+
+def test_by_start_takes_the_mean_over_the_repeats_that_were_driven():
+    found = by_start(table_of_repeats([[1.0, 3.0, np.nan, 5.0], [1.0, 1.0, np.nan, np.nan]], labelled(2, 2)))
+    assert found.episodes == ("0", "1")
+    np.testing.assert_array_equal(found.values[:, :, 0], [[2.0, 5.0], [1.0, np.nan]])
+
+
+def test_repeats_of_a_start_are_drawn_together_and_plain_episodes_as_ever():
+    repeated, plain = table_of_repeats(np.zeros((2, 6)), labelled(3, 2)), table_of_repeats(np.zeros((2, 3)), "012")
+    counts = draw_counts(repeated, np.random.default_rng(0), 30)
+    assert (counts[..., ::2] == counts[..., 1::2]).all()
+    np.testing.assert_array_equal(counts[..., ::2], draw_counts(plain, np.random.default_rng(0), 30))
+
+
+def test_of_one_start_alone_the_repeats_are_drawn_and_that_is_said():
+    values = np.random.default_rng(0).normal(size=(4, 6))
+    counts = draw_counts(table_of_repeats(values, labelled(1, 6)), np.random.default_rng(0), 30)
+    assert len(np.unique(counts[0], axis=0)) > 10
+    assert not compare(
+        proxy=table_of_repeats(values[:, :3], labelled(1, 3)),
+        target=table_of_repeats(values, labelled(1, 6)),
+        metrics=REPEATS_M,
+    ).paired
+    found = assess(
+        proxy=table_of_repeats(values, "abcdef"), target=table_of_repeats(values, labelled(1, 6)), metrics=REPEATS_M
+    )
+    assert any("from one start" in note for note in found.notes)
+
+
+def test_a_proxy_of_plain_starts_is_paired_with_a_target_of_repeats_by_start():
+    """Scores that depend on the start alone stay equal in every resample, in whatever order the starts come."""
+    starts = np.random.default_rng(0).normal(size=(1, 5)).repeat(3, axis=0)
+    target = table_of_repeats(starts.repeat(2, axis=1), labelled(5, 2))
+    inputs = compare(proxy=table_of_repeats(starts[:, ::-1], "43210"), target=target, metrics=REPEATS_M)
+    assert inputs.paired
+    means = bootstrap_means(inputs, resamples=50, seed=1)
+    np.testing.assert_allclose(means[0], means[1], atol=1e-12)
+    assert np.ptp(means[0], axis=0).min() > 0.0
+    assert not compare(proxy=table_of_repeats(starts, "abcde"), target=target, metrics=REPEATS_M).paired
+
+
+def test_more_repeats_of_the_same_starts_make_no_interval_narrower():
+    """Copies of every episode say nothing new."""
+    rng = np.random.default_rng(3)
+    starts, proxy = rng.normal(size=(8, 4)), table_of_repeats(rng.normal(size=(8, 6)), "abcdef")
+    once = bootstrap_prpv(proxy=proxy, target=table_of_repeats(starts, "0123"), metrics=REPEATS_M)
+    copied = bootstrap_prpv(
+        proxy=proxy, target=table_of_repeats(starts.repeat(5, axis=1), labelled(4, 5)), metrics=REPEATS_M
+    )
+    assert (copied.low, copied.high) == (once.low, once.high)
+
+
+def test_starts_and_not_repeats_are_counted_as_few():
+    values = np.random.default_rng(0).normal(size=(4, 12))
+    found = assess(
+        proxy=table_of_repeats(values, labelled(3, 4)),
+        target=table_of_repeats(values, labelled(3, 4)),
+        metrics=REPEATS_M,
+    )
+    assert any(note.startswith("only 3 starts per agent") for note in found.notes)
+    loose = table_of_repeats(values, labelled(3, 4)).unpaired()
+    assert not any("few" in note for note in assess(proxy=loose, target=loose, metrics=REPEATS_M).notes)

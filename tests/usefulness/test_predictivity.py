@@ -1,0 +1,227 @@
+"""SRCC and Kendall's τ agree with scipy and SIMPLER, and say where they are undefined.
+
+MMRV is what a wrong order costs on the target.
+POD compares what two domains answer to the same commands.
+PPV weighs how far the scores are off.
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from proxytune.errors import InputError
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness import pod_of_images, pod_of_poses
+from proxytune.usefulness.predictivity import (
+    kendall_of_means,
+    kendall_tau,
+    mmrv,
+    mmrv_of_means,
+    pearson_of_means,
+    ppv,
+    srcc,
+)
+
+SCORES = Path(__file__).parents[2] / "../shared/data/scores"
+M = [Metric("m"), Metric("n")]
+
+
+def table(rows, agents="ABCDEFGH"):
+    return ScoreTable.from_episodes({(agents[i], 1): {"m": float(m), "n": float(n)} for i, (m, n) in enumerate(rows)})
+
+
+def test_both_agree_with_scipy_also_where_there_are_ties():
+    rng = np.random.default_rng(1)
+    proxy, target = rng.integers(0, 4, size=(2, 50, 8, 2)).astype(float)
+    pearson, kendall = pearson_of_means(proxy, target), kendall_of_means(proxy, target)
+    for i, column in np.ndindex(50, 2):
+        one, other = proxy[i, :, column], target[i, :, column]
+        assert pearson[i, column] == pytest.approx(stats.pearsonr(one, other).statistic, abs=1e-7)
+        assert kendall[i, column] == pytest.approx(stats.kendalltau(one, other).statistic, abs=1e-12)
+
+
+def test_a_constant_metric_is_undefined_and_said_so():
+    proxy, target = table([(1, 5), (2, 5), (3, 5)]), table([(1, 1), (2, 2), (2, 3)])
+    for measure in (srcc, kendall_tau):
+        result = measure(proxy=proxy, target=target, metrics=M)
+        assert result.value["n"] is None
+        assert result.value["m"] > 0
+        assert [note for note in result.notes if "n: " in note and "alike in the proxy" in note]
+        assert (result.better, result.range) == ("higher", (-1, 1))
+
+
+def test_identical_tables_correlate_exactly():
+    same = table([(0.1, 5), (0.2, 3), (0.4, 4)])
+    for measure in (srcc, kendall_tau):
+        assert measure(proxy=same, target=same, metrics=M).value == {"m": 1.0, "n": 1.0}
+
+
+def test_two_agents_correlate_perfectly_which_means_nothing():
+    result = srcc(proxy=table([(1, 1), (2, 2)]), target=table([(1, 2), (2, 1)]), metrics=M)
+    assert result.value == {"m": pytest.approx(1.0), "n": pytest.approx(-1.0)}
+    assert "of two agents" in result.notes[0]
+
+
+@pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
+def test_simplers_own_figures_come_out():
+    rows = list(csv.DictReader((SCORES / "simpler_success.csv").open()))
+    golden = list(csv.DictReader((SCORES / "simpler_golden.csv").open()))
+    metric = [Metric("success")]
+    assert len(golden) == 9
+    for task in golden:
+        own = [row for row in rows if row["task"] == task["task"]]
+        sides = {
+            side: ScoreTable.from_episodes({(r["policy"], 1): {"success": float(r[f"{side}_success"])} for r in own})
+            for side in ("proxy", "target")
+        }
+        assert mmrv(**sides, metrics=metric).value["success"] == pytest.approx(float(task["mmrv"]), abs=1e-9)
+        assert srcc(**sides, metrics=metric).value["success"] == pytest.approx(float(task["pearson"]), abs=1e-9)
+
+
+def table_of_mmrv(values):
+    return ScoreTable.from_episodes({(a, 1): {"m": v} for a, v in zip("ABC", values, strict=True)})
+
+
+def test_three_agents_by_hand():
+    """B and C change places: that costs each of them 0.3, and A nothing."""
+    result = mmrv(proxy=table_of_mmrv([0.9, 0.4, 0.6]), target=table_of_mmrv([0.8, 0.5, 0.2]), metrics=[Metric("m")])
+    assert result.value["m"] == pytest.approx((0 + 0.3 + 0.3) / 3)
+    assert result.range["m"] == (0.0, pytest.approx(0.6))
+    assert result.better == "lower"
+
+
+def simplers_loop(proxy, target):
+    """The definition as a double loop, with SIMPLER's > between agents."""
+    agents = range(len(proxy))
+    costs = [
+        [abs(target[i] - target[j]) * ((proxy[i] > proxy[j]) != (target[i] > target[j])) for j in agents]
+        for i in agents
+    ]
+    return np.mean([max(row) for row in costs])
+
+
+def test_it_is_simplers_double_loop_also_where_there_are_ties():
+    rng = np.random.default_rng(0)
+    proxy, target = rng.integers(0, 4, size=(2, 40, 5, 1)).astype(float)
+    for direction, sign in (("max", 1), ("min", -1)):
+        values = mmrv_of_means(proxy, target, [Metric("m", direction)])[:, 0]
+        expected = [simplers_loop(sign * p[:, 0], sign * t[:, 0]) for p, t in zip(proxy, target, strict=True)]
+        np.testing.assert_allclose(values, expected, atol=1e-12)
+
+
+def test_a_proxy_that_ties_everything_is_charged_for_the_better_agents():
+    tied, target = table_of_mmrv([0.5, 0.5, 0.5]), table_of_mmrv([0.1, 0.4, 0.9])
+    assert mmrv(proxy=tied, target=target, metrics=[Metric("m")]).value["m"] == pytest.approx((0 + 0.3 + 0.8) / 3)
+    assert mmrv(proxy=tied, target=target, metrics=[Metric("m", "min")]).value["m"] == pytest.approx(
+        (0.8 + 0.5 + 0) / 3
+    )
+
+
+def test_the_same_order_costs_nothing_in_either_direction():
+    for direction in ("max", "min"):
+        metric = [Metric("m", direction)]
+        assert (
+            mmrv(proxy=table_of_mmrv([1.0, 5.0, 9.0]), target=table_of_mmrv([0.1, 0.2, 0.7]), metrics=metric).value["m"]
+            == 0.0
+        )
+
+
+STILL = np.zeros((4, 3))
+APART = STILL + np.array([3.0, 4.0, 0.0])
+
+
+def test_poses_apart_by_three_and_four_are_five_apart():
+    result = pod_of_poses(proxy=APART, target=STILL)
+    assert (result.value, result.unit, result.observations) == (5.0, "m", 4)
+    assert pod_of_poses(proxy=APART, target=STILL, reduction="sum").value == 20.0
+
+
+def test_a_heading_counts_only_with_its_weight_and_goes_round():
+    turned = STILL + np.array([0.0, 0.0, 2 * np.pi - 0.5])
+    assert pod_of_poses(proxy=turned, target=STILL).value == 0.0
+    result = pod_of_poses(proxy=turned, target=STILL, metres_per_radian=0.1)
+    assert result.value == pytest.approx(0.05)
+    assert "0.1 m/rad" in result.norm
+
+
+def test_images_differ_by_a_fraction_of_full_scale_whatever_their_type_and_size():
+    dark, bright = np.zeros((2, 3, 4, 3), dtype=np.uint8), np.full((2, 3, 4, 3), 51, dtype=np.uint8)
+    assert pod_of_images(proxy=bright, target=dark).value == pytest.approx(0.2)
+    assert pod_of_images(proxy=bright / 255, target=dark / 255).value == pytest.approx(0.2)
+    assert pod_of_images(proxy=bright[..., 0], target=dark[..., 0], reduction="sum").value == pytest.approx(0.4)
+
+
+def test_ranges_are_stated():
+    image = np.zeros((2, 3, 4))
+    assert pod_of_images(proxy=image + 1, target=image).range == (0.0, 1.0)
+    assert pod_of_images(proxy=image + 1, target=image, reduction="sum").range == (0.0, 2.0)
+    assert pod_of_poses(proxy=STILL, target=STILL).range == (0.0, None)
+
+
+@pytest.mark.parametrize(
+    ("measure", "proxy", "target", "complaint"),
+    [
+        (pod_of_poses, STILL, STILL[:2], "at the same times"),
+        (pod_of_poses, STILL[:, :2], STILL[:, :2], "x, y, heading"),
+        (pod_of_poses, STILL[:0], STILL[:0], "no observation"),
+        (pod_of_poses, STILL * np.nan, STILL, "NaN"),
+        (pod_of_images, STILL, STILL, "height, width"),
+        (pod_of_images, np.zeros((1, 2, 2)), np.full((1, 2, 2), 200.0), "within 0 and 1"),
+        (pod_of_images, np.zeros((1, 2, 2), np.uint8), np.zeros((1, 2, 2)), "must both be"),
+    ],
+)
+def test_observations_that_cannot_be_compared_are_refused(measure, proxy, target, complaint):
+    with pytest.raises(InputError, match=complaint):
+        measure(proxy=proxy, target=target)
+
+
+def table_of_ppv(rows):
+    return ScoreTable.from_episodes({(a, 1): {"m": m, "n": n} for a, (m, n) in zip("ABC", rows, strict=True)})
+
+
+TARGET = table_of_ppv([(1.0, 10.0), (2.0, 20.0), (3.0, 30.0)])
+
+
+def test_given_weights_by_hand():
+    proxy = table_of_ppv([(2.0, 10.0), (2.0, 20.0), (1.0, 36.0)])
+    result = ppv(proxy=proxy, target=TARGET, metrics=M, beta={"m": 1.0, "n": 0.5})
+    assert result.value == pytest.approx((1 + 0 + 2 + 0.5 * 6) / 3)
+    assert result.better == "lower"
+
+
+def test_without_weights_a_metric_counts_in_its_spread_on_the_target():
+    proxy = table_of_ppv([(2.0, 20.0), (3.0, 30.0), (4.0, 40.0)])
+    result = ppv(proxy=proxy, target=TARGET, metrics=M)
+    assert result.beta == {"m": pytest.approx(1.0), "n": pytest.approx(0.1)}
+    assert result.value == pytest.approx(2.0)
+
+
+def test_identical_tables_are_foretold_exactly():
+    assert ppv(proxy=TARGET, target=TARGET, metrics=M).value == 0.0
+
+
+def test_the_unit_of_a_metric_does_not_matter_without_weights():
+    proxy = table_of_ppv([(2.0, 10.0), (2.0, 20.0), (1.0, 36.0)])
+    scaled = [table_of_ppv([(1000 * m, n) for m, n in side.means.tolist()]) for side in (proxy, TARGET)]
+    assert ppv(proxy=scaled[0], target=scaled[1], metrics=M).value == pytest.approx(
+        ppv(proxy=proxy, target=TARGET, metrics=M).value
+    )
+
+
+def test_a_metric_constant_on_the_target_is_left_out_and_said_so():
+    flat = table_of_ppv([(1.0, 5.0), (2.0, 5.0), (3.0, 5.0)])
+    result = ppv(proxy=TARGET, target=flat, metrics=M)
+    assert (result.value, result.beta["n"]) == (0.0, None)
+    assert "n: left out of PPV" in result.notes[0]
+    assert ppv(proxy=TARGET, target=flat, metrics=[Metric("n")]).value is None
+
+
+@pytest.mark.parametrize(
+    "beta", [{"m": 1.0}, {"m": 1.0, "n": -1.0}, {"m": 1.0, "n": float("nan")}, {"m": 1.0, "k": 1.0}]
+)
+def test_weights_that_do_not_fit_are_refused(beta):
+    with pytest.raises(InputError, match="weight"):
+        ppv(proxy=TARGET, target=TARGET, metrics=M, beta=beta)

@@ -32,10 +32,10 @@ from proxytune.usefulness import (
     Measure,
     Measured,
     assess,
+    interval as central_interval,
     pod_of_images,
     pod_of_poses,
 )
-from proxytune.usefulness import interval as central_interval
 
 
 def has_answer(study: Study) -> bool:

@@ -44,10 +44,10 @@ from proxytune.study import (
     retry_failed,
     run_confirmation,
     run_preflight,
+    run_study as run_trials,
     stored_run,
     with_spending,
 )
-from proxytune.study import run_study as run_trials
 
 FIGURES: Mapping[str, Callable[[StudyResult], Figure]] = {
     "convergence": convergence,

@@ -1,62 +1,57 @@
-from .answer import Diagnosis as Diagnosis
-from .answer import Estimate as Estimate
-from .answer import HorizonError as HorizonError
-from .answer import main_error as main_error
+from .answer import Diagnosis as Diagnosis, Estimate as Estimate, HorizonError as HorizonError, main_error as main_error
 from .camera.diagnose import camera_effects as camera_effects
-from .camera.edges import Edges as Edges
-from .camera.edges import effects_of as effects_of
-from .camera.error import CameraDiagnosis as CameraDiagnosis
-from .camera.error import CameraEffect as CameraEffect
-from .camera.error import Comparison as Comparison
-from .camera.error import LaidLine as LaidLine
-from .camera.error import LaidMap as LaidMap
-from .camera.error import PictureError as PictureError
+from .camera.edges import Edges as Edges, effects_of as effects_of
+from .camera.error import (
+    CameraDiagnosis as CameraDiagnosis,
+    CameraEffect as CameraEffect,
+    Comparison as Comparison,
+    LaidLine as LaidLine,
+    LaidMap as LaidMap,
+    PictureError as PictureError,
+)
 from .camera.fitting import CameraFit as CameraFit
 from .camera.light import Blemish as Blemish
 from .camera.model import project as project
-from .camera.selection import LEAST_NATS as LEAST_NATS
-from .camera.selection import Leftover as Leftover
-from .camera.selection import rank_subsets as rank_subsets
-from .log_diagnosis import LogDiagnosis as LogDiagnosis
-from .log_diagnosis import diagnose_log as diagnose_log
-from .log_diagnosis import frames_of as frames_of
-from .log_diagnosis import predict_pictures as predict_pictures
-from .motion.clocks import Clocks as Clocks
-from .motion.clocks import Offset as Offset
-from .motion.discrepancy_match import Learning as Learning
-from .motion.discrepancy_match import Lookalike as Lookalike
-from .motion.drives import Drives as Drives
-from .motion.drives import Floats as Floats
-from .motion.drives import Whole as Whole
-from .motion.drives import robot_of as robot_of
-from .motion.effect_size import Unlike as Unlike
-from .motion.effect_size import Worth as Worth
-from .motion.evidence import AdoptedEffect as AdoptedEffect
-from .motion.evidence import Findings as Findings
-from .motion.evidence import TriedEffect as TriedEffect
+from .camera.selection import LEAST_NATS as LEAST_NATS, Leftover as Leftover, rank_subsets as rank_subsets
+from .log_diagnosis import (
+    LogDiagnosis as LogDiagnosis,
+    diagnose_log as diagnose_log,
+    frames_of as frames_of,
+    predict_pictures as predict_pictures,
+)
+from .motion.clocks import Clocks as Clocks, Offset as Offset
+from .motion.discrepancy_match import Learning as Learning, Lookalike as Lookalike
+from .motion.drives import Drives as Drives, Floats as Floats, Whole as Whole, robot_of as robot_of
+from .motion.effect_size import Unlike as Unlike, Worth as Worth
+from .motion.evidence import AdoptedEffect as AdoptedEffect, Findings as Findings, TriedEffect as TriedEffect
 from .motion.fitting import Fit as Fit
-from .motion.innovations import HUBER as HUBER
-from .motion.innovations import RANDOM_EFFECTS as RANDOM_EFFECTS
-from .motion.innovations import disturbed_increments as disturbed_increments
-from .motion.innovations import drawn_wheel_speeds as drawn_wheel_speeds
-from .motion.innovations import increments as increments
-from .motion.innovations import span as span
-from .motion.innovations import theta_at as theta_at
-from .motion.innovations import wheel_speeds as wheel_speeds
-from .motion.prediction import Ratio as Ratio
-from .motion.prediction import Rmse as Rmse
-from .motion.prediction import agreement as agreement
-from .motion.prediction import cut as cut
-from .motion.prediction import pose_errors as pose_errors
-from .motion.prediction import predict as predict
-from .motion.screening import MOTION_EFFECTS as MOTION_EFFECTS
-from .motion.screening import motion_effects as motion_effects
+from .motion.innovations import (
+    HUBER as HUBER,
+    RANDOM_EFFECTS as RANDOM_EFFECTS,
+    disturbed_increments as disturbed_increments,
+    drawn_wheel_speeds as drawn_wheel_speeds,
+    increments as increments,
+    span as span,
+    theta_at as theta_at,
+    wheel_speeds as wheel_speeds,
+)
+from .motion.prediction import (
+    Ratio as Ratio,
+    Rmse as Rmse,
+    agreement as agreement,
+    cut as cut,
+    pose_errors as pose_errors,
+    predict as predict,
+)
+from .motion.screening import MOTION_EFFECTS as MOTION_EFFECTS, motion_effects as motion_effects
 from .motion.signals import Curve as Curve
-from .recording import PICTURES as PICTURES
-from .recording import FilmedDrive as FilmedDrive
-from .recording import film as film
-from .recording import frames_text as frames_text
-from .recording import log_text as log_text
-from .recording import record as record
-from .recording import samples_text as samples_text
+from .recording import (
+    PICTURES as PICTURES,
+    FilmedDrive as FilmedDrive,
+    film as film,
+    frames_text as frames_text,
+    log_text as log_text,
+    record as record,
+    samples_text as samples_text,
+)
 from .rules import RULES as RULES

@@ -1,61 +1,60 @@
-from .agent import Agent as Agent
-from .agent import Command as Command
-from .agent import Picture as Picture
-from .agents import AGENTS as AGENTS
-from .agents import NEEDS as NEEDS
-from .agents import load_agent as load_agent
+from .agent import Agent as Agent, Command as Command, Picture as Picture
+from .agents import AGENTS as AGENTS, NEEDS as NEEDS, load_agent as load_agent
 from .bullet import BulletPlant as BulletPlant
 from .cameras import GroundPlaneCamera as GroundPlaneCamera
-from .episode import METRICS as METRICS
-from .episode import TICK_HZ as TICK_HZ
-from .episode import Course as Course
-from .episode import Drive as Drive
-from .episode import Instance as Instance
-from .episode import Rollout as Rollout
-from .episode import Sight as Sight
-from .episode import check_command as check_command
-from .episode import drive as drive
-from .episode import follow as follow
-from .episode import measured as measured
-from .episode import score_trajectory as score_trajectory
-from .episode import start_pose as start_pose
+from .episode import (
+    METRICS as METRICS,
+    TICK_HZ as TICK_HZ,
+    Course as Course,
+    Drive as Drive,
+    Instance as Instance,
+    Rollout as Rollout,
+    Sight as Sight,
+    check_command as check_command,
+    drive as drive,
+    follow as follow,
+    measured as measured,
+    score_trajectory as score_trajectory,
+    start_pose as start_pose,
+)
 from .expert import Expert as Expert
-from .family import LaneFollowing as LaneFollowing
-from .family import lane_following as lane_following
-from .family import mounted_camera as mounted_camera
-from .lane import lane_length as lane_length
-from .lane import lane_point as lane_point
-from .lane import lane_pose as lane_pose
-from .lane import off_map as off_map
-from .maps import map_names as map_names
-from .maps import read_map as read_map
-from .maps import shipped_map as shipped_map
-from .optics import CameraFigures as CameraFigures
-from .optics import floor_points as floor_points
-from .optics import ground_points as ground_points
-from .optics import orientation as orientation
-from .plants import AXLES as AXLES
-from .plants import Body as Body
-from .plants import Drivetrain as Drivetrain
-from .plants import Plant as Plant
-from .plants import add_little_mass as add_little_mass
-from .plants import drivetrain as drivetrain
-from .plants import link_pose as link_pose
-from .plants import links_called as links_called
-from .plants import origin_of as origin_of
-from .plants import parse_urdf as parse_urdf
-from .plants import read_body as read_body
-from .plants import sound_urdf as sound_urdf
+from .family import LaneFollowing as LaneFollowing, lane_following as lane_following, mounted_camera as mounted_camera
+from .lane import lane_length as lane_length, lane_point as lane_point, lane_pose as lane_pose, off_map as off_map
+from .maps import map_names as map_names, read_map as read_map, shipped_map as shipped_map
+from .optics import (
+    CameraFigures as CameraFigures,
+    floor_points as floor_points,
+    ground_points as ground_points,
+    orientation as orientation,
+)
+from .plants import (
+    AXLES as AXLES,
+    Body as Body,
+    Drivetrain as Drivetrain,
+    Plant as Plant,
+    add_little_mass as add_little_mass,
+    drivetrain as drivetrain,
+    link_pose as link_pose,
+    links_called as links_called,
+    origin_of as origin_of,
+    parse_urdf as parse_urdf,
+    read_body as read_body,
+    sound_urdf as sound_urdf,
+)
 from .road import Road as Road
-from .road_picture import COLOURS as COLOURS
-from .road_picture import LINES as LINES
-from .road_picture import Markings as Markings
-from .road_picture import Marks as Marks
-from .road_picture import draw_floor as draw_floor
-from .robot import CAMERA as CAMERA
-from .robot import UNITS as UNITS
-from .robot import Robot as Robot
-from .robot import read_robot as read_robot
-from .robot import robot_from_geometry as robot_from_geometry
-from .robot import robot_home as robot_home
-from .robot import robot_names as robot_names
+from .road_picture import (
+    COLOURS as COLOURS,
+    LINES as LINES,
+    Markings as Markings,
+    Marks as Marks,
+    draw_floor as draw_floor,
+)
+from .robot import (
+    CAMERA as CAMERA,
+    UNITS as UNITS,
+    Robot as Robot,
+    read_robot as read_robot,
+    robot_from_geometry as robot_from_geometry,
+    robot_home as robot_home,
+    robot_names as robot_names,
+)

@@ -18,7 +18,6 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 

@@ -1,44 +1,48 @@
-from .catalogue import CATALOGUE as CATALOGUE
-from .catalogue import DECLARED as DECLARED
-from .catalogue import MEMBERS as MEMBERS
-from .catalogue import PARAMETERS as PARAMETERS
-from .catalogue import SHIPPED as SHIPPED
-from .catalogue import Catalogue as Catalogue
-from .catalogue import effect_of as effect_of
-from .catalogue import effects_from as effects_from
-from .catalogue import problems as problems
-from .catalogue import theta_names as theta_names
-from .effect import CHANNELS as CHANNELS
-from .effect import TURN as TURN
-from .effect import Cue as Cue
-from .effect import Draws as Draws
-from .effect import Effect as Effect
-from .effect import Form as Form
-from .effect import Lateness as Lateness
-from .effect import Means as Means
-from .effect import Memory as Memory
-from .effect import Panel as Panel
-from .effect import Setting as Setting
-from .effect import Signal as Signal
-from .effect import Stage as Stage
-from .effect import Trace as Trace
-from .effect import WheelCurve as WheelCurve
-from .features import GROUPS as GROUPS
-from .features import HEADING as HEADING
-from .features import LEVEL as LEVEL
-from .features import Knots as Knots
-from .image import Blur as Blur
-from .image import RollingShutter as RollingShutter
-from .learnt import Curve as Curve
-from .learnt import Learnt as Learnt
-from .learnt import Seen as Seen
-from .learnt import is_learnt as is_learnt
-from .learnt import learnt_effect as learnt_effect
-from .learnt import learnt_theta as learnt_theta
-from .model import Chain as Chain
-from .model import Model as Model
-from .model import model_text as model_text
-from .model import read_effects as read_effects
-from .model import read_model as read_model
-from .model import stage_chain as stage_chain
+from .catalogue import (
+    CATALOGUE as CATALOGUE,
+    DECLARED as DECLARED,
+    MEMBERS as MEMBERS,
+    PARAMETERS as PARAMETERS,
+    SHIPPED as SHIPPED,
+    Catalogue as Catalogue,
+    effect_of as effect_of,
+    effects_from as effects_from,
+    problems as problems,
+    theta_names as theta_names,
+)
+from .effect import (
+    CHANNELS as CHANNELS,
+    TURN as TURN,
+    Cue as Cue,
+    Draws as Draws,
+    Effect as Effect,
+    Form as Form,
+    Lateness as Lateness,
+    Means as Means,
+    Memory as Memory,
+    Panel as Panel,
+    Setting as Setting,
+    Signal as Signal,
+    Stage as Stage,
+    Trace as Trace,
+    WheelCurve as WheelCurve,
+)
+from .features import GROUPS as GROUPS, HEADING as HEADING, LEVEL as LEVEL, Knots as Knots
+from .image import Blur as Blur, RollingShutter as RollingShutter
+from .learnt import (
+    Curve as Curve,
+    Learnt as Learnt,
+    Seen as Seen,
+    is_learnt as is_learnt,
+    learnt_effect as learnt_effect,
+    learnt_theta as learnt_theta,
+)
+from .model import (
+    Chain as Chain,
+    Model as Model,
+    model_text as model_text,
+    read_effects as read_effects,
+    read_model as read_model,
+    stage_chain as stage_chain,
+)
 from .motors import SMALLEST_LIMIT as SMALLEST_LIMIT

@@ -1,19 +1,23 @@
-from .beside import Interrupted as Interrupted
-from .beside import Packed as Packed
-from .beside import folders as folders
-from .beside import import_beside as import_beside
-from .beside import interrupt as interrupt
-from .beside import is_users as is_users
-from .beside import open_folders as open_folders
-from .beside import pack as pack
-from .beside import permitting as permitting
-from .beside import unpack as unpack
-from .door import GROUP as GROUP
-from .door import ask as ask
-from .door import describe as describe
-from .door import load as load
-from .door import make as make
-from .door import one_line as one_line
-from .door import place_of as place_of
-from .door import plugins as plugins
-from .door import require as require
+from .beside import (
+    Interrupted as Interrupted,
+    Packed as Packed,
+    folders as folders,
+    import_beside as import_beside,
+    interrupt as interrupt,
+    is_users as is_users,
+    open_folders as open_folders,
+    pack as pack,
+    permitting as permitting,
+    unpack as unpack,
+)
+from .door import (
+    GROUP as GROUP,
+    ask as ask,
+    describe as describe,
+    load as load,
+    make as make,
+    one_line as one_line,
+    place_of as place_of,
+    plugins as plugins,
+    require as require,
+)

@@ -1,10 +1,14 @@
-from .reading import open_log as open_log
-from .reading import read_source as read_source
-from .reading import source_without_unnamed_pictures as source_without_unnamed_pictures
-from .reading import write_log as write_log
-from .source import Facts as Facts
-from .source import Source as Source
-from .source import Survey as Survey
-from .source import Wanted as Wanted
-from .source import finite as finite
-from .source import read_geometry as read_geometry
+from .reading import (
+    open_log as open_log,
+    read_source as read_source,
+    source_without_unnamed_pictures as source_without_unnamed_pictures,
+    write_log as write_log,
+)
+from .source import (
+    Facts as Facts,
+    Source as Source,
+    Survey as Survey,
+    Wanted as Wanted,
+    finite as finite,
+    read_geometry as read_geometry,
+)

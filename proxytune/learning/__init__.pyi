@@ -1,37 +1,39 @@
-from .curve_model import POSTERIOR_DRAWS as POSTERIOR_DRAWS
-from .curve_model import Curve as Curve
-from .curve_model import places as places
-from .learner import Learner as Learner
-from .learner import Weights as Weights
-from .learner import policy_of as policy_of
-from .lessons import Arrays as Arrays
-from .lessons import Cache as Cache
-from .lessons import Costs as Costs
-from .lessons import Distribution as Distribution
-from .lessons import collect_samples as collect_samples
-from .lessons import describe as describe
-from .lessons import digest as digest
-from .lessons import examine as examine
-from .lessons import learner_identity as learner_identity
-from .lessons import mix_samples as mix_samples
-from .plv import LEVELS as LEVELS
-from .plv import Convergence as Convergence
-from .plv import Estimate as Estimate
-from .plv import Examination as Examination
-from .plv import SampleNeeds as SampleNeeds
-from .plv import Scores as Scores
-from .plv import Spending as Spending
-from .plv import Teaching as Teaching
-from .plv import curves_of as curves_of
-from .plv import difference as difference
-from .plv import estimate as estimate
-from .plv import first_examinations as first_examinations
-from .plv import mean_score as mean_score
-from .plv import next_examinations as next_examinations
-from .plv import sample_needs as sample_needs
-from .plv import teaching as teaching
-from .settings import EXPERT as EXPERT
-from .settings import LEARNER as LEARNER
-from .settings import NONE as NONE
-from .settings import TeachingSettings as TeachingSettings
-from .settings import read_teaching as read_teaching
+from .curve_model import POSTERIOR_DRAWS as POSTERIOR_DRAWS, Curve as Curve, places as places
+from .learner import Learner as Learner, Weights as Weights, policy_of as policy_of
+from .lessons import (
+    Arrays as Arrays,
+    Cache as Cache,
+    Costs as Costs,
+    Distribution as Distribution,
+    collect_samples as collect_samples,
+    describe as describe,
+    digest as digest,
+    examine as examine,
+    learner_identity as learner_identity,
+    mix_samples as mix_samples,
+)
+from .plv import (
+    LEVELS as LEVELS,
+    Convergence as Convergence,
+    Estimate as Estimate,
+    Examination as Examination,
+    SampleNeeds as SampleNeeds,
+    Scores as Scores,
+    Spending as Spending,
+    Teaching as Teaching,
+    curves_of as curves_of,
+    difference as difference,
+    estimate as estimate,
+    first_examinations as first_examinations,
+    mean_score as mean_score,
+    next_examinations as next_examinations,
+    sample_needs as sample_needs,
+    teaching as teaching,
+)
+from .settings import (
+    EXPERT as EXPERT,
+    LEARNER as LEARNER,
+    NONE as NONE,
+    TeachingSettings as TeachingSettings,
+    read_teaching as read_teaching,
+)

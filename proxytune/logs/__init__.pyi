@@ -1,8 +1,10 @@
 from .frames import read_pictures as read_pictures
-from .log import COMMANDS as COMMANDS
-from .log import GEOMETRY as GEOMETRY
-from .log import Frames as Frames
-from .log import Log as Log
-from .log import LogEpisode as LogEpisode
-from .log import Measured as Measured
+from .log import (
+    COMMANDS as COMMANDS,
+    GEOMETRY as GEOMETRY,
+    Frames as Frames,
+    Log as Log,
+    LogEpisode as LogEpisode,
+    Measured as Measured,
+)
 from .reading import read_log as read_log

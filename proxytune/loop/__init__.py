@@ -1,4 +1,4 @@
-"""proxytune.loop"""
+"""The loop in one command: tune, diagnose, extend, tune again."""
 
 import lazy_loader
 

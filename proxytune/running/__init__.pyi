@@ -1,20 +1,7 @@
-from .apart import Apart as Apart
-from .apart import Lost as Lost
+from .apart import Apart as Apart, Lost as Lost
 from .cluster import on_cluster as on_cluster
-from .episodes import ENDED as ENDED
-from .episodes import ENDLESS as ENDLESS
-from .episodes import Watch as Watch
-from .episodes import run_episode as run_episode
-from .episodes import running as running
-from .limits import OVERRUN as OVERRUN
-from .limits import Noted as Noted
-from .limits import limited as limited
-from .limits import was_ended_in as was_ended_in
+from .episodes import ENDED as ENDED, ENDLESS as ENDLESS, Watch as Watch, run_episode as run_episode, running as running
+from .limits import OVERRUN as OVERRUN, Noted as Noted, limited as limited, was_ended_in as was_ended_in
 from .machine import check_machine as check_machine
-from .progress import Bars as Bars
-from .progress import Lines as Lines
-from .progress import Silent as Silent
-from .progress import Watcher as Watcher
-from .progress import progress_bar as progress_bar
-from .workers import Rescue as Rescue
-from .workers import working as working
+from .progress import Bars as Bars, Lines as Lines, Silent as Silent, Watcher as Watcher, progress_bar as progress_bar
+from .workers import Rescue as Rescue, working as working

@@ -1,8 +1,7 @@
-from .reading import column_names as column_names
-from .reading import read_domains as read_domains
-from .reading import read_scores as read_scores
-from .reading import write_scores as write_scores
-from .table import ROUNDING as ROUNDING
-from .table import Metric as Metric
-from .table import ScoreTable as ScoreTable
-from .table import varies as varies
+from .reading import (
+    column_names as column_names,
+    read_domains as read_domains,
+    read_scores as read_scores,
+    write_scores as write_scores,
+)
+from .table import ROUNDING as ROUNDING, Metric as Metric, ScoreTable as ScoreTable, varies as varies

@@ -1,43 +1,55 @@
-from .engine import Engine as Engine
-from .engine import Look as Look
-from .engine import from_unit as from_unit
-from .engine import to_unit as to_unit
-from .engine import unit_points as unit_points
-from .knowledge import Importance as Importance
-from .knowledge import Information as Information
-from .knowledge import Knowledge as Knowledge
-from .knowledge import importances as importances
-from .knowledge import learn as learn
-from .loop import Compose as Compose
-from .loop import Goal as Goal
-from .loop import Propose as Propose
-from .loop import Proposer as Proposer
-from .loop import Search as Search
-from .loop import Trial as Trial
-from .loop import Values as Values
-from .loop import batch_at as batch_at
-from .loop import propose_batch as propose_batch
-from .loop import with_failures_as_worst as with_failures_as_worst
-from .optuna_bridge import History as History
-from .optuna_bridge import PastTrial as PastTrial
-from .optuna_bridge import optimize_result as optimize_result
-from .optuna_bridge import write_optuna as write_optuna
-from .optuna_bridge import write_skopt as write_skopt
+from .engine import (
+    Engine as Engine,
+    Look as Look,
+    from_unit as from_unit,
+    to_unit as to_unit,
+    unit_points as unit_points,
+)
+from .knowledge import (
+    Importance as Importance,
+    Information as Information,
+    Knowledge as Knowledge,
+    importances as importances,
+    learn as learn,
+)
+from .loop import (
+    Compose as Compose,
+    Goal as Goal,
+    Propose as Propose,
+    Proposer as Proposer,
+    Search as Search,
+    Trial as Trial,
+    Values as Values,
+    batch_at as batch_at,
+    propose_batch as propose_batch,
+    with_failures_as_worst as with_failures_as_worst,
+)
+from .optuna_bridge import (
+    History as History,
+    PastTrial as PastTrial,
+    optimize_result as optimize_result,
+    write_optuna as write_optuna,
+    write_skopt as write_skopt,
+)
 from .outcomes import expected_gain as expected_gain
-from .registry import DEFAULT_ENGINE as DEFAULT_ENGINE
-from .registry import ENGINES as ENGINES
-from .registry import NAMES as NAMES
-from .registry import SCORE_ENGINE as SCORE_ENGINE
-from .registry import STUDY_ENGINES as STUDY_ENGINES
-from .registry import code_of as code_of
-from .registry import engine_code as engine_code
-from .registry import engine_of as engine_of
-from .registry import installed as installed
-from .registry import make_proposer as make_proposer
-from .registry import why_not as why_not
-from .registry import why_not_engine as why_not_engine
-from .surrogate import GAUSSIAN_PROCESS as GAUSSIAN_PROCESS
-from .surrogate import Surrogate as Surrogate
-from .surrogate import expected_improvement as expected_improvement
-from .surrogate import fit_surrogate as fit_surrogate
-from .surrogate import unit_array as unit_array
+from .registry import (
+    DEFAULT_ENGINE as DEFAULT_ENGINE,
+    ENGINES as ENGINES,
+    NAMES as NAMES,
+    SCORE_ENGINE as SCORE_ENGINE,
+    STUDY_ENGINES as STUDY_ENGINES,
+    code_of as code_of,
+    engine_code as engine_code,
+    engine_of as engine_of,
+    installed as installed,
+    make_proposer as make_proposer,
+    why_not as why_not,
+    why_not_engine as why_not_engine,
+)
+from .surrogate import (
+    GAUSSIAN_PROCESS as GAUSSIAN_PROCESS,
+    Surrogate as Surrogate,
+    expected_improvement as expected_improvement,
+    fit_surrogate as fit_surrogate,
+    unit_array as unit_array,
+)

@@ -160,8 +160,7 @@ def optimize_result(history: History) -> Any:
     """
     import numpy as np
     from scipy.optimize import OptimizeResult
-    from skopt.space import Real
-    from skopt.space import Space as Box
+    from skopt.space import Real, Space as Box
 
     sign = -1.0 if history.maximise else 1.0
     points = [[trial.theta[name] for name in history.space.names] for trial in history.trials]

@@ -1,70 +1,83 @@
-from .facts import adopt as adopt
-from .facts import note_search as note_search
-from .facts import open_to_look as open_to_look
-from .facts import unfounded as unfounded
-from .families import Choice as Choice
-from .families import ComparedFamilies as ComparedFamilies
-from .families import Lesson as Lesson
-from .families import TunedFamily as TunedFamily
-from .families import best_teacher as best_teacher
-from .families import read_lessons as read_lessons
-from .families import save_lessons as save_lessons
-from .families import tuned as tuned
-from .family import bare_family as bare_family
-from .family import check_bounds as check_bounds
-from .family import code_of as code_of
-from .family import load_family as load_family
-from .opening import PRPV as PRPV
-from .opening import Study as Study
-from .opening import measure_of as measure_of
-from .opening import open_settings as open_settings
-from .opening import open_study as open_study
-from .opening import read_target as read_target
-from .opening import study_facts as study_facts
-from .preflight import Preflight as Preflight
-from .preflight import most_preflight_episodes as most_preflight_episodes
-from .preflight import run_preflight as run_preflight
-from .pruning import goal_of as goal_of
-from .pruning import nothing_to_gain as nothing_to_gain
-from .pruning import out_of_time as out_of_time
-from .result import Best as Best
-from .result import Confirmation as Confirmation
-from .result import StudyResult as StudyResult
-from .result import history_of as history_of
-from .result import most_confirmation_episodes as most_confirmation_episodes
-from .result import result_of as result_of
-from .result import run_confirmation as run_confirmation
-from .run import as_stored as as_stored
-from .run import check_facts as check_facts
-from .run import rescored as rescored
-from .run import retry_failed as retry_failed
-from .run import run_study as run_study
-from .run import stored_run as stored_run
-from .run import with_metrics as with_metrics
-from .settings import FILE_NAME as FILE_NAME
-from .settings import LEARNING as LEARNING
-from .settings import MADE as MADE
-from .settings import StudySettings as StudySettings
-from .settings import as_document as as_document
-from .settings import read_study_settings as read_study_settings
-from .settings import study_around as study_around
-from .single_episode import APART_M as APART_M
-from .single_episode import RecordedEpisode as RecordedEpisode
-from .single_episode import SideBySide as SideBySide
-from .single_episode import can_record as can_record
-from .single_episode import check_episode as check_episode
-from .single_episode import check_robot as check_robot
-from .single_episode import drive_side_by_side as drive_side_by_side
-from .single_episode import load_target as load_target
-from .single_episode import record_episode as record_episode
-from .study_run import Evaluation as Evaluation
-from .study_run import Spent as Spent
-from .study_run import StudyRun as StudyRun
-from .study_run import failure_of as failure_of
-from .study_run import measure as measure
-from .study_run import outputs_of as outputs_of
-from .study_run import plan as plan
-from .study_run import score as score
-from .study_run import score_trials as score_trials
-from .study_run import table as table
-from .study_run import with_spending as with_spending
+from .facts import adopt as adopt, note_search as note_search, open_to_look as open_to_look, unfounded as unfounded
+from .families import (
+    Choice as Choice,
+    ComparedFamilies as ComparedFamilies,
+    Lesson as Lesson,
+    TunedFamily as TunedFamily,
+    best_teacher as best_teacher,
+    read_lessons as read_lessons,
+    save_lessons as save_lessons,
+    tuned as tuned,
+)
+from .family import (
+    bare_family as bare_family,
+    check_bounds as check_bounds,
+    code_of as code_of,
+    load_family as load_family,
+)
+from .opening import (
+    PRPV as PRPV,
+    Study as Study,
+    measure_of as measure_of,
+    open_settings as open_settings,
+    open_study as open_study,
+    read_target as read_target,
+    study_facts as study_facts,
+)
+from .preflight import (
+    Preflight as Preflight,
+    most_preflight_episodes as most_preflight_episodes,
+    run_preflight as run_preflight,
+)
+from .pruning import goal_of as goal_of, nothing_to_gain as nothing_to_gain, out_of_time as out_of_time
+from .result import (
+    Best as Best,
+    Confirmation as Confirmation,
+    StudyResult as StudyResult,
+    history_of as history_of,
+    most_confirmation_episodes as most_confirmation_episodes,
+    result_of as result_of,
+    run_confirmation as run_confirmation,
+)
+from .run import (
+    as_stored as as_stored,
+    check_facts as check_facts,
+    rescored as rescored,
+    retry_failed as retry_failed,
+    run_study as run_study,
+    stored_run as stored_run,
+    with_metrics as with_metrics,
+)
+from .settings import (
+    FILE_NAME as FILE_NAME,
+    LEARNING as LEARNING,
+    MADE as MADE,
+    StudySettings as StudySettings,
+    as_document as as_document,
+    read_study_settings as read_study_settings,
+    study_around as study_around,
+)
+from .single_episode import (
+    APART_M as APART_M,
+    RecordedEpisode as RecordedEpisode,
+    SideBySide as SideBySide,
+    can_record as can_record,
+    check_episode as check_episode,
+    check_robot as check_robot,
+    drive_side_by_side as drive_side_by_side,
+    load_target as load_target,
+    record_episode as record_episode,
+)
+from .study_run import (
+    Evaluation as Evaluation,
+    Spent as Spent,
+    StudyRun as StudyRun,
+    failure_of as failure_of,
+    measure as measure,
+    outputs_of as outputs_of,
+    plan as plan,
+    score as score,
+    score_trials as score_trials,
+    table as table,
+    with_spending as with_spending,
+)

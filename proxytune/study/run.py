@@ -15,8 +15,7 @@ from proxytune.settings import nearest
 from proxytune.storage import State, Store, TrialRecord
 from proxytune.study.facts import CODE, DESCRIBED, SEARCH, adopt, check_scores, describe, differ
 from proxytune.study.opening import Objective, Study, changes, read_target, study_facts
-from proxytune.study.preflight import FACT as NOT_REPEATABLE
-from proxytune.study.preflight import check_some_work
+from proxytune.study.preflight import FACT as NOT_REPEATABLE, check_some_work
 from proxytune.study.pruning import Cut, by_other_metrics, reference, run_or_cut, stopped
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.settings import LEARNING

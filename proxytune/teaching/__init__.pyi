@@ -1,23 +1,27 @@
 from .examining import count_examinations as count_examinations
-from .experiment import Agreement as Agreement
-from .experiment import Experiment as Experiment
-from .experiment import Observations as Observations
-from .experiment import Predictivity as Predictivity
-from .experiment import TeacherResult as TeacherResult
-from .experiment import check_proxies as check_proxies
-from .experiment import classrooms as classrooms
-from .experiment import load_setup as load_setup
-from .experiment import observe as observe
-from .experiment import predictivity as predictivity
-from .experiment import run_experiment as run_experiment
-from .experiment import teach_families as teach_families
-from .experiment import teaching_settings as teaching_settings
+from .experiment import (
+    Agreement as Agreement,
+    Experiment as Experiment,
+    Observations as Observations,
+    Predictivity as Predictivity,
+    TeacherResult as TeacherResult,
+    check_proxies as check_proxies,
+    classrooms as classrooms,
+    load_setup as load_setup,
+    observe as observe,
+    predictivity as predictivity,
+    run_experiment as run_experiment,
+    teach_families as teach_families,
+    teaching_settings as teaching_settings,
+)
 from .points import search_space as search_space
-from .search import PlvSearch as PlvSearch
-from .search import PlvStudy as PlvStudy
-from .search import PlvTrial as PlvTrial
-from .search import best_teacher as best_teacher
-from .search import most_examinations as most_examinations
-from .search import plv_or_worst as plv_or_worst
-from .search import saves_more as saves_more
-from .search import why_unknown as why_unknown
+from .search import (
+    PlvSearch as PlvSearch,
+    PlvStudy as PlvStudy,
+    PlvTrial as PlvTrial,
+    best_teacher as best_teacher,
+    most_examinations as most_examinations,
+    plv_or_worst as plv_or_worst,
+    saves_more as saves_more,
+    why_unknown as why_unknown,
+)

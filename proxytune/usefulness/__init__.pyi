@@ -1,53 +1,65 @@
-from .assessment import PAIRED as PAIRED
-from .assessment import PERFECT as PERFECT
-from .assessment import Assessment as Assessment
-from .assessment import Difference as Difference
-from .assessment import Selection as Selection
-from .assessment import assess as assess
-from .assessment import select_proxy as select_proxy
-from .catalogue import ALL as ALL
-from .catalogue import MEASURES as MEASURES
-from .catalogue import POD_IMAGE as POD_IMAGE
-from .catalogue import POD_POSE as POD_POSE
-from .catalogue import PODS as PODS
-from .catalogue import PPV as PPV
-from .catalogue import PRPV as PRPV
-from .catalogue import SRCC as SRCC
-from .catalogue import Measure as Measure
-from .catalogue import Measured as Measured
-from .noise import Chance as Chance
-from .noise import FloorKind as FloorKind
-from .noise import NoiseFloor as NoiseFloor
-from .noise import Rate as Rate
-from .noise import SuccessRates as SuccessRates
-from .noise import chance as chance
-from .noise import floor_of_repeats as floor_of_repeats
-from .noise import noise_floor as noise_floor
-from .pairs import Comparison as Comparison
-from .pairs import FlippedPair as FlippedPair
-from .pairs import Prpv as Prpv
-from .pairs import compare as compare
-from .pairs import dominance as dominance
-from .pairs import in_common as in_common
-from .pairs import prpv as prpv
-from .pairs import prpv_of_means as prpv_of_means
-from .pairs import start_of as start_of
-from .pairs import starts_of as starts_of
-from .predictivity import Correlation as Correlation
-from .predictivity import Mmrv as Mmrv
-from .predictivity import Pod as Pod
-from .predictivity import Ppv as Ppv
-from .predictivity import kendall_tau as kendall_tau
-from .predictivity import mmrv as mmrv
-from .predictivity import pod_of_images as pod_of_images
-from .predictivity import pod_of_poses as pod_of_poses
-from .predictivity import ppv as ppv
-from .predictivity import srcc as srcc
-from .resampling import Ends as Ends
-from .resampling import Intervals as Intervals
-from .resampling import PrpvInterval as PrpvInterval
-from .resampling import bootstrap_means as bootstrap_means
-from .resampling import bootstrap_prpv as bootstrap_prpv
-from .resampling import in_blocks as in_blocks
-from .resampling import interval as interval
-from .resampling import why_not_repeated as why_not_repeated
+from .assessment import (
+    PAIRED as PAIRED,
+    PERFECT as PERFECT,
+    Assessment as Assessment,
+    Difference as Difference,
+    Selection as Selection,
+    assess as assess,
+    select_proxy as select_proxy,
+)
+from .catalogue import (
+    ALL as ALL,
+    MEASURES as MEASURES,
+    POD_IMAGE as POD_IMAGE,
+    POD_POSE as POD_POSE,
+    PODS as PODS,
+    PPV as PPV,
+    PRPV as PRPV,
+    SRCC as SRCC,
+    Measure as Measure,
+    Measured as Measured,
+)
+from .noise import (
+    Chance as Chance,
+    FloorKind as FloorKind,
+    NoiseFloor as NoiseFloor,
+    Rate as Rate,
+    SuccessRates as SuccessRates,
+    chance as chance,
+    floor_of_repeats as floor_of_repeats,
+    noise_floor as noise_floor,
+)
+from .pairs import (
+    Comparison as Comparison,
+    FlippedPair as FlippedPair,
+    Prpv as Prpv,
+    compare as compare,
+    dominance as dominance,
+    in_common as in_common,
+    prpv as prpv,
+    prpv_of_means as prpv_of_means,
+    start_of as start_of,
+    starts_of as starts_of,
+)
+from .predictivity import (
+    Correlation as Correlation,
+    Mmrv as Mmrv,
+    Pod as Pod,
+    Ppv as Ppv,
+    kendall_tau as kendall_tau,
+    mmrv as mmrv,
+    pod_of_images as pod_of_images,
+    pod_of_poses as pod_of_poses,
+    ppv as ppv,
+    srcc as srcc,
+)
+from .resampling import (
+    Ends as Ends,
+    Intervals as Intervals,
+    PrpvInterval as PrpvInterval,
+    bootstrap_means as bootstrap_means,
+    bootstrap_prpv as bootstrap_prpv,
+    in_blocks as in_blocks,
+    interval as interval,
+    why_not_repeated as why_not_repeated,
+)

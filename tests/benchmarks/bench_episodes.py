@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from proxytune.domain import make_episode
-from proxytune.driving import TICK_HZ, BulletPlant, drivetrain, lane_following, load_agent, read_robot
-from proxytune.driving import cameras as ground_plane
-from proxytune.driving import plain_texels as plain
+from proxytune.driving import (
+    TICK_HZ,
+    BulletPlant,
+    cameras as ground_plane,
+    drivetrain,
+    lane_following,
+    load_agent,
+    plain_texels as plain,
+    read_robot,
+)
 from proxytune.driving.cameras import View
 from proxytune.driving.plants import PlanarPlant, integrate
 from proxytune.driving.texels import by_numba

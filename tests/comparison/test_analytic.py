@@ -1,6 +1,5 @@
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.comparison.analytic import CEILING, NOISE, STEP, Analytic
 from proxytune.search import from_unit, to_unit

@@ -1,6 +1,5 @@
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.comparison.calibrated import COMPARED, LONGEST, METRICS, Calibrated, replaced
 from proxytune.comparison.courses import course, simulated

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proxytune.diagnosis import film
-from proxytune.diagnosis import recording as filming
+from proxytune.diagnosis import film, recording as filming
 from proxytune.driving import LaneFollowing, drive, lane_pose, shipped_map
 from proxytune.driving.family import with_columns
 from proxytune.effects import Setting

@@ -7,8 +7,7 @@ import pybullet
 import pytest
 from nominal_camera import CAMERA
 
-from proxytune.driving import GroundPlaneCamera, draw_floor, ground_points, shipped_map
-from proxytune.driving import bullet as renderer
+from proxytune.driving import GroundPlaneCamera, bullet as renderer, draw_floor, ground_points, shipped_map
 from proxytune.driving.bullet import BulletCamera
 from proxytune.driving.optics import SKY
 from proxytune.driving.road_picture import Floor

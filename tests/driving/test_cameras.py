@@ -31,15 +31,21 @@ import matplotlib.image
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from nominal_camera import CAMERA
 
 from proxytune.domain import make_episode
-from proxytune.driving import GroundPlaneCamera, draw_floor, ground_points, lane_following, read_robot, shipped_map
-from proxytune.driving import cameras as ground_plane
-from proxytune.driving import plain_texels as plain
-from proxytune.driving import texels as choosing
+from proxytune.driving import (
+    GroundPlaneCamera,
+    cameras as ground_plane,
+    draw_floor,
+    ground_points,
+    lane_following,
+    plain_texels as plain,
+    read_robot,
+    shipped_map,
+    texels as choosing,
+)
 from proxytune.driving.cameras import View
 from proxytune.effects import CATALOGUE, PARAMETERS, Blur, Chain, RollingShutter, Setting, Stage, theta_names
 from proxytune.effects.image import CameraLatency

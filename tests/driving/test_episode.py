@@ -11,8 +11,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.domain import make_episode
 from proxytune.driving import (
@@ -20,6 +19,7 @@ from proxytune.driving import (
     TICK_HZ,
     BulletPlant,
     LaneFollowing,
+    bullet as worlds,
     drivetrain,
     lane_following,
     lane_length,
@@ -30,7 +30,6 @@ from proxytune.driving import (
     shipped_map,
     start_pose,
 )
-from proxytune.driving import bullet as worlds
 from proxytune.driving.episode import driving_score
 from proxytune.driving.plants import PlanarPlant, integrate
 from proxytune.effects import CATALOGUE, DECLARED, PARAMETERS, Setting, Stage, effects_from, theta_names

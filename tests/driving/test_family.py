@@ -7,11 +7,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.driving import (
     LaneFollowing,
+    family as identity,
     lineage,
     mounted_camera,
     read_robot,
@@ -19,7 +19,6 @@ from proxytune.driving import (
     robot_home,
     shipped_map,
 )
-from proxytune.driving import family as identity
 from proxytune.effects import effects_from
 from proxytune.errors import SettingsError
 from proxytune.files import shipped

@@ -5,8 +5,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from proxytune.driving import lane_length, lane_point, lane_pose, off_map, shipped_map
 

@@ -5,12 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from nominal_camera import CAMERA
 
-from proxytune.driving import COLOURS, GroundPlaneCamera, draw_floor, ground_points, shipped_map
-from proxytune.driving import cameras as ground_plane
+from proxytune.driving import (
+    COLOURS,
+    GroundPlaneCamera,
+    cameras as ground_plane,
+    draw_floor,
+    ground_points,
+    shipped_map,
+)
 from proxytune.driving.optics import CAMERA_CHANNELS, SKY, lens_rays
 from proxytune.driving.road_picture import Floor
 from proxytune.effects import PARAMETERS

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import square_loop
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.domain import make_episode
 from proxytune.driving import (

@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.driving import COLOURS, LINES, Markings, draw_floor, lane_length, lane_point, shipped_map
 from proxytune.driving.road import Arc, Straight

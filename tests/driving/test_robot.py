@@ -15,10 +15,10 @@ from proxytune.driving import (
     drivetrain,
     lane_following,
     read_robot,
+    robot as module,
     robot_from_geometry,
     robot_names,
 )
-from proxytune.driving import robot as module
 from proxytune.driving.plants import PlanarPlant
 from proxytune.driving.robot import REQUIRED
 from proxytune.effects import CATALOGUE, Setting, Stage, effects_from, theta_names

@@ -5,8 +5,7 @@ A first-order lag, exact for what holds over each sample.
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.effects import Setting
 from proxytune.effects.effect import FEW, beforehand, follow, lag_of, values_along

@@ -5,8 +5,7 @@ What was before is remembered the same, however a signal is cut.
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.effects import GROUPS
 from proxytune.effects.features import hats, low_passes, moved_since, play, rings, rolled_since

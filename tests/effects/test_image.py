@@ -5,8 +5,7 @@ From which instants a picture is made: ages of pictures and of their rows, again
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.effects import Blur, Chain, RollingShutter, Setting
 from proxytune.effects.image import CameraLatency, Defocus, Exposure, ImageNoise, Vignetting

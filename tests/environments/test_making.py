@@ -7,8 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from toy_families import CART, PENDULUM, SCREEN, domain, family
 
 from proxytune.domain import make_episode

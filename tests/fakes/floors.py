@@ -2,7 +2,7 @@
 
 FLOORS = (
     {"errors"},
-    {"settings", "drafts", "seeds", "meaning", "versions", "extensions", "space", "shipped", "scores", "logs"},
+    {"arrays", "settings", "files", "seeds", "identity", "extensions", "space", "scores", "logs"},
     {"usefulness", "effects", "importing"},
     {"domain"},
     {"driving"},
@@ -12,7 +12,7 @@ FLOORS = (
     {"sweep", "teaching", "comparison", "diagnosis"},
     {"report"},
     {"api", "testing", "skeletons"},
-    {"closing"},
+    {"loop"},
     {"cli"},
     {"__main__", "__init__"},
 )

@@ -17,8 +17,7 @@ from camera_truth.rates import EXAM, Rate, accuracy, all_sets, coverage, rates
 from camera_truth.room import sky
 from camera_truth.sight import COLUMNS, PUBLIC, ROWS, Bend, Bumper, Sight, Spot
 from camera_truth.tape import lay_tape, line_distances, straight_tape
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.driving import COLOURS, CameraFigures, GroundPlaneCamera, draw_floor, lane_pose, shipped_map
 from proxytune.driving.optics import lens_rays

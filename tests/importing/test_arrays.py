@@ -5,8 +5,7 @@ import io
 import numpy as np
 import pytest
 from drives import HEADINGS, PLACES, ROWS, SPEEDS, TIMES, write_arrays, write_csv
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from one_line import complaint_of
 
 from proxytune.errors import LogError

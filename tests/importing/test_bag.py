@@ -9,8 +9,7 @@ import sys
 import bags
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.errors import LogError
 from proxytune.importing import Wanted

@@ -9,14 +9,12 @@ from types import SimpleNamespace
 import bags
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from moving_frames import TIMES, circle, moving, read
 from PIL import Image
 
 from proxytune.errors import LogError
-from proxytune.importing import Wanted
-from proxytune.importing import bag_scene as pictures
+from proxytune.importing import Wanted, bag_scene as pictures
 from proxytune.importing.bag import open_bag
 from proxytune.importing.bag_scene import picture_of, read_pictures
 

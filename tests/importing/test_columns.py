@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.errors import LogError
 from proxytune.importing.columns import UNITS, contradiction, epoch_unit, own_unit, split_ending, split_unit

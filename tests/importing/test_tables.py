@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from drives import HEADINGS, PLACES, SPEEDS, TIMES, write_csv, write_mrclam, write_tum
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from one_line import complaint_of
 from project import ROOT
 

@@ -11,8 +11,7 @@ from pathlib import Path
 import bags
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from moving_frames import TIMES, circle, moving, read
 from scipy.spatial.transform import Rotation
 

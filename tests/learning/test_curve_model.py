@@ -7,8 +7,7 @@ Drawn learning curves keep within bounds, rise where the data allow it, and cros
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from made_up_learners import BEST, GRID, NONE, TOLERANCE, MadeUpLearners
 
 from proxytune.errors import InputError

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from schoolroom import SAMPLES_PER_S, Matrix, Schoolroom
 from tightrope import Tightrope
 from wobbly import Wobbly

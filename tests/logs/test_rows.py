@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from log_folders import complaint, write_files
 
-from proxytune.logs import read_log
-from proxytune.logs import rows as cells
+from proxytune.logs import read_log, rows as cells
 
 TWIST = 'format = 1\nname = "yard"\nrobot = "tractor"\ncommand = "twist"\nrate_hz = 10\n'
 HEADER = "episode,time,v,omega,x,y,heading"

@@ -14,8 +14,7 @@ from tiny_loop import RIGHTING, short, write_diagnosis, write_tiny
 
 from proxytune.api.studies import StudyReport
 from proxytune.cli.main import main
-from proxytune.loop import diagnosing
-from proxytune.loop import run as closing
+from proxytune.loop import diagnosing, run as closing
 from proxytune.loop.run import STEPS
 
 LINES = {name: f"step {number} of {len(STEPS)}," for number, name in enumerate(STEPS, start=1)}

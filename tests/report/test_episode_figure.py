@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from episodes import paired, recorded
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.driving import shipped_map
 from proxytune.report.drive.document import parting

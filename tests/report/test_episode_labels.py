@@ -1,8 +1,7 @@
 """Words on a map keep clear of each other, of marks and of paths."""
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.report.drive.labels import CORNERS, GAP, SIZE, corners_of
 

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.errors import InputError
 from proxytune.report.table_files import IN_LATEX, booktabs, check_ending, latex, write_csv, write_latex

@@ -6,8 +6,7 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 import pytest
 
-from proxytune.learning import Costs, Curve, Distribution, Teaching, sample_needs
-from proxytune.learning import Estimate as Worth
+from proxytune.learning import Costs, Curve, Distribution, Estimate as Worth, Teaching, sample_needs
 from proxytune.learning.plv import Published
 from proxytune.report.page.foot import foot_of
 from proxytune.report.page.rendering import html_of

@@ -1,8 +1,7 @@
 """Several points proposed together, while none of them is finished."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from steps import SPACE, WHOLE, search, steps
 
 from proxytune.search import NAMES, Trial, batch_at, make_proposer, propose_batch, why_not, with_failures_as_worst

@@ -6,8 +6,7 @@ The posterior over the box: its share, its intervals and its draws are those of 
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.stats import chi2
 from steps import SPACE, goal, whole
 

@@ -17,10 +17,10 @@ from proxytune.search import (
     engine_code,
     engine_of,
     make_proposer,
+    registry as digest,
+    registry as engines,
     why_not,
 )
-from proxytune.search import registry as digest
-from proxytune.search import registry as engines
 from proxytune.search.engine import AfterDesign, design_point
 from proxytune.testing.extension import check_engine
 

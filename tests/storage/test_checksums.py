@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import pytest
 from edited import edited
-from hypothesis import given, settings
-from hypothesis import strategies as some
+from hypothesis import given, settings, strategies as some
 
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import StoreError

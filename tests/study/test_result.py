@@ -24,12 +24,12 @@ from proxytune.study import (
     most_confirmation_episodes,
     open_study,
     plan,
+    result as confirmation,
     result_of,
     run_confirmation,
     run_study,
     table,
 )
-from proxytune.study import result as confirmation
 from proxytune.study.pruning import knowledge_of
 from proxytune.study.result import CANDIDATES, candidates, confirmation_of
 from proxytune.study.settings import StopRules

@@ -6,8 +6,7 @@ One episode to look at: what is kept of it, and what is no recording.
 import numpy as np
 import pytest
 from episodes import paired, recorded
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.domain import make_episode
 from proxytune.errors import EpisodeError, InputError

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from proxytune.scores import Metric, ScoreTable, read_domains
 from proxytune.usefulness import assess, chance, compare, floor_of_repeats, prpv_of_means

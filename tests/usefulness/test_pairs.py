@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, read_domains
@@ -21,12 +20,12 @@ from proxytune.usefulness import (
     compare,
     dominance,
     in_common,
+    pairs as standing,
     prpv_of_means,
     resampling,
     start_of,
     starts_of,
 )
-from proxytune.usefulness import pairs as standing
 from proxytune.usefulness.noise import _ties
 from proxytune.usefulness.pairs import FlippedPair, by_start, is_repeated, prpv, split_repeats, stand, start_places
 from proxytune.usefulness.predictivity import kendall_of_means, mmrv_of_means

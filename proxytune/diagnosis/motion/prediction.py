@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import t as student
-from scipy.stats import wilcoxon
+from scipy.stats import t as student, wilcoxon
 
 from proxytune.diagnosis.motion.drives import (
     Drives,

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pictured import PICTURES, ROBOT, lane_poses, pictures, write_pictures, write_still_frames
 from viewed import NEUTRAL, OPTICS, stood
 

@@ -9,13 +9,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pictured import lane_poses, pictures
 from viewed import at_truth, everything, stood
 
-from proxytune.diagnosis.camera import error as unseen
-from proxytune.diagnosis.camera import error as weighing
+from proxytune.diagnosis.camera import error as unseen, error as weighing
 from proxytune.diagnosis.camera.edges import Gathered
 from proxytune.diagnosis.camera.error import (
     CAP_PX,

@@ -12,8 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pictured import ROBOT, lane_poses, pictures
 from viewed import OPTICS, at_truth, driven, everything, still, stood, tracked, views_of
 

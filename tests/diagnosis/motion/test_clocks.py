@@ -15,8 +15,7 @@ from planted import ROBOT, TRUTH, driven_log, planted_drives, planted_log, with_
 from project import ROOT
 
 from proxytune.diagnosis import cut, increments
-from proxytune.diagnosis.motion import clocks as splitting
-from proxytune.diagnosis.motion import clocks as thinning
+from proxytune.diagnosis.motion import clocks as splitting, clocks as thinning
 from proxytune.diagnosis.motion.clocks import (
     BLOCKS,
     TEST_BLOCK_S,

@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from planted import NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis import HUBER, disturbed_increments, increments, wheel_speeds

@@ -13,8 +13,7 @@ import pytest
 from planted import DECLARED, NOISE, ROBOT, TRUTH, planted_drives
 
 from proxytune.diagnosis import AdoptedEffect, Curve, Findings
-from proxytune.diagnosis.motion import selection as naming
-from proxytune.diagnosis.motion import selection as searching
+from proxytune.diagnosis.motion import selection as naming, selection as searching
 from proxytune.diagnosis.motion.evidence import Evidence, FittedLead
 from proxytune.diagnosis.motion.fitting import evaluate, fit
 from proxytune.diagnosis.motion.innovations import at_edge

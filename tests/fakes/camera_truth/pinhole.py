@@ -14,8 +14,7 @@ from scipy.ndimage import map_coordinates
 from camera_truth.lens import rays
 from camera_truth.room import Room
 from camera_truth.sight import COLUMNS, ROWS, Sight
-from proxytune.driving import CameraFigures
-from proxytune.driving import bullet as renderer
+from proxytune.driving import CameraFigures, bullet as renderer
 from proxytune.driving.road_picture import Floor
 
 Values = NDArray[np.float64]

@@ -1,6 +1,5 @@
 """What `import proxytune` offers: named, typed, documented, and loaded only when it is used."""
 
-import ast
 import fnmatch
 import inspect
 import json
@@ -14,7 +13,6 @@ import pytest
 import proxytune
 
 ROOT = Path(__file__).resolve().parent.parent
-TOP = ROOT / "proxytune" / "__init__.py"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 NAMES = [name for name in proxytune.__all__ if name != "__version__"]
 HEAVY = {"numpy", "pandas", "matplotlib", "pybullet", "sklearn", "skopt", "torch"}
@@ -28,21 +26,8 @@ def loaded(code):
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-def imported_for_type_checkers():
-    """Each name with the module that type checkers take it from, without our prefix."""
-    tree = ast.parse(TOP.read_text(encoding="utf-8"))
-    block = next(node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
-    return {
-        alias.asname or alias.name: node.module.removeprefix("proxytune.")
-        for node in block.body
-        for alias in node.names
-    }
-
-
-def test_the_names_are_sorted_and_are_those_that_can_be_loaded_and_that_type_checkers_see():
+def test_the_names_are_sorted_and_can_all_be_listed():
     assert proxytune.__all__ == sorted(proxytune.__all__)
-    assert set(NAMES) == set(proxytune._HOMES)
-    assert imported_for_type_checkers() == proxytune._HOMES
     assert dir(proxytune) == proxytune.__all__
 
 

@@ -19,6 +19,13 @@ from .catalogue import (
     Measure as Measure,
     Measured as Measured,
 )
+from .comparison import (
+    Comparison as Comparison,
+    compare as compare,
+    in_common as in_common,
+    start_of as start_of,
+    starts_of as starts_of,
+)
 from .noise import (
     Chance as Chance,
     FloorKind as FloorKind,
@@ -30,16 +37,11 @@ from .noise import (
     noise_floor as noise_floor,
 )
 from .pairs import (
-    Comparison as Comparison,
     FlippedPair as FlippedPair,
     Prpv as Prpv,
-    compare as compare,
     dominance as dominance,
-    in_common as in_common,
     prpv as prpv,
     prpv_of_means as prpv_of_means,
-    start_of as start_of,
-    starts_of as starts_of,
 )
 from .predictivity import (
     Correlation as Correlation,

@@ -13,8 +13,9 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness.comparison import Comparison, compare
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
-from proxytune.usefulness.pairs import Comparison, Prpv, compare, prpv, prpv_of_means
+from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
 from proxytune.usefulness.predictivity import Correlation, Mmrv, Ppv, kendall_tau, mmrv, ppv, srcc
 from proxytune.usefulness.resampling import (
     CONFIDENCE,

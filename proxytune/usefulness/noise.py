@@ -10,19 +10,17 @@ from typing import Literal
 
 import numpy as np
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Flags, Floats
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness.pairs import (
-    Choice,
+from proxytune.usefulness.comparison import (
     Comparison,
     by_start,
     compare,
     is_repeated,
-    prpv_of_means,
     split_repeats,
-    stand,
     start_places,
 )
+from proxytune.usefulness.pairs import prpv_of_means, stand
 from proxytune.usefulness.resampling import agent_blocks, counted_means, draw_counts, in_blocks, interval, too_few
 
 FloorKind = Literal["same starts", "halves", "none"]
@@ -137,7 +135,7 @@ def _split_means(table: ScoreTable, rng: np.random.Generator, splits: int, same_
     return first, second
 
 
-def split_halves(driven: Choice, rng: np.random.Generator, splits: int) -> tuple[Choice, Choice]:
+def split_halves(driven: Flags, rng: np.random.Generator, splits: int) -> tuple[Flags, Flags]:
     """Which episodes fall into the first half and which into the second, each of shape (agents, splits, episodes).
 
     Args:

@@ -16,7 +16,8 @@ from proxytune.arrays import Floats
 from proxytune.errors import InputError
 from proxytune.scores import ROUNDING, Metric, ScoreTable, varies
 from proxytune.settings import nearest
-from proxytune.usefulness.pairs import FEW_AGENTS, Comparison, by_table, compare, kendall_of_table, violations_of_table
+from proxytune.usefulness.comparison import Comparison, compare
+from proxytune.usefulness.pairs import FEW_AGENTS, by_table, kendall_of_table, violations_of_table
 
 SMALLEST_SPREAD = 1e-150
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness.pairs import Comparison, compare, prpv_of_means, start_of, start_places
+from proxytune.usefulness.comparison import Comparison, compare, start_of, start_places
+from proxytune.usefulness.pairs import prpv_of_means
 from proxytune.usefulness.predictivity import Ppv, kendall_of_means, mmrv_of_means, pearson_of_means, ppv_of_means
 
 CONFIDENCE = 0.95

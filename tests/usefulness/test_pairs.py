@@ -5,7 +5,6 @@ PRPV against hand-worked cases, its properties, and the published pilot.
 START/REPEAT: repeats of a start are no other starts, for the bootstrap and for splits alike.
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,14 +19,16 @@ from proxytune.usefulness import (
     compare,
     dominance,
     in_common,
-    pairs as standing,
+    pairs,
+    predictivity,
     prpv_of_means,
     resampling,
     start_of,
     starts_of,
 )
+from proxytune.usefulness.comparison import by_start, is_repeated, split_repeats, start_places
 from proxytune.usefulness.noise import _ties
-from proxytune.usefulness.pairs import FlippedPair, by_start, is_repeated, prpv, split_repeats, stand, start_places
+from proxytune.usefulness.pairs import FlippedPair, prpv, stand
 from proxytune.usefulness.predictivity import kendall_of_means, mmrv_of_means
 from proxytune.usefulness.resampling import bootstrap_prpv, draw_counts
 
@@ -85,7 +86,7 @@ def test_agents_that_all_sides_have_are_kept_and_the_others_named():
 
 MEASURES = {
     "prpv": prpv_of_means,
-    "correlation": lambda proxy, target, metrics: kendall_of_means(proxy, target),
+    "kendall_tau": lambda proxy, target, metrics: kendall_of_means(proxy, target),
     "mmrv": mmrv_of_means,
 }
 KINDS = {
@@ -97,18 +98,19 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("module", MEASURES)
+@pytest.mark.parametrize("measure", MEASURES)
 @given(kind=st.sampled_from(sorted(KINDS)), seed=st.integers(0, 10**6), agents=st.integers(2, 100))
 @settings(max_examples=60, derandomize=True, deadline=None)
-def test_sorting_gives_what_comparing_every_pair_gives(module, kind, seed, agents):
+def test_sorting_gives_what_comparing_every_pair_gives(measure, kind, seed, agents):
     random = np.random.default_rng(seed)
     proxy, target = (KINDS[kind](random, (2, agents, 3)) for _ in range(2))
     metrics = (Metric("a"), Metric("b", "min", 0.1), Metric("c", "max", 5.0, percent=True))
-    pairwise = MEASURES[module](proxy, target, metrics)
+    pairwise = MEASURES[measure](proxy, target, metrics)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys.modules[f"proxytune.usefulness.{module}"], "FEW_AGENTS", 1)
-        patch.setattr(standing, "WORDS", agents + 1)  # a word of 64 agents at a time
-        np.testing.assert_array_equal(MEASURES[module](proxy, target, metrics), pairwise)
+        patch.setattr(pairs, "FEW_AGENTS", 1)
+        patch.setattr(predictivity, "FEW_AGENTS", 1)
+        patch.setattr(pairs, "WORDS", agents + 1)  # a word of 64 agents at a time
+        np.testing.assert_array_equal(MEASURES[measure](proxy, target, metrics), pairwise)
 
 
 def test_a_tolerance_that_differences_only_just_reach_is_a_tie_as_rounded():

@@ -408,8 +408,8 @@ def split(log: Log, robot: Robot, test: Log | None, clocks: Sequence[Clocks] = (
     for name, drives in zip(("fit", "test on"), parts, strict=True):
         if drives.seconds < LEAST_MOTION_S:
             raise LogError(
-                f"{log.name}: only {drives.seconds:.1f} s of measured motion to {name}, at least {LEAST_MOTION_S:.0f} s "
-                "are needed for each; record more episodes"
+                f"{log.name}: only {drives.seconds:.1f} s of measured motion to {name}, at least {LEAST_MOTION_S:.0f} "
+                "s are needed for each; record more episodes"
             )
     return Parts(thin(cut_into_blocks(parts.fitted)), cut_into_blocks(parts.tested))
 

@@ -1,0 +1,189 @@
+"""The two sides of every measure: a score table of the proxy and one of the target, with the same agents in one order.
+
+Starts and their repeats are read off the episodes' labels: START/REPEAT is one of several episodes from START, each
+under other noise.
+"""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proxytune.arrays import Flags, Floats, Whole
+from proxytune.errors import ScoresError
+from proxytune.scores import Metric, ScoreTable
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two score tables, of the proxy and of the target, with the same agents and metrics in the same order.
+
+    Attributes:
+        proxy: Scores in the proxy.
+        target: Scores on the target.
+        metrics: How agents are compared, in the order of both tables' columns.
+    """
+
+    proxy: ScoreTable
+    target: ScoreTable
+    metrics: tuple[Metric, ...]
+
+    @property
+    def agents(self) -> tuple[str, ...]:
+        """Names in the order of both tables' rows."""
+        return self.target.agents
+
+    @property
+    def paired(self) -> bool:
+        """True if both domains have the same starts of every agent, so that these are paired across domains.
+
+        Of one start alone, the same repeats are asked for.
+        """
+        if not (self.proxy.complete and self.target.complete):
+            return False
+        starts, others = (set(starts_of(side.episodes)) for side in (self.proxy, self.target))
+        return self.proxy.episodes == self.target.episodes or (starts == others and len(starts) > 1)
+
+    @property
+    def means(self) -> tuple[Floats, Floats]:
+        """Mean scores in the proxy and on the target, each of shape (agents, metrics)."""
+        return self.proxy.means, self.target.means
+
+    @property
+    def fewest_starts(self) -> int:
+        """The fewest starts that an agent drove on either side; repeats of a start count once."""
+        return int(min((repeats(side) > 0).sum(axis=1).min() for side in (self.proxy, self.target)))
+
+    @property
+    def proxy_episodes(self) -> tuple[int, int]:
+        """Fewest and most episodes of an agent in the proxy."""
+        return int(self.proxy.counts.min()), int(self.proxy.counts.max())
+
+    @property
+    def target_episodes(self) -> tuple[int, int]:
+        """Fewest and most episodes of an agent on the target."""
+        return int(self.target.counts.min()), int(self.target.counts.max())
+
+
+def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Comparison:
+    """Put two tables in the same order.
+
+    Raises:
+        ScoresError: If an agent is missing on one side, there are fewer than two, or a metric is unknown or twice.
+    """
+    names = [metric.name for metric in metrics]
+    if not names:
+        raise ScoresError("no metric is given; name at least one")
+    if len(set(names)) < len(names):
+        raise ScoresError(f"a metric is given twice: {', '.join(names)}")
+    _check_agents(proxy, "the proxy", target, "the target")
+    _check_agents(target, "the target", proxy, "the proxy")
+    if len(target.agents) < 2:
+        raise ScoresError(f"only one agent ('{target.agents[0]}') is scored; comparing takes at least two")
+    target = target.select(names)
+    same = set(proxy.episodes) == set(target.episodes)
+    proxy = proxy.select(names).arrange(agents=target.agents, episodes=target.episodes if same else None)
+    return Comparison(proxy, target, tuple(metrics))
+
+
+def _check_agents(present: ScoreTable, where: str, absent: ScoreTable, other: str) -> None:
+    known = set(absent.agents)
+    missing = [name for name in present.agents if name not in known]
+    if missing:
+        remedy = "add or remove them, or compare the others alone (score --common)"
+        raise ScoresError(f"{other} lacks scores of {', '.join(missing)}, which {where} has; {remedy}")
+
+
+def in_common(tables: Mapping[str, ScoreTable]) -> tuple[dict[str, ScoreTable], tuple[str, ...]]:
+    """The tables with only those agents that all have, in each its own order, and who is left out, in a line each.
+
+    Raises:
+        ScoresError: If they have fewer than two in common.
+    """
+    shared = set.intersection(*(set(table.agents) for table in tables.values()))
+    lines = [
+        f"left out, since not all sides have them: {', '.join(sorted(beyond))} of {name}"
+        for name, table in tables.items()
+        if (beyond := set(table.agents) - shared)
+    ]
+    if len(shared) < 2:
+        sides = "; ".join(f"{name} has {', '.join(table.agents)}" for name, table in tables.items())
+        raise ScoresError(f"comparing takes at least two agents in common; {sides}")
+    kept = {name: _only(table, shared) for name, table in tables.items()}
+    return kept, tuple(lines)
+
+
+def _only(table: ScoreTable, agents: Collection[str]) -> ScoreTable:
+    """The table of these agents and of the episodes that they drove."""
+    rest = table.arrange(agents=[agent for agent in table.agents if agent in agents])
+    driven = [label for column, label in enumerate(rest.episodes) if rest.driven[:, column].any()]
+    return rest.arrange(agents=rest.agents, episodes=driven)
+
+
+def start_of(label: str) -> str:
+    """The start of an episode: what is before the label's last "/", or the whole label where there is none."""
+    return label.rpartition("/")[0] or label
+
+
+def starts_of(labels: Iterable[str]) -> tuple[str, ...]:
+    """The starts of these episodes, each once, in their order."""
+    return tuple(dict.fromkeys(map(start_of, labels)))
+
+
+def start_places(table: ScoreTable) -> Whole:
+    """The place of each episode's start among the table's starts."""
+    places = {start: place for place, start in enumerate(starts_of(table.episodes))}
+    return np.array([places[start_of(label)] for label in table.episodes], dtype=np.int64)
+
+
+def repeats(table: ScoreTable) -> Whole:
+    """Count the repeats that each agent drove of each start, shape (agents, starts)."""
+    places = start_places(table)
+    order = np.argsort(places, kind="stable")
+    firsts = np.searchsorted(places[order], np.arange(places.max() + 1))
+    return np.add.reduceat(table.driven[:, order].astype(np.int64), firsts, axis=1)
+
+
+def is_repeated(table: ScoreTable) -> bool:
+    """Check that every start has two repeats or more, so that a domain can be compared with itself from them.
+
+    Every agent must have driven some start twice. A start that one agent alone drove is no start but a label of that
+    agent's own.
+    """
+    labels, driven = np.bincount(start_places(table)), repeats(table)
+    shared = (driven > 0).sum(axis=0) >= 2
+    return bool(labels.min() >= 2 and shared.all() and (driven >= 2).any(axis=1).all())
+
+
+def by_start(table: ScoreTable) -> ScoreTable:
+    """Average over the repeats of each start: the same scores with one episode per start."""
+    places = start_places(table)
+    members = (places[:, None] == np.arange(places.max() + 1)).astype(np.float64)  # (episodes, starts)
+    counts = repeats(table)
+    sums = np.einsum("aem,es->asm", np.nan_to_num(table.values), members)
+    values = np.where(counts[..., None] > 0, sums / np.maximum(counts, 1)[..., None], np.nan)
+    return ScoreTable(table.agents, starts_of(table.episodes), table.metrics, values)
+
+
+def split_repeats(driven: Flags, places: Whole, keys: Floats) -> tuple[Flags, Flags]:
+    """Split episodes into two sets that hold the same starts, each as often.
+
+    Where an agent has an odd number of repeats of a start, one is left out. Agents split the same repeats alike.
+
+    Args:
+        driven: Which agent drove which episode, shape (agents, episodes).
+        places: The place of each episode's start.
+        keys: Random numbers, shape (splits, episodes); the lower half of a start's repeats is the first set's.
+
+    Returns:
+        Two arrays of shape (agents, splits, episodes).
+    """
+    first, second = np.zeros((2, len(driven), *keys.shape), dtype=np.bool_)
+    for place in range(places.max() + 1):
+        columns = np.flatnonzero(places == place)
+        own = driven[:, None, columns]
+        rank = np.where(own, keys[:, columns], np.inf).argsort(axis=-1).argsort(axis=-1)
+        size = own.sum(axis=-1, keepdims=True) // 2
+        first[..., columns] = rank < size
+        second[..., columns] = (rank >= size) & (rank < 2 * size)
+    return first, second

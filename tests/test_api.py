@@ -55,7 +55,7 @@ def test_every_function_is_typed_and_says_what_it_raises(name):
 
 @pytest.mark.parametrize("name", proxytune.__all__)
 def test_every_name_is_on_the_page_about_python(name):
-    assert f"`{name}`" in (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    assert f"`{name}`" in (ROOT / "docs" / "how-to" / "python.md").read_text(encoding="utf-8")
 
 
 def test_the_package_says_that_it_is_typed_and_the_wheel_holds_that():

@@ -1,4 +1,4 @@
-"""The commands of docs/cluster.md work as they stand, on a study that takes seconds."""
+"""The commands of docs/how-to/cluster.md work as they stand, on a study that takes seconds."""
 
 import os
 import re
@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from processes import ENVIRONMENT
 
-PAGE = (Path(__file__).resolve().parent.parent / "docs" / "cluster.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "cluster.md").read_text(encoding="utf-8")
 LINES = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL) for line in block.splitlines()]
 
 

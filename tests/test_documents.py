@@ -1,6 +1,7 @@
-"""What a user can type is documented, and what is documented works."""
+"""What a user can type is documented, and what is documented is there."""
 
 import argparse
+import importlib
 import json
 import os
 import re
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 from floors import floor
 
-from proxytune.cli.compare_objective import STAND_INS
+import proxytune
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
 from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
 from proxytune.driving import AGENTS, METRICS, UNITS, map_names
@@ -27,26 +28,50 @@ from proxytune.study.settings import KEYS
 from proxytune.usefulness import MEASURES, PODS
 
 ROOT = Path(__file__).resolve().parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS_PAGE = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
-STUDIES = (ROOT / "studies" / "README.md").read_text(encoding="utf-8")
-ROBOTS = (ROOT / "robots" / "README.md").read_text(encoding="utf-8")
-DOCS = {path: path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs").glob("*.md"))}
-LOGS_PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
+DOCS = {path.relative_to(ROOT / "docs").as_posix(): path.read_text("utf-8") for path in (ROOT / "docs").rglob("*.md")}
+DOCUMENTS = {
+    path.relative_to(ROOT).as_posix(): path.read_text("utf-8")
+    for path in (
+        *sorted(ROOT.glob("*.md")),
+        *(path for part in ("docs", "studies", "robots", "benchmarks") for path in sorted((ROOT / part).rglob("*.md"))),
+    )
+}
+README, ROBOTS = DOCUMENTS["README.md"], DOCUMENTS["robots/README.md"]
+COMMANDS_PAGE, STUDY, LOGS = (DOCS[f"reference/{name}.md"] for name in ("commands", "study", "logs"))
 
-LONGEST_README = 120
+LONGEST_README = 100
 """Lines: the README is read in one go; the rest is in docs/."""
-RUN_ELSEWHERE = ("cluster.md", "extending.md", "logs.md", "own_robot.md")
-"""Their commands need what comes before them; tests of their own run them."""
+LONGEST_ROW = 320
+"""Characters of a table's row without the targets of its links: more cannot be read on GitHub."""
+RUN_ELSEWHERE = ("cluster", "extending", "logs", "own_robot", "tune_a_simulator", "find_what_it_lacks")
+"""Pages whose commands need what comes before them; tests/test_pages.py and tests/test_extending.py run them."""
+SHARED = ("--json", "--format", "--trust")
 COMMAND_LINES = sorted(
     {
         line.removeprefix("$ ")
-        for text in (README, *(text for path, text in DOCS.items() if path.name not in RUN_ELSEWHERE))
+        for name, text in {"README": README, **DOCS}.items()
+        if Path(name).stem not in RUN_ELSEWHERE
         for block in re.findall(r"```(?:sh|console)\n(.*?)```", text, flags=re.DOTALL)
         for line in block.splitlines()
         if line.removeprefix("$ ").startswith("python -m proxytune")
     }
 )
+DOTTED = re.compile(r"`(proxytune(?:\.\w+)+)`")
+IN_THE_PACKAGE = re.compile(r"`(proxytune/[\w/]+(?:\.\w+)?)`")
+
+
+def section(text, title):
+    """The part of a page under a heading, up to the next one of its level."""
+    found = re.search(rf"^(#+) {re.escape(title)}\n(.*?)(?=^\1 |\Z)", text, flags=re.MULTILINE | re.DOTALL)
+    assert found, f"no section '{title}'"
+    return found.group(2)
+
+
+def row_of(page, start):
+    """The table's row of a page under docs/ that begins with this cell."""
+    row = next((line for line in DOCS[page].splitlines() if line.startswith(f"| {start} ")), "")
+    assert row, f"docs/{page} has no row for {start}"
+    return row
 
 
 def options():
@@ -56,29 +81,46 @@ def options():
             yield from ((name, flag) for flag in action.option_strings if flag.startswith("--") and flag != "--help")
 
 
+def anchors(text):
+    """The anchors of a page's headings, as GitHub and the site make them."""
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    for title in re.findall(r"^#+ (.*)$", prose, flags=re.MULTILINE):
+        title = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", title)
+        yield re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-")
+
+
+def resolved(name):
+    """What a dotted name stands for: the longest part that is a module, and attributes of it."""
+    parts = name.split(".")
+    for length in range(len(parts), 0, -1):
+        try:
+            thing = importlib.import_module(".".join(parts[:length]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[length:]:
+            thing = getattr(thing, part)
+        return thing
+    raise LookupError(name)
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_is_documented(command):
-    assert f"python -m proxytune {command}" in COMMANDS_PAGE
+    assert f"python -m proxytune {command}" in section(COMMANDS_PAGE, command)
+    assert f"| [`{command}`](#{command}) |" in COMMANDS_PAGE
 
 
 @pytest.mark.parametrize(("command", "option"), sorted(set(options())))
 def test_every_option_is_documented(command, option):
-    row = next(line for line in COMMANDS_PAGE.splitlines() if line.startswith(f"| `{command}"))
-    of_a_source = "what `import` reads, with its options" in row and f"`{option}" in LOGS_PAGE
-    assert f"`{option}" in row or of_a_source or option in ("--json", "--format", "--trust")
-    assert "`--json`" in COMMANDS_PAGE
-    assert "`--format svg,pdf`" in COMMANDS_PAGE
-    assert "`--trust`" in COMMANDS_PAGE
+    about = section(COMMANDS_PAGE, "What all commands share" if option in SHARED else command)
+    of_a_source = "what `import` reads, with its options" in about.replace("\n", " ") and f"`{option}" in LOGS
+    assert re.search(rf"`{option}[ `]", about) or of_a_source
 
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
 def test_every_engine_is_documented_with_what_it_learns_from_and_what_installs_it(engine):
-    table = STUDIES.split("## Engines")[1].split("\n## ")[0]
-    row = next((line for line in table.splitlines() if line.startswith(f"| `{engine.name}` |")), "")
-    assert row, f"studies/README.md has no row for the engine '{engine.name}'"
-    cells = [cell.strip() for cell in row.strip("|").split("|")]
-    assert cells[1:3] == [engine.learns_from, "yes" if engine.in_studies else ""]
-    assert engine.needs is None or f'pip install "proxytune[{engine.needs.extra}]"' in cells[3]
+    cells = [cell.strip() for cell in row_of("reference/engines.md", f"`{engine.name}`").strip("|").split("|")]
+    assert cells[1] == engine.learns_from
+    assert engine.needs is None or f'pip install "proxytune[{engine.needs.extra}]"' in cells[-1]
 
 
 def test_every_engine_is_listed_with_how_it_proposes(capsys):
@@ -94,49 +136,39 @@ def test_every_engine_is_listed_with_how_it_proposes(capsys):
 
 @pytest.mark.parametrize("measure", [*MEASURES, *PODS], ids=lambda measure: measure.key)
 def test_every_measure_is_documented_with_its_name_spelt_out_and_its_direction(measure):
-    table = STUDIES.split("## Measures of usefulness")[1].split("\n## ")[0]
-    row = next((line for line in table.splitlines() if line.startswith(f"| {measure.name} |")), "")
-    assert row, f"studies/README.md has no row for the measure '{measure.name}'"
+    row = row_of("reference/measures.md", measure.name)
     assert f"| `{measure.key}` | {measure.title} | {measure.better} |" in row
     assert ("per metric" in row) == measure.per_metric
 
 
-@pytest.mark.parametrize("name", STAND_INS)
-def test_every_stand_in_is_documented_with_what_came_out(name):
-    row = next(line for line in COMMANDS_PAGE.splitlines() if line.startswith("| `compare"))
-    assert f"`{name}`" in row
-    assert f"compare {name} " in (ROOT / "studies" / "compare.md").read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize("key", [*KEYS, "robot", "plant", "camera", "map", "seconds", "position_noise_m", "effects"])
 def test_every_study_key_is_documented(key):
-    assert re.search(rf"^\| `\[?{key}\]?` ", STUDIES, flags=re.MULTILINE)
+    assert re.search(rf"^\| `\[?{key}\]?` |^## \[{key}\]$", STUDY, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("key", TEACHING_KEYS)
 def test_every_key_of_teaching_is_documented(key):
-    table = STUDIES.split("## [teaching]")[1].split("\n## ")[0]
-    assert re.search(rf"^\| `{key}` ", table, flags=re.MULTILINE)
+    assert re.search(rf"^\| `{key}` ", section(STUDY, "[teaching]"), flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_effect_and_its_parameters_are_documented(name):
-    row = next((line for line in STUDIES.splitlines() if line.startswith(f"| `{name}`")), "")
-    assert row, f"studies/README.md has no row for the effect '{name}'"
-    assert CATALOGUE[name].stage.value in row
-    assert all(f"`{parameter.name}`" in row for parameter in CATALOGUE[name].parameters)
+    effect = CATALOGUE[name]
+    row = next((line for line in DOCS["reference/effects.md"].splitlines() if line.startswith(f"| `{name}`")), "")
+    assert row, f"docs/reference/effects.md has no row for the effect '{name}'"
+    assert effect.stage.value in row
+    assert all(f"`{parameter.name}`" in row for parameter in effect.parameters)
 
 
 @pytest.mark.parametrize("group", GROUPS)
 def test_every_group_that_can_be_learnt_and_its_channels_are_documented(group):
-    learnt = STUDIES.split("What was learnt", 1)[1].splitlines()
-    row = next(line for line in learnt if line.startswith(f"| `{group}`"))
+    row = row_of("reference/model.md", f"`{group}`")
     assert all(f"`{channel}`" in row for channel in GROUPS[group].channels)
 
 
 @pytest.mark.parametrize("metric", METRICS)
 def test_every_metric_is_documented(metric):
-    assert f"`{metric}` [{METRICS[metric]}]" in STUDIES
+    assert row_of("reference/measures.md", f"`{metric}` [{METRICS[metric]}]")
 
 
 @pytest.mark.parametrize("figure", UNITS)
@@ -146,7 +178,7 @@ def test_every_figure_of_a_robot_is_documented(figure):
 
 @pytest.mark.parametrize("name", map_names())
 def test_every_map_and_its_keys_are_documented(name):
-    maps = ROBOTS.split("## Maps")[1]
+    maps = section(ROBOTS, "Maps")
     assert re.search(rf"^\| `{name}` ", maps, flags=re.MULTILINE)
     settings = read_settings(shipped("robots") / "maps" / f"{name}.toml").values
     for key in {*settings, *settings["road"], *settings["paint"]} - {"road", "paint"}:
@@ -160,51 +192,91 @@ def test_every_agent_is_listed_with_how_it_drives(capsys):
     assert all("speed=" in how for how in listed.values())
 
 
-def test_every_room_is_in_the_readme_in_reading_order():
-    listing = (path.name for path in (ROOT / "proxytune").iterdir())
-    rooms = {name.removesuffix(".py") for name in listing if not name.startswith(("__", "py."))}
-    named = re.findall(r"^\| `proxytune/(\w+)", README, flags=re.MULTILINE)
-    assert rooms == set(named)
-    assert [floor(room) for room in named] == sorted(floor(room) for room in named), "a room stands before one it needs"
-
-
-def test_the_readme_is_short_and_leads_to_every_page_of_docs():
-    assert len(README.splitlines()) <= LONGEST_README
-    for path in DOCS:
-        others = "".join(text for other, text in DOCS.items() if other != path)
-        contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-        assert path.name in README + contributing + others, f"nothing leads to docs/{path.name}"
-
-
 @pytest.mark.parametrize("status", [INTERRUPTED, TERMINATED, DONE, FAILED, BAD_INPUT])
 def test_every_exit_status_is_documented(status):
     rows = [line for line in COMMANDS_PAGE.splitlines() if re.match(r"\| \d", line)]
     assert any(re.search(rf"\b{status}\b", row.split("|")[1]) for row in rows)
 
 
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in ("list", "completion")])
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in ("list", "completion", "compare")])
 def test_what_every_command_leaves_when_it_is_stopped_is_documented(command):
-    table = COMMANDS_PAGE.split("## When a command is stopped")[1].split("\n## ")[0]
-    assert f"`{command}`" in table
+    assert f"`{command}`" in section(DOCS["how-to/trouble.md"], "When a command is stopped")
 
 
 @pytest.mark.parametrize("verdict", MEANINGS)
 def test_every_verdict_of_diagnose_is_documented(verdict):
-    assert re.search(rf"^\| {verdict} \|", (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert row_of("explanation/diagnosis.md", verdict)
 
 
 @pytest.mark.parametrize("measure", ["PRPV", "PPV", "SRCC", "MMRV", "POD", "PLV"])
-def test_every_measure_is_spelt_out(measure):
-    rows = [line.split("|") for line in DOCS[ROOT / "docs" / "usefulness.md"].splitlines()]
-    words = next(row[2].replace("-", " ").split() for row in rows if len(row) > 2 and row[1].strip() == measure)
+def test_every_measure_is_spelt_out_and_has_its_formula(measure):
+    words = row_of("explanation/usefulness.md", measure).split("|")[2].replace("-", " ").split()
     assert "".join(word[0] for word in words if word != "to").upper() in (measure, "SRCC")
+    assert re.search(rf"^##+ .*\b{measure}\b", DOCS["method.md"], flags=re.MULTILINE)
 
 
-def test_every_link_of_the_documents_leads_somewhere():
-    below = (ROOT.glob(f"{folder}/**/*.md") for folder in ("docs", "studies", "robots"))
-    for document in [*ROOT.glob("*.md"), *(path for paths in below for path in paths)]:
-        for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
-            assert target.startswith("http") or (document.parent / target).exists(), f"{document}: {target}"
+def test_every_room_is_on_the_page_about_architecture_in_reading_order():
+    listing = (path.name for path in (ROOT / "proxytune").iterdir())
+    rooms = {name.removesuffix(".py") for name in listing if not name.startswith(("__", "py."))}
+    named = re.findall(r"^\| `proxytune\.(\w+)", section(DOCS["architecture.md"], "The rooms"), flags=re.MULTILINE)
+    assert rooms == set(named)
+    assert [floor(room) for room in named] == sorted(floor(room) for room in named), "a room stands before one it needs"
+
+
+def test_the_readme_is_short_and_docs_readme_leads_to_every_page_of_docs():
+    assert len(README.splitlines()) <= LONGEST_README
+    assert "(docs/README.md)" in README
+    for path in set(DOCS) - {"README.md"}:
+        assert f"({path})" in DOCS["README.md"], f"docs/README.md does not lead to docs/{path}"
+
+
+def test_the_readme_takes_two_commands_on_a_fresh_machine():
+    (block,) = re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
+    lines = [line for line in block.splitlines() if not line.startswith("#")]
+    assert len(lines) == 2
+    assert lines[0].endswith("python -m proxytune study studies/quickstart")
+    assert lines[1].endswith("python -m pytest")
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_every_link_leads_to_a_file_and_a_heading_that_are_there(document):
+    home = (ROOT / document).parent
+    prose = re.sub(r"^```.*?^```", "", DOCUMENTS[document], flags=re.MULTILINE | re.DOTALL)
+    for target in re.findall(r"\]\(([^)\s]+)\)", prose):
+        if target.startswith("http"):
+            continue
+        path, _, anchor = target.partition("#")
+        there = (home / path).resolve() if path else ROOT / document
+        assert there.exists(), f"{document}: {target}"
+        if anchor:
+            assert anchor in anchors(there.read_text("utf-8")), f"{document}: {target}: no such heading"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_no_row_of_a_table_is_too_long_to_read(document):
+    for line in DOCUMENTS[document].splitlines():
+        if line.startswith("|"):
+            shown = re.sub(r"\]\([^)]*\)", "]", line)
+            assert len(shown) <= LONGEST_ROW, f"{document}: {len(shown)} characters: {line[:80]}"
+
+
+@pytest.mark.parametrize("document", [name for name in DOCUMENTS if name != "CHANGELOG.md"])
+def test_every_module_and_file_of_the_package_that_is_named_is_there(document):
+    for name in DOTTED.findall(DOCUMENTS[document]):
+        assert resolved(name) is not None, f"{document}: {name}"
+    for path in IN_THE_PACKAGE.findall(DOCUMENTS[document]):
+        assert (ROOT / path).exists() or (ROOT / f"{path}.py").exists(), f"{document}: {path}"
+
+
+@pytest.mark.parametrize("title", re.findall(r"^## (.*)$", DOCS["method.md"], flags=re.MULTILINE))
+def test_every_formula_of_the_method_stands_beside_the_module_that_computes_it(title):
+    for part in re.split(r"^### ", section(DOCS["method.md"], title), flags=re.MULTILINE):
+        assert "```math" not in part or DOTTED.search(part), f"{title}: {part[:60]}"
+
+
+def test_every_name_of_the_package_is_on_the_page_of_the_api():
+    named = re.findall(r"^::: proxytune\.(\w+)", DOCS["reference/api.md"], flags=re.MULTILINE)
+    assert sorted([*named, "__version__"]) == sorted(proxytune.__all__)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""docs/extending.md works as it stands: its files are written, its commands run, in a folder for each section."""
+"""docs/how-to/extending.md works as it stands: its files are written, its commands run, in a folder for each section."""
 
 import json
 import re
@@ -19,7 +19,7 @@ from proxytune.extensions.door import GROUP
 from proxytune.settings import read_settings
 from proxytune.study import open_study
 
-PAGE = (Path(__file__).resolve().parent.parent / "docs" / "extending.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 INTRODUCTION, *CHAPTERS = re.split(r"^## ", PAGE, flags=re.MULTILINE)
 SECTIONS = {chapter.partition("\n")[0]: chapter for chapter in CHAPTERS}
 PLUGINS = "Plug-ins"

@@ -1,4 +1,4 @@
-"""The Python that docs/gymnasium.md shows runs as it stands, and what it shows of its output is what it prints."""
+"""The Python that docs/how-to/gymnasium.md shows runs as it stands, and what it shows of its output is what it prints."""
 
 import contextlib
 import io
@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("gymnasium")
 
-PAGE = (Path(__file__).resolve().parent.parent / "docs" / "gymnasium.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "gymnasium.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"```python\n(.*?)```(?:\n```text\n(.*?)```)?", flags=re.DOTALL)
 TRAINING, AFTER = "## Train a policy", "## Any environment"
 WHOLE, SMALL = "STEPS = 40_000", "STEPS = 2_000"

@@ -1,4 +1,4 @@
-"""The commands at the head of docs/logs.md work as they stand, in order, on a bag of a robot of nobody's."""
+"""The commands at the head of docs/how-to/logs.md work as they stand, in order, on a bag of a robot of nobody's."""
 
 import json
 import re
@@ -10,7 +10,7 @@ import pytest
 
 from proxytune.cli.main import main
 
-PAGE = (Path(__file__).resolve().parent.parent / "docs" / "logs.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "logs.md").read_text(encoding="utf-8")
 LINES = [line for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL) for line in block.splitlines()]
 FIGURES = (
     "wheel_radius=0.033,wheel_distance=0.16,full_speed=0.5,motor_time_constant=0.1,camera_height=0.1,camera_pitch=20"

@@ -75,4 +75,4 @@ def test_an_effect_without_a_row_in_the_documents_is_refused_in_words(folder):
         folder, "-m", "pytest", "tests/test_documents.py", "-k", "every_effect_and_its_parameters and weak_reverse"
     )
     assert answer.returncode == 1
-    assert "studies/README.md has no row for the effect 'weak_reverse'" in answer.stdout
+    assert "docs/reference/effects.md has no row for the effect 'weak_reverse'" in answer.stdout

@@ -57,4 +57,4 @@ def test_a_tenth_engine_is_listed_and_refused_where_it_is_not_documented(folder)
     ]
     answer = run(folder, "-m", "pytest", "-n", "0", "tests/test_documents.py", "-k", "every_engine_is_documented")
     assert answer.returncode == 1
-    assert "studies/README.md has no row for the engine 'spiral'" in answer.stdout
+    assert "docs/reference/engines.md has no row for the engine 'spiral'" in answer.stdout

@@ -1,4 +1,4 @@
-"""docs/own_robot.md works as it stands, line by line, in an empty folder."""
+"""docs/how-to/own_robot.md works as it stands, line by line, in an empty folder."""
 
 import json
 import re
@@ -10,7 +10,7 @@ import pytest
 from proxytune.cli.main import main
 from proxytune.skeletons.writing import SIX
 
-PAGE = (Path(__file__).resolve().parent.parent / "docs" / "own_robot.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parent.parent / "docs" / "how-to" / "own_robot.md").read_text(encoding="utf-8")
 LINES = [
     line
     for block in re.findall(r"```sh\n(.*?)```", PAGE, flags=re.DOTALL)

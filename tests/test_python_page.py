@@ -12,7 +12,7 @@ import pytest
 import proxytune
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "python.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"```python\n(.*?)```(?:\n```text\n(.*?)```)?", flags=re.DOTALL)
 SMALL = {"budget = 24": "budget = 1", "seconds = 20.0": 'seconds = 1.0\nplant = "planar"', "initial = 8": "confirm = 0"}
@@ -37,7 +37,7 @@ def words(output):
     return " ".join(re.sub(r"[-−]?\d[\d.]*(e[-+]\d+)?", "#", output).split())
 
 
-@pytest.mark.parametrize("text", [PAGE, README], ids=["docs/python.md", "README.md"])
+@pytest.mark.parametrize("text", [PAGE, README], ids=["docs/how-to/python.md", "README.md"])
 def test_every_name_of_proxytune_that_the_documents_use_is_a_public_one(text):
     trees = [ast.walk(ast.parse(code)) for code, _ in blocks(text)]
     used = {

@@ -11,7 +11,7 @@ from proxytune.effects import CATALOGUE, theta_names
 from proxytune.report.export.instance import lines_of
 from proxytune.report.export.places import FORMATS, PLACES, place_of
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "exporting.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "exporting.md"
 NEEDED = {
     "floor_slope.push": {"floor_slope.x": 0.1},
     **{f"{effect}.imbalance": {} for effect in ("dead_band", "stiction", "saturation", "motor_lag", "backlash")},

@@ -43,7 +43,15 @@ LONGEST_README = 100
 """Lines: the README is read in one go; the rest is in docs/."""
 LONGEST_ROW = 320
 """Characters of a table's row without the targets of its links: more cannot be read on GitHub."""
-RUN_ELSEWHERE = ("cluster", "extending", "logs", "own_robot", "tune_a_simulator", "find_what_it_lacks")
+RUN_ELSEWHERE = (
+    "cluster",
+    "extending",
+    "logs",
+    "own_robot",
+    "tune_a_simulator",
+    "find_what_it_lacks",
+    "judge_two_score_tables",
+)
 """Pages whose commands need what comes before them; tests/test_pages.py and tests/test_extending.py run them."""
 SHARED = ("--json", "--format", "--trust")
 COMMAND_LINES = sorted(

@@ -87,7 +87,7 @@ def _plant(robot: Robot) -> str:
     return "bullet"
 
 
-PAGE = "docs/extending.md"
+PAGE = "docs/how-to/extending.md"
 
 
 def family_skeleton(name: str) -> Skeleton:

@@ -22,7 +22,7 @@ from processes import ENVIRONMENT
 
 import proxytune
 from proxytune.cli.main import main
-from proxytune.skeletons.robot import SIX
+from proxytune.skeletons.writing import SIX
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

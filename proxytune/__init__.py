@@ -9,7 +9,7 @@
     to extend    DomainFamily, Episode, Parameter, Agent, Effect, Engine, Proposer, Learner, Measure
     errors       ProxytuneError, InputError, RunError
 
-A name is loaded when it is first used, so that `import proxytune` costs nothing. docs/how-to/python.md shows all of them.
+A name is loaded when it is first used, so that `import proxytune` costs nothing. docs/how-to/python.md shows all.
 """
 
 import lazy_loader

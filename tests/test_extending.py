@@ -1,4 +1,4 @@
-"""docs/how-to/extending.md works as it stands: its files are written, its commands run, in a folder for each section."""
+"""docs/how-to/extending.md works as it stands: its files are written, its commands run, a folder for each section."""
 
 import json
 import re

@@ -98,7 +98,7 @@ def anchors(text):
 
 
 def resolved(name):
-    """What a dotted name stands for: the longest part that is a module, and attributes of it."""
+    """What a dotted name stands for: the longest part that is a module, then attributes and fields."""
     parts = name.split(".")
     for length in range(len(parts), 0, -1):
         try:
@@ -106,7 +106,7 @@ def resolved(name):
         except ModuleNotFoundError:
             continue
         for part in parts[length:]:
-            thing = getattr(thing, part)
+            thing = getattr(thing, part, None) or thing.__annotations__[part]
         return thing
     raise LookupError(name)
 

@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from compare import STAND_INS, parser as compare_parser
 from floors import floor
 
-from proxytune.cli.compare_objective import STAND_INS
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
 from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
 from proxytune.driving import AGENTS, METRICS, UNITS, map_names
@@ -101,11 +101,26 @@ def test_every_measure_is_documented_with_its_name_spelt_out_and_its_direction(m
     assert ("per metric" in row) == measure.per_metric
 
 
+def test_every_benchmark_that_a_page_names_is_there_and_each_has_a_row_in_their_readme():
+    folder = ROOT / "benchmarks"
+    rows = [line for line in (folder / "README.md").read_text(encoding="utf-8").splitlines() if line.startswith("|")]
+    pages = [*DOCS.values(), STUDIES, *(path.read_text(encoding="utf-8") for path in folder.rglob("*.md"))]
+    named = {name for text in pages for name in re.findall(r"[ `]benchmarks/(\w+\.py)", text)}
+    ends = ('if __name__ == "__main__":', "-m pytest benchmarks/")
+    runs = {path.name for path in folder.glob("*.py") if any(one in path.read_text(encoding="utf-8") for one in ends)}
+    assert named == runs
+    assert runs <= {name for row in rows for name in re.findall(r" benchmarks/(\w+\.py)", row)}
+
+
 @pytest.mark.parametrize("name", STAND_INS)
-def test_every_stand_in_is_documented_with_what_came_out(name):
-    row = next(line for line in COMMANDS_PAGE.splitlines() if line.startswith("| `compare"))
-    assert f"`{name}`" in row
-    assert f"compare {name} " in (ROOT / "studies" / "compare.md").read_text(encoding="utf-8")
+def test_every_problem_of_the_comparison_is_documented_with_what_came_out(name):
+    assert f"compare.py {name} " in (ROOT / "benchmarks" / "compare.md").read_text(encoding="utf-8")
+
+
+def test_every_option_of_the_comparison_is_documented():
+    page = (ROOT / "benchmarks" / "README.md").read_text(encoding="utf-8")
+    options = [flag for action in compare_parser()._actions for flag in action.option_strings if flag.startswith("--")]
+    assert [option for option in options if f"`{option}" not in page and option != "--help"] == []
 
 
 @pytest.mark.parametrize("key", [*KEYS, "robot", "plant", "camera", "map", "seconds", "position_noise_m", "effects"])
@@ -201,7 +216,7 @@ def test_every_measure_is_spelt_out(measure):
 
 
 def test_every_link_of_the_documents_leads_somewhere():
-    below = (ROOT.glob(f"{folder}/**/*.md") for folder in ("docs", "studies", "robots"))
+    below = (ROOT.glob(f"{folder}/**/*.md") for folder in ("docs", "studies", "robots", "benchmarks"))
     for document in [*ROOT.glob("*.md"), *(path for paths in below for path in paths)]:
         for target in re.findall(r"\]\(([^)#]+)\)", document.read_text(encoding="utf-8")):
             assert target.startswith("http") or (document.parent / target).exists(), f"{document}: {target}"

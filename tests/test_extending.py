@@ -113,10 +113,8 @@ def test_the_measure_is_the_objective_of_a_study(follow, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_engine_runs_in_a_comparison_and_in_a_study(follow, tmp_path):
+def test_the_engine_runs_in_a_study(follow, tmp_path):
     answers = follow("A search engine")
-    (compared,) = [answer for line, answer in answers.items() if line.startswith("compare")]
-    assert [row["engine"] for row in compared["engines"]] == ["my_engine:HALTON", "sobol"]
     assert len(answers["study ."]["trials"]) == 4
     assert open_study(tmp_path).engine.label == "Halton sequence"
 

@@ -13,9 +13,6 @@ ROOMS = {
     "numba": {"driving/compiled_texels.py"},
     "skopt": {"search"},
     "optuna": {"search"},
-    "torch": {"search"},
-    "botorch": {"search"},
-    "gpytorch": {"search"},
     "gymnasium": {"environments"},
     "stable_baselines3": {"environments"},
     "mujoco": {"environments"},
@@ -103,3 +100,10 @@ def handed_out(door):
 def test_no_room_is_a_drawer():
     forbidden = {"utils", "common", "helpers", "misc", "base", "core"}
     assert not forbidden & {path.stem for path in MODULES} | forbidden & {path.parent.name for path in MODULES}
+
+
+def test_the_package_imports_nothing_of_the_benchmarks():
+    benchmarks = {path.stem for path in (PACKAGE.parent / "benchmarks").iterdir()}
+    assert "compare" in benchmarks
+    for path in MODULES:
+        assert not benchmarks & {name.split(".")[0] for name in imports(path)}, path

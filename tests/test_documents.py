@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from compare import STAND_INS, parser as compare_parser
 from floors import floor
 
 import proxytune
@@ -36,7 +37,7 @@ DOCUMENTS = {
         *(path for part in ("docs", "studies", "robots", "benchmarks") for path in sorted((ROOT / part).rglob("*.md"))),
     )
 }
-README, ROBOTS = DOCUMENTS["README.md"], DOCUMENTS["robots/README.md"]
+README, ROBOTS, BENCHMARKS = (DOCUMENTS[f"{folder}README.md"] for folder in ("", "robots/", "benchmarks/"))
 COMMANDS_PAGE, STUDY, LOGS = (DOCS[f"reference/{name}.md"] for name in ("commands", "study", "logs"))
 
 LONGEST_README = 100
@@ -152,6 +153,26 @@ def test_every_measure_is_documented_with_its_name_spelt_out_and_its_direction(m
     assert ("per metric" in row) == measure.per_metric
 
 
+def test_every_benchmark_that_a_page_names_is_there_and_each_has_a_row_in_their_readme():
+    rows = [line for line in BENCHMARKS.splitlines() if line.startswith("|")]
+    named = {name for text in DOCUMENTS.values() for name in re.findall(r"[ `]benchmarks/(\w+\.py)", text)}
+    ends = ('if __name__ == "__main__":', "-m pytest benchmarks/")
+    scripts = (ROOT / "benchmarks").glob("*.py")
+    runs = {path.name for path in scripts if any(one in path.read_text(encoding="utf-8") for one in ends)}
+    assert named == runs
+    assert runs <= {name for row in rows for name in re.findall(r" benchmarks/(\w+\.py)", row)}
+
+
+@pytest.mark.parametrize("name", STAND_INS)
+def test_every_problem_of_the_comparison_is_documented_with_what_came_out(name):
+    assert f"compare.py {name} " in DOCUMENTS["benchmarks/compare.md"]
+
+
+def test_every_option_of_the_comparison_is_documented():
+    options = [flag for action in compare_parser()._actions for flag in action.option_strings if flag.startswith("--")]
+    assert [option for option in options if f"`{option}" not in BENCHMARKS and option != "--help"] == []
+
+
 @pytest.mark.parametrize("key", [*KEYS, "robot", "plant", "camera", "map", "seconds", "position_noise_m", "effects"])
 def test_every_study_key_is_documented(key):
     assert re.search(rf"^\| `\[?{key}\]?` |^## \[{key}\]$", STUDY, flags=re.MULTILINE)
@@ -209,7 +230,7 @@ def test_every_exit_status_is_documented(status):
     assert any(re.search(rf"\b{status}\b", row.split("|")[1]) for row in rows)
 
 
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in ("list", "completion", "compare")])
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name not in ("list", "completion")])
 def test_what_every_command_leaves_when_it_is_stopped_is_documented(command):
     assert f"`{command}`" in section(DOCS["how-to/trouble.md"], "When a command is stopped")
 

@@ -105,14 +105,6 @@ COMMANDS: dict[str, Command] = {
         kept="no table was written, at most some of the pictures",
         runs_code=True,
     ),
-    "compare": Command(
-        "compare",
-        "compare how fast each search engine finds a good θ",
-        resumes=True,
-        kept="every finished run and episode is kept",
-        draws=True,
-        runs_code=True,
-    ),
     "plot": Command(
         "plot",
         "draw a study's figures and report again, without simulating",

@@ -50,11 +50,6 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
         "predict found/model.toml my_log --horizon 2 --output poses.csv",
         "predict found/model.toml my_log --frames --output pictures",
     ),
-    "compare": (
-        "compare my_study --engines gp,sobol --seeds 5",
-        "compare my_study --truths --seeds 10 --budget 30",
-        "compare analytic --engines gp,random --output compared",
-    ),
     "plot": (
         "plot my_study",
         "plot my_study --format svg,pdf",

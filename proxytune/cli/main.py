@@ -2,13 +2,14 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import proxytune
 from proxytune.cli.commands import COMMANDS
 from proxytune.cli.examples import epilog
+from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.interruption import signals_as_interruptions
 from proxytune.cli.terminal.own_output import print_answer, prints_to_stderr
 from proxytune.cli.terminal.trouble import FAILED, stopped_by
@@ -48,16 +49,27 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
         )
         if words is None or name == asked:
             known.load().configure(command)
-        if known.draws:
-            command.add_argument(
-                "--format", type=formats, default=(), metavar="svg,pdf", help="figures also as SVG or PDF [PNG alone]"
-            )
-        if known.runs_code:
-            command.add_argument(
-                "--trust", action="store_true", help="run the code beside the study, from now on without asking"
-            )
-        command.add_argument("--json", action="store_true", help="print one JSON document instead of text")
+        add_shared_options(command, draws=known.draws, runs_code=known.runs_code)
     return top
+
+
+def add_shared_options(parser: argparse.ArgumentParser, *, draws: bool, runs_code: bool) -> None:
+    """Add the options that commands have in common.
+
+    Args:
+        parser: The command's.
+        draws: Whether it writes figures.
+        runs_code: Whether it may run a study's own code.
+    """
+    if draws:
+        parser.add_argument(
+            "--format", type=formats, default=(), metavar="svg,pdf", help="figures also as SVG or PDF [PNG alone]"
+        )
+    if runs_code:
+        parser.add_argument(
+            "--trust", action="store_true", help="run the code beside the study, from now on without asking"
+        )
+    parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
 def formats(text: str) -> tuple[str, ...]:
@@ -82,24 +94,37 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = sys.argv[1:] if argv is None else argv
     arguments = parser(words).parse_args(words, argparse.Namespace(words=words))
-    with signals_as_interruptions():
-        return _run(arguments)
-
-
-def _run(arguments: argparse.Namespace) -> int:
     command = COMMANDS[arguments.command]
-    try:
-        with only_trusted_code(getattr(arguments, "trust", False)), _figures(getattr(arguments, "format", ())):
-            with prints_to_stderr():
-                answer = command.load().run(arguments)
-            print_answer(answer, as_json=arguments.json)
-    except ProxytuneError as problem:
-        _complain(arguments.command, str(problem))
-        return BAD_INPUT if isinstance(problem, InputError) else FAILED
-    except (KeyboardInterrupt, SystemExit, MemoryError, OSError) as problem:
-        what, status = stopped_by(problem)
-        _complain(arguments.command, f"{what}; {command.left}")
-        return status
+    return run_command(
+        lambda: command.load().run(arguments), arguments, program=f"proxytune {arguments.command}", left=command.left
+    )
+
+
+def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, *, program: str, left: str) -> int:
+    """Run a command, and print its answer or, in one line, what came in between.
+
+    Args:
+        answer_of: The command.
+        arguments: Its options, those of add_shared_options among them.
+        program: Its name before that line.
+        left: What an interruption leaves, and what the same command does then.
+
+    Returns:
+        The exit status, as of `main`.
+    """
+    with signals_as_interruptions():
+        try:
+            with only_trusted_code(getattr(arguments, "trust", False)), _figures(getattr(arguments, "format", ())):
+                with prints_to_stderr():
+                    answer = answer_of()
+                print_answer(answer, as_json=arguments.json)
+        except ProxytuneError as problem:
+            _complain(program, str(problem))
+            return BAD_INPUT if isinstance(problem, InputError) else FAILED
+        except (KeyboardInterrupt, SystemExit, MemoryError, OSError) as problem:
+            what, status = stopped_by(problem)
+            _complain(program, f"{what}; {left}")
+            return status
     return DONE
 
 
@@ -112,5 +137,5 @@ def _figures(named: Sequence[str]) -> AbstractContextManager[None]:
     return figures_also_as(named)
 
 
-def _complain(command: str, line: str) -> None:
-    print(f"proxytune {command}: {' '.join(line.splitlines())}", file=sys.stderr)
+def _complain(program: str, line: str) -> None:
+    print(f"{program}: {' '.join(line.splitlines())}", file=sys.stderr)

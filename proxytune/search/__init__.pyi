@@ -37,7 +37,6 @@ from .registry import (
     ENGINES as ENGINES,
     NAMES as NAMES,
     SCORE_ENGINE as SCORE_ENGINE,
-    STUDY_ENGINES as STUDY_ENGINES,
     code_of as code_of,
     engine_code as engine_code,
     engine_of as engine_of,

@@ -1,7 +1,6 @@
 """The trials of a search as other optimisers keep them: an Optuna storage, scikit-optimize's OptimizeResult.
 
 Optuna's tree-structured Parzen estimator, where Optuna is installed.
-PyTorch on one thread: with several, the last bit of a sum is anybody's guess, and a proposal would be too.
 """
 
 import warnings
@@ -11,8 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
-
-from threadpoolctl import threadpool_limits
 
 from proxytune.errors import InputError
 from proxytune.search.engine import Engine, Library, Look
@@ -185,17 +182,3 @@ def write_skopt(history: History, path: Path) -> None:
     from skopt import dump
 
     dump(optimize_result(history), path)
-
-
-@contextmanager
-def on_one_thread() -> Iterator[None]:
-    """Hold PyTorch and the numerical libraries to one thread."""
-    import torch
-
-    before = torch.get_num_threads()
-    with threadpool_limits(limits=1):
-        torch.set_num_threads(1)
-        try:
-            yield
-        finally:
-            torch.set_num_threads(before)

@@ -15,7 +15,6 @@ from proxytune.errors import ExtensionError, InputError
 from proxytune.extensions import load, plugins
 from proxytune.identity import meaning_of
 from proxytune.search.engine import RANDOM, SOBOL, AfterDesign, Engine, outside_proposer
-from proxytune.search.engines import botorch_nei, optuna_gp, scikit_optimize
 from proxytune.search.loop import Goal, Proposer
 from proxytune.search.optuna_bridge import TREE_PARZEN
 from proxytune.search.outcomes import COMPOSITE, OUTCOMES
@@ -23,20 +22,20 @@ from proxytune.search.surrogate import GAUSSIAN_PROCESS
 from proxytune.settings import nearest
 
 FOLDER = Path(__file__).resolve().parent.parent
-ROOMS = ("search", "comparison")
-"""What a digest looks into: the ground floor and the simulators are not what proposes."""
+ROOM = "search"
+"""A digest looks into this room alone: the ground floor and the simulators are not what proposes."""
 
 
 @cache
 def code_of(*modules: str) -> str:
-    """A digest of what modules of the search or a comparison mean, with all that they import of these."""
+    """A digest of what modules of the search mean, with all that they import of it."""
     found: dict[str, Path] = {}
     waiting = list(modules)
     while waiting:
         module = waiting.pop()
         parts = module.split(".")[1:]
         path = FOLDER.joinpath(*parts).with_suffix(".py")
-        if module not in found and parts[:1] and parts[0] in ROOMS and path.is_file():
+        if module not in found and parts[:1] == [ROOM] and path.is_file():
             found[module] = path
             waiting.extend(_imported(path))
     return meaning_of(found.values(), FOLDER)[:12]
@@ -59,15 +58,10 @@ ENGINES: tuple[Engine, ...] = (
     RANDOM,
     SOBOL,
     TREE_PARZEN,
-    scikit_optimize.ENGINE,
-    optuna_gp.ENGINE,
-    botorch_nei.ENGINE,
 )
 """A new engine is a module of its own and a line here; each says all about itself (engine.py)."""
 
 NAMES = tuple(engine.name for engine in ENGINES)
-"""What can be compared."""
-STUDY_ENGINES = tuple(engine.name for engine in ENGINES if engine.in_studies)
 """What a study may name."""
 DEFAULT_ENGINE = OUTCOMES.name
 SCORE_ENGINE = GAUSSIAN_PROCESS.name

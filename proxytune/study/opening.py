@@ -21,7 +21,7 @@ from proxytune.errors import ExtensionError, InputError, ScoresError
 from proxytune.extensions import ask, load, plugins
 from proxytune.identity import version_changes
 from proxytune.scores import Metric, ScoreTable, read_scores
-from proxytune.search import GAUSSIAN_PROCESS, STUDY_ENGINES, Engine, engine_of, why_not_engine
+from proxytune.search import GAUSSIAN_PROCESS, NAMES, Engine, engine_of, why_not_engine
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.study.family import code_of, load_family
@@ -281,7 +281,7 @@ def _engine(settings: StudySettings) -> Engine:
     except InputError as problem:
         raise settings.error("engine", str(problem)) from None
     if not engine.in_studies:
-        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, STUDY_ENGINES)}")
+        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, NAMES)}")
     reason = why_not_engine(engine, composed=settings.objective != LEARNING)
     if reason:
         raise settings.error("engine", reason)

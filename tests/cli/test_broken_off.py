@@ -1,4 +1,4 @@
-"""`sweep`, `teach` and `compare`, killed or on a full disk, at their first writes to their last: the same is made."""
+"""`sweep` and `teach`, killed or on a full disk, at their first writes to their last: the same is made."""
 
 import itertools
 import json
@@ -11,18 +11,15 @@ from failing_disk import HOOKED, forking
 from processes import besides_progress, finished_episodes
 from taught import make_taught
 
-from proxytune.cli.compare import read_runs
-
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not HOOKED, reason="this Python's SQLite hides what its system calls could be replaced by"),
 ]
 SMALL = {"agents": '["agent0", "agent1"]', "metrics": '["distance:max"]', "starts": "1"}
-COMPARED = ("--engines", "sobol,random", "--seeds", "2", "--budget", "4", "--initial", "2", "--output")
 TIMES = re.compile(rb"Written [-0-9]+ [0-9:]+( UTC)?|\d+(\.\d+)? m?s\b")
 TOLD = re.compile(r"proxytune \w+: .*(disk (is )?full|No space left|cannot be written).*\n")
-TIMED = {"study.toml", "study.db", "runs.jsonl", "compare.json", "report.html"}
-"""What has times in it everywhere, or names the folder; documents and runs are compared instead."""
+TIMED = {"study.toml", "study.db", "report.html"}
+"""What has times in it everywhere, or names the folder; documents are compared instead."""
 
 
 @pytest.fixture
@@ -37,15 +34,6 @@ def swept(make_study):
 def taught(make_study):
     def words(called):
         return "teach", make_taught(make_study, called=called, grid=[0, 20, 40], **SMALL), "--json"
-
-    return words
-
-
-@pytest.fixture
-def compared(make_study):
-    def words(called):
-        folder = make_study(called, **SMALL)
-        return "compare", folder, *COMPARED, folder / "out", "--json"
 
     return words
 
@@ -85,7 +73,7 @@ def made(forker, folder):
     )
     paths = [path for path in sorted(folder.rglob("*")) if path.is_file() and not path.name.startswith(".")]
     files = {str(path.relative_to(folder)): content(path, folder) for path in paths}
-    return but_for_times(document), files, runs(folder)
+    return but_for_times(document), files
 
 
 def content(path, folder):
@@ -98,12 +86,6 @@ def but_for_times(document):
     if isinstance(document, dict):
         return {key: but_for_times(value) for key, value in document.items() if key not in ("seconds", "episodes")}
     return document
-
-
-def runs(folder):
-    """What each run of a comparison visited, and what that is worth."""
-    found = read_runs(folder / "out" / "runs.jsonl").values()
-    return {(run.key.engine, run.key.seed): (run.visited, run.judgement) for run in found}
 
 
 def test_a_sweep_broken_off_at_any_write_comes_to_the_same_curve(broken_off, swept):
@@ -122,9 +104,3 @@ def test_teaching_broken_off_at_any_write_comes_to_the_same_table(broken_off, ta
 def kinds(folder):
     """How many lessons and how many examinations are kept."""
     return [len(list((folder / "teaching").glob(f"{kind}-*.npz"))) for kind in ("samples", "exam")]
-
-
-def test_a_comparison_broken_off_at_any_write_comes_to_the_same_runs(broken_off, compared):
-    kept = [len(runs(folder)) for folder in broken_off(compared, 7)]
-    assert set(kept) & {1, 2, 3}, "between the first run and the last"
-    assert kept[-1] == 4

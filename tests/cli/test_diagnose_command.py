@@ -5,7 +5,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-import hidden
+import hidden_cases as hidden
 import numpy as np
 import pandas as pd
 import pytest

@@ -177,7 +177,7 @@ def test_the_code_of_every_family_is_asked_for(make_study, capsys, monkeypatch, 
 
 
 @pytest.mark.parametrize(
-    "words", ["sweep {} --parameter trim", "teach {}", "repair {}", "compare {}", "export {} --to skopt --output x"]
+    "words", ["sweep {} --parameter trim", "teach {}", "repair {}", "export {} --to skopt --output x"]
 )
 def test_a_command_of_one_study_says_which_to_give(make_study, words, capsys):
     folder = make_several(make_study)

@@ -7,7 +7,6 @@ import warnings
 import pytest
 from processes import besides_progress
 
-from proxytune.cli.compare import read_runs
 from proxytune.cli.main import main
 from proxytune.report.writing import file_names
 
@@ -76,7 +75,6 @@ def test_scores_whose_squares_are_no_numbers_are_refused_or_have_no_spread(table
 ENDLESS = {
     "record": (["--model", "m.toml", "--output", "log", "--repeats", "1000000000"], "--repeats must be between 1 and"),
     "measure": (["--model", "m.toml", "--output", "t.csv", "--repeats", "1" + "0" * 12], "--repeats must be between"),
-    "compare": (["--output", "out", "--seeds", "1000000000"], "--seeds 1000000000: give at least 2 and at most 100000"),
 }
 
 
@@ -90,10 +88,3 @@ def test_a_folder_in_place_of_a_table_is_told_before_anything_is_simulated(make_
     (tmp_path / "m.toml").write_text("trim = 0.1\n")
     told = refused(capsys, "measure", make_study(), "--model", tmp_path / "m.toml", "--output", tmp_path)
     assert re.search(r"--output .*: is a folder; give the name of a file in it", told)
-
-
-@pytest.mark.parametrize("line", [b"\xff\xfe", b"[" * 20_000, b"[]", b"3", b"{}"])
-def test_spoilt_lines_of_finished_runs_are_skipped(tmp_path, line):
-    path = tmp_path / "runs.jsonl"
-    path.write_bytes(line + b"\n")
-    assert read_runs(path) == {}

@@ -11,7 +11,6 @@ import pytest
 from planted import planted_log, write_log
 from processes import besides_progress, finished_episodes, start, wait_for
 
-from proxytune.cli.compare import read_runs
 from proxytune.cli.main import COMMANDS, main
 from proxytune.cli.terminal.interruption import Terminated, signals_as_interruptions
 from proxytune.extensions import Interrupted
@@ -44,34 +43,6 @@ def test_a_stopped_sweep_goes_on_to_the_same_curve(make_study, capsys, number, j
         documents.append(json.loads(capsys.readouterr().out))
     assert documents[0]["curves"] == documents[1]["curves"]
     assert documents[0]["episodes"]["run"] == 5 * 18 - kept
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("number", "jobs"), [(signal.SIGTERM, "2"), (signal.SIGINT, "1")])
-def test_a_stopped_comparison_goes_on_to_the_same_runs(make_study, tmp_path, number, jobs):
-    folder, whole = make_study(domain={"sleep": "0.01"}, jobs=jobs), make_study("whole")
-    few = ("--engines", "gp,sobol", "--seeds", "2", "--budget", "4", "--initial", "2", "--output")
-    process = start("compare", folder, *few, tmp_path / "out")
-    wait_for(tmp_path / "out", process, 30)
-    ended(process, number, "compare")
-    assert 30 <= finished_episodes(tmp_path / "out") < 4 * 5 * 18
-    found = []
-    for home, output in ((folder, tmp_path / "out"), (whole, tmp_path / "never stopped")):
-        assert main(["compare", str(home), *few, str(output)]) == 0
-        runs = read_runs(output / "runs.jsonl").items()
-        found.append({(key.engine, key.seed): (run.visited, run.judgement) for key, run in runs})
-    assert found[0] == found[1]
-    assert len(found[0]) == 4
-
-
-@pytest.mark.slow
-def test_a_terminated_comparison_on_the_stand_in_ends_its_processes(tmp_path):
-    process = start("compare", "analytic", "--engines", "sobol", "--seeds", "30", "--output", tmp_path)
-    runs = tmp_path / "runs.jsonl"
-    while not runs.exists() and process.poll() is None:
-        time.sleep(0.01)
-    ended(process, signal.SIGTERM, "compare")
-    assert len(runs.read_text().splitlines()) < 60
 
 
 @pytest.mark.slow

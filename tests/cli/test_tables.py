@@ -66,12 +66,6 @@ def test_the_scores_of_a_twin_are_whole(make_study, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_comparison_is_whole(tmp_path):
-    few = ("--seeds", "2", "--budget", "4", "--initial", "2", "--output", tmp_path)
-    assert_whole(shown("compare", "analytic", "--engines", "sobol,random", *few))
-
-
-@pytest.mark.slow
 def test_learning_curves_are_whole(make_study):
     assert_whole(shown("teach", make_taught(make_study)))
 

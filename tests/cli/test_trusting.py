@@ -60,7 +60,6 @@ COMMANDS = {
     "drive": ["--agent", "agent1"],
     "loop": ["--log", "nowhere"],
     "record": ["--model", "m.toml", "--output", "log"],
-    "compare": ["--engines", "sobol", "--output", "compared"],
     "teach": [],
 }
 

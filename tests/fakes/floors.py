@@ -9,7 +9,7 @@ FLOORS = (
     {"search", "learning", "environments"},
     {"storage", "running"},
     {"study"},
-    {"sweep", "teaching", "comparison", "diagnosis"},
+    {"sweep", "teaching", "diagnosis"},
     {"report"},
     {"api", "testing", "skeletons"},
     {"loop"},

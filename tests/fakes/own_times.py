@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-import hidden
+import hidden_cases as hidden
 import numpy as np
 from manoeuvres import RATE_HZ, make_drives
 

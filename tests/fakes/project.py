@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def copy_project(folder: Path) -> Path:
     """Copy everything that is needed to run commands and the tests of the documents."""
-    for part in ("proxytune", "robots", "studies", "docs", "tests"):
+    for part in ("proxytune", "robots", "studies", "docs", "benchmarks", "tests"):
         shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.png", "study.db"))
     for document in ("README.md", "CONTRIBUTING.md", "CITATION.cff", "CHANGELOG.md", "pyproject.toml"):
         shutil.copy(ROOT / document, folder)

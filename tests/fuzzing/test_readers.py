@@ -21,9 +21,9 @@ import foreign_robot
 import numpy as np
 import pytest
 from mutation import mutated
+from runs import read_runs
 from tiny_loop import write_diagnosis
 
-from proxytune.cli.compare import read_runs
 from proxytune.domain import make_episode
 from proxytune.driving import read_map, read_robot
 from proxytune.effects import read_model

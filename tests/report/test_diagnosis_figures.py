@@ -1,7 +1,7 @@
 import warnings
 from dataclasses import replace
 
-import hidden
+import hidden_cases as hidden
 import numpy as np
 import pytest
 from matplotlib.container import ErrorbarContainer

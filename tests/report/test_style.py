@@ -13,7 +13,6 @@ HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis
     "module",
     [
         "proxytune.report.study.convergence",
-        "proxytune.report.compare.figure",
         "proxytune.report.sweep.figures",
     ],
 )

@@ -10,7 +10,6 @@ from proxytune.search.registry import AfterDesign
 from proxytune.search.surrogate import GaussianProcess
 
 HERE = [name for name in NAMES if not why_not(name, composed=True)]
-IN_BATCHES = [pytest.param(name, marks=pytest.mark.slow) if name == "skopt" else name for name in HERE]
 
 
 @given(st.integers(0, 200), st.integers(1, 20), st.integers(1, 30))
@@ -28,7 +27,7 @@ def test_the_design_makes_batches_of_its_own():
     assert [list(batch_at(index, 1, 5)) for index in range(7)] == [[index] for index in range(7)]
 
 
-@pytest.mark.parametrize("engine", IN_BATCHES)
+@pytest.mark.parametrize("engine", HERE)
 def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger_one(engine):
     proposer = make_proposer(engine, 3, WHOLE)
     finished = search(proposer, 6, seed=2)
@@ -38,7 +37,7 @@ def test_the_points_of_a_batch_all_differ_and_a_smaller_batch_begins_as_a_larger
     assert batch[0] == proposer.propose(SPACE, finished, 2)
 
 
-@pytest.mark.parametrize("engine", IN_BATCHES)
+@pytest.mark.parametrize("engine", HERE)
 def test_the_points_of_a_batch_differ_also_where_the_best_is_at_a_corner(engine):
     proposer = make_proposer(engine, 3, WHOLE)
     finished = search(proposer, 8, seed=1, score=lambda values: -100 * values[0] - values[1])
@@ -69,7 +68,7 @@ def test_a_pending_trial_is_not_taken_for_a_failed_one():
     assert [trial.score for trial in with_failures_as_worst(trials)] == [3.0, 3.0, None]
 
 
-@pytest.mark.parametrize("engine", [name for name in ("gp", "skopt", "tpe") if name in HERE])
+@pytest.mark.parametrize("engine", [name for name in ("gp", "tpe") if name in HERE])
 def test_an_engine_that_learns_looks_elsewhere_than_at_what_is_pending(engine):
     """What it draws is the same whatever is pending, so it would propose the same again if it did not mind."""
     inner = make_proposer(engine, 4).inner

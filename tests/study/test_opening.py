@@ -107,7 +107,10 @@ BAD = {
 
 ENGINES = {
     "an unknown engine": ('"tpr"', "engine: unknown engine 'tpr' .*; did you mean 'tpe'"),
-    "an engine for comparison only": ('"skopt"', "engine: 'skopt' is for `compare` only; known are: composite, gp"),
+    "an engine for comparison only": (
+        '"compared_engines:SKOPT"',
+        "'compared_engines:SKOPT' is for `compare` only; known are: composite, gp",
+    ),
     "no engine": ('"mine:nearness"', "engine 'mine:nearness' is a function; make it a proxytune"),
 }
 

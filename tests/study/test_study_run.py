@@ -17,7 +17,7 @@ from telling import Telling
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError, InputError, SettingsError
 from proxytune.running import Silent
-from proxytune.search import STUDY_ENGINES, make_proposer, propose_batch
+from proxytune.search import NAMES, make_proposer, propose_batch
 from proxytune.seeds import episode_seed
 from proxytune.storage import Store, TrialRecord
 from proxytune.study import (
@@ -133,7 +133,7 @@ def test_interrupted_within_batches_it_goes_on_to_the_same_trials_and_runs_no_ep
     assert len(stored_episodes(folder)) == spent.episodes + run_before
 
 
-@pytest.mark.parametrize("engine", STUDY_ENGINES)
+@pytest.mark.parametrize("engine", NAMES)
 def test_with_every_engine_an_interrupted_batch_goes_on_to_the_same_trials(make_study, engine):
     if engine == "tpe":
         pytest.importorskip("optuna")

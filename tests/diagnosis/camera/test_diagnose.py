@@ -13,8 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from camera_truth.answers import diagnosed
-from camera_truth.rates import confusion, coverage, rates
+from camera_rates import confusion, coverage, diagnosed, rates
 from joblib import Parallel, delayed
 from pictured import PICTURES, ROAD, ROBOT, lane_poses, pictures, write_pictures, write_still_frames
 from scipy.ndimage import map_coordinates

@@ -7,7 +7,7 @@ Long drives are made short, in the same blocks, without a pose that was not meas
 
 from dataclasses import replace
 
-import hidden
+import hidden_cases as hidden
 import numpy as np
 import pytest
 from clock_rates import planted

@@ -5,7 +5,7 @@ Six robots with a secret: the effect is named, what has no name is flagged, and 
 
 from dataclasses import FrozenInstanceError, replace
 
-import hidden
+import hidden_cases as hidden
 import numpy as np
 import pytest
 import rates

@@ -6,7 +6,7 @@ What drives could not have shown: a full-speed limit in slow drives, say.
 
 from dataclasses import replace
 
-import hidden
+import hidden_cases as hidden
 import numpy as np
 import pytest
 from planted import DECLARED, NOISE, TRUTH, driven_log, drives_of, fitted, planted_drives, planted_log

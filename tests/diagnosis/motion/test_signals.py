@@ -1,6 +1,6 @@
 """Curves over signals: the signal that something depends on leads, and nothing leads where nothing is missing."""
 
-import hidden
+import hidden_cases as hidden
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

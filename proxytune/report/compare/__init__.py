@@ -1,1 +1,0 @@
-"""A comparison of engines: JSON, tables and the figure."""

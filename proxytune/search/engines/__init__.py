@@ -1,1 +1,0 @@
-"""What proposes the next θ, one module each, and the registry of all."""

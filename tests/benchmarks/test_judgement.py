@@ -1,0 +1,225 @@
+"""Runs of engines, what their points are worth, and what many say together."""
+
+import json
+import math
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from calibrated import Calibrated
+from judgement import Judgement, Reading, judge, judgement_from, judging_code
+from problems import Analytic
+from runs import (
+    Run,
+    RunKey,
+    estimate,
+    judged_again,
+    median_curve,
+    read_runs,
+    run_document,
+    run_engine,
+    run_from,
+    summarise,
+)
+
+from proxytune.search import Trial, engine_of, fit_surrogate, from_unit, learn, unit_points
+from proxytune.search.engine import design_point
+
+OBJECTIVE = Calibrated()
+SEED = 3
+VISITED = tuple(design_point(OBJECTIVE.space, index, SEED) for index in range(12))
+
+
+@pytest.fixture(scope="module")
+def judged():
+    return judge(OBJECTIVE, VISITED, SEED, by_outputs=True)
+
+
+@pytest.fixture(scope="module")
+def trials():
+    return [Trial(values, OBJECTIVE.score(values, SEED), OBJECTIVE.outcome(values, SEED)) for values in VISITED]
+
+
+def test_the_answer_of_an_engine_that_learns_from_outputs_is_what_a_study_would_report(judged, trials):
+    known = learn(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED)
+    assert judged.answer == known.answer
+    assert judged.answer_score == OBJECTIVE.fresh_score(known.answer, SEED)
+
+
+def test_that_of_any_other_engine_is_where_the_model_of_the_score_is_lowest(judged, trials):
+    found = judge(OBJECTIVE, VISITED, SEED, by_outputs=False)
+    assert found.answer == fit_surrogate(OBJECTIVE.space, trials).incumbent()[0]
+    assert found.reading == judged.reading, "what points tell does not depend on who chose them"
+
+
+def test_the_reading_says_whether_region_and_intervals_hold_the_truth(judged, trials):
+    known, truth = learn(OBJECTIVE.space, trials, OBJECTIVE.goal(SEED), SEED), OBJECTIVE.truth(SEED)
+    assert judged.reading.holds == known.holds(truth)
+    assert judged.reading.share == known.posterior.share
+    held = {
+        name: low <= value <= high for value, (name, (low, high)) in zip(truth, known.intervals.items(), strict=True)
+    }
+    assert judged.reading.intervals_hold == held
+    assert (judged.reading.p_value, judged.reading.fits) == (known.misfit.p_value, known.misfit.fits)
+
+
+def test_a_truth_far_from_all_that_fits_is_not_held():
+    class Elsewhere(Calibrated):
+        def truth(self, seed):
+            return from_unit(self.space, 1.0 - unit_points(4, 1, 9)[0])
+
+        def goal(self, seed):
+            return Calibrated().goal(seed)
+
+    apart = Elsewhere()
+    truths = [judge(apart, VISITED, seed, by_outputs=True).reading for seed in (1, 2, 3)]
+    assert not all(reading.holds for reading in truths)
+    assert not all(all(reading.intervals_hold.values()) for reading in truths)
+
+
+def test_without_parts_there_is_no_reading_and_without_a_truth_nothing_holds_it():
+    class Unknown(Calibrated):
+        def truth(self, seed):
+            return Calibrated().truth(seed) if self.name == "inner" else None
+
+        def regret(self, values, seed, lowest=math.inf):
+            return Calibrated().regret(values, seed)
+
+        def goal(self, seed):
+            return Calibrated().goal(seed)
+
+        def score(self, values, seed):
+            return Calibrated().score(values, seed)
+
+        def fresh_score(self, values, seed):
+            return Calibrated().fresh_score(values, seed)
+
+        def error(self, values, seed):
+            return None
+
+    assert judge(Analytic(), VISITED, 1, by_outputs=False).reading is None
+    reading = judge(Unknown(), VISITED, SEED, by_outputs=False).reading
+    assert (reading.holds, reading.intervals_hold) == (None, None)
+    assert 0.0 < reading.share < 1.0
+
+
+def test_an_objective_is_told_the_lowest_regret_so_far():
+    told = []
+
+    class Listening(Analytic):
+        def regret(self, values, seed, lowest=math.inf):
+            told.append(lowest)
+            return Analytic().regret(values, seed)
+
+    regrets = judge(Listening(), VISITED, 1, by_outputs=False).regrets
+    # Scores are asked for first, and made of regrets here.
+    assert told[len(VISITED) : 2 * len(VISITED)] == [min((math.inf, *regrets[:count])) for count in range(len(VISITED))]
+
+
+def test_evaluations_are_counted_to_the_first_point_within_the_floor():
+    found = Judgement((None, 9.0, 4.0, 8.0, 0.0), (0.0,), 0.0, 0.0, None, None, "")
+    assert found.best_regrets == (math.inf, 9.0, 4.0, 4.0, 0.0)
+    assert found.evaluations_to(4.0) == 3
+    assert found.evaluations_to(0.0) == 5
+    assert found.evaluations_to(-1.0) is None
+
+
+def test_a_judgement_comes_back_from_json_as_it_was(judged):
+    for one in (judged, replace(judged, reading=None)):
+        assert judgement_from(json.loads(json.dumps(asdict(one)))) == one
+    assert judged.code == judging_code()
+
+
+SOBOL = engine_of("sobol")
+KEY = RunKey("analytic 1", "sobol", 1, 12, 4, "")
+
+
+def made(engine, seed, regrets, answer_regret=0.0, error=0.1, reading=None):
+    key, score = RunKey("o", engine, seed, len(regrets), 1, ""), None if answer_regret is None else answer_regret + 5.0
+    found = Judgement(tuple(regrets), (0.0,), score, answer_regret, error, reading, "")
+    return Run(key, ((0.0,),) * len(regrets), 0.5, found)
+
+
+def test_a_run_is_a_function_of_its_key_but_for_the_time_it_took():
+    runs = [replace(run_engine(Analytic(), KEY, SOBOL), seconds=0.0) for _ in range(2)]
+    assert runs[0] == runs[1]
+    assert len(runs[0].visited) == len(runs[0].judgement.regrets) == 12
+
+
+@pytest.mark.parametrize("engine", ["random", "gp"])
+def test_runs_of_one_seed_share_the_design_and_no_more(engine):
+    one, other = (
+        run_engine(Analytic(), replace(KEY, engine=name, budget=7), engine_of(name)) for name in ("sobol", engine)
+    )
+    assert one.visited[:4] == other.visited[:4]
+    assert one.visited != other.visited
+
+
+def test_a_run_judged_again_proposes_nothing_and_forgets_the_old_judgement(monkeypatch):
+    run = run_engine(Analytic(), KEY, SOBOL)
+    stale = replace(run, judgement=replace(run.judgement, answer=(0.0,), code="old"))
+    monkeypatch.setattr("runs.make_proposer", None)
+    assert judged_again(Analytic(), stale, SOBOL) == run
+
+
+def test_a_run_comes_back_from_json_as_it_was():
+    run = run_engine(Analytic(), KEY, SOBOL)
+    assert run_from(json.loads(json.dumps(run_document(run)))) == run
+
+
+def test_the_saving_is_paired_by_seed_and_a_run_beyond_the_budget_counts_as_one_more():
+    default = [made("gp", seed, [9.0, 0.0, 0.0]) for seed in (1, 2)]
+    rival = [made("tpe", 1, [9.0, 9.0, 0.0], 2.0), made("tpe", 2, [9.0, 9.0, 9.0], 9.0)]
+    found = summarise(rival, default, 4.0)
+    assert (found.seeds, found.reached) == (2, 1)
+    assert found.saved.value == 1.5
+    assert (found.saved.low, found.saved.high) == (1.0, 2.0)
+    assert found.evaluations.value == 3.5
+    assert found.regret_difference.value == 5.5
+    assert found.score.value == 10.5
+    assert found.ratio.value == 2.0 / 3.5
+    assert (found.ratio.low, found.ratio.high) == (0.5, 2.0 / 3.0)
+
+
+def test_an_answer_that_failed_counts_as_the_worst_point_of_its_run():
+    runs = [made("gp", 1, [9.0, None, 3.0], answer_regret=None)] * 2
+    assert summarise(runs, runs, 4.0).regret.value == 9.0
+
+
+def test_readings_are_counted_over_seeds_and_parameters():
+    held = [{"delay": True, "trim": False}, {"delay": True, "trim": True}]
+    readings = [Reading(share, share < 0.2, one, 0.5, share < 0.2) for share, one in zip((0.1, 0.3), held, strict=True)]
+    runs = [made("gp", seed, [9.0, 0.0], reading=reading) for seed, reading in enumerate(readings)]
+    region = summarise(runs, runs, 4.0).region
+    assert (region.covered, region.misfits, region.intervals_covered) == (1, 1, {"delay": 2, "trim": 1})
+    assert region.share.value == pytest.approx(0.2)
+
+
+def test_where_truth_is_not_known_nothing_is_said_to_hold_it():
+    runs = [made("gp", seed, [9.0, 0.0], reading=Reading(0.1, None, None, None, None)) for seed in (1, 2)]
+    region = summarise(runs, runs, 4.0).region
+    assert (region.covered, region.misfits, region.intervals_covered) == (None, 0, None)
+
+
+def test_an_interval_covers_the_truth_about_as_often_as_it_says():
+    generator = np.random.default_rng(1)
+    hits = [
+        abs(found.value - 5.0) >= 0 and found.low <= 5.0 <= found.high
+        for found in (estimate(generator.normal(5.0, 2.0, 30), np.mean) for _ in range(100))
+    ]
+    assert 86 <= sum(hits) <= 100
+
+
+def test_the_curve_is_the_median_of_the_lowest_so_far_within_its_band():
+    runs = [made("gp", seed, regrets) for seed, regrets in enumerate([[9.0, 1.0], [7.0, 8.0], [5.0, 2.0]])]
+    middle, low, high = median_curve(runs)
+    assert middle.tolist() == [7.0, 2.0]
+    assert (low <= middle).all()
+    assert (middle <= high).all()
+
+
+@pytest.mark.parametrize("line", [b"\xff\xfe", b"[" * 20_000, b"[]", b"3", b"{}"])
+def test_spoilt_lines_of_finished_runs_are_skipped(tmp_path, line):
+    path = tmp_path / "runs.jsonl"
+    path.write_bytes(line + b"\n")
+    assert read_runs(path) == {}

@@ -1,23 +1,17 @@
 """An effect that is added beside the others is taken up everywhere, and refused where it is not documented."""
 
 import json
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 from outside_effects import WEAK_REVERSE
-
-ROOT = Path(__file__).resolve().parent.parent
+from project import copy_project, run
 
 EFFECT = "\n\n" + WEAK_REVERSE[WEAK_REVERSE.index("@dataclass") :]
 
 DIAGNOSE = """
 import sys
 from pathlib import Path
-sys.path.append(sys.argv[1])
+sys.path += sys.argv[1:]
 from planted import TRUTH, planted_log, write_log
 from proxytune.cli.main import main
 log = write_log(planted_log({**TRUTH, "weak_reverse": 0.3}, episodes=6, seconds=20.0), Path("log"))
@@ -28,31 +22,19 @@ sys.exit(main(["diagnose", str(log), "--json", "--output", "found"]))
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A copy of the project whose room of effects has one more class, and its name in the catalogue."""
-    folder = tmp_path_factory.mktemp("project")
-    for part in ("proxytune", "robots", "studies", "docs", "tests"):
-        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "*.png", "study.db"))
-    for document in ("README.md", "pyproject.toml"):
-        shutil.copy(ROOT / document, folder)
-    motion = folder / "proxytune" / "effects" / "body" / "motion.py"
+    folder = copy_project(tmp_path_factory.mktemp("project"))
+    motion = folder / "proxytune" / "effects" / "motion.py"
     motion.write_text(motion.read_text(encoding="utf-8") + EFFECT, encoding="utf-8")
     catalogue = folder / "proxytune" / "effects" / "catalogue.py"
     text = catalogue.read_text(encoding="utf-8")
-    text = text.replace("    FloorSlope,\n", "    WeakReverse,\n    FloorSlope,\n", 1)
-    text = text.replace("motion import ", "motion import WeakReverse, ", 1)
-    catalogue.write_text(text, encoding="utf-8")
+    assert text.count("    FloorSlope,\n") == 2  # imported, and listed
+    catalogue.write_text(text.replace("    FloorSlope,\n", "    WeakReverse,\n    FloorSlope,\n"), encoding="utf-8")
     return folder
-
-
-def run(folder, *arguments):
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
-    return subprocess.run(
-        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
 
 
 @pytest.mark.slow
 def test_an_effect_that_is_added_in_one_place_is_found_fitted_and_drawn(folder):
-    answer = run(folder, "-c", DIAGNOSE, str(folder / "tests" / "diagnosis"))
+    answer = run(folder, "-c", DIAGNOSE, str(folder / "tests" / "fakes"), str(folder / "benchmarks"))
     assert answer.returncode == 0, answer.stderr
     found = json.loads(answer.stdout)
     assert [effect["name"] for effect in found["effects"]] == ["weak_reverse"]
@@ -72,7 +54,14 @@ def test_an_effect_that_is_added_in_one_place_is_listed(folder):
 @pytest.mark.slow
 def test_an_effect_without_a_row_in_the_documents_is_refused_in_words(folder):
     answer = run(
-        folder, "-m", "pytest", "tests/test_documents.py", "-k", "every_effect_and_its_parameters and weak_reverse"
+        folder,
+        "-m",
+        "pytest",
+        "-n",
+        "0",
+        "tests/test_documents.py",
+        "-k",
+        "every_effect_and_its_parameters and weak_reverse",
     )
     assert answer.returncode == 1
     assert "docs/reference/effects.md has no row for the effect 'weak_reverse'" in answer.stdout

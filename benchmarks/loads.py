@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "diagnosis"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "fakes"))
 
 from planted import ROBOT, TRUTH, planted_log
 

@@ -17,6 +17,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
+sys.path.append(str(Path(__file__).parent))
+
 import foreign_robot
 import numpy as np
 import pytest
@@ -39,9 +41,6 @@ from proxytune.loop.opening import Kept
 from proxytune.scores import read_scores
 from proxytune.storage import Store
 from proxytune.study import StudyRun, as_stored, open_study, read_lessons, read_study_settings, result_of
-
-sys.path.append(str(Path(__file__).parent))
-
 
 MODEL = """\
 format = 1

@@ -72,7 +72,7 @@ def test_studies_of_one_engine_outlast_an_edit_of_another_engine(tmp_path, monke
     monkeypatch.setattr(digest, "FOLDER", tmp_path)
     code_of.cache_clear()
     before = {engine: engine_code(engine) for engine in ("outcomes", "gp", "tpe", "random")}
-    with (tmp_path / "search" / "knowledge" / "likelihood.py").open("a") as file:
+    with (tmp_path / "search" / "likelihood.py").open("a") as file:
         file.write("EDITED = 1\n")
     code_of.cache_clear()
     changed = {engine for engine, code in before.items() if engine_code(engine) != code}
@@ -184,9 +184,9 @@ def test_no_other_engine_needs_these_libraries(monkeypatch):
             assert len(made(engine, 3).propose(SPACE, told, 1)) == 2
 
 
-def test_every_engine_that_is_not_refused_can_be_made_and_has_a_digest_of_its_own_code():
+def test_every_engine_that_is_not_refused_can_be_made_and_has_the_digest_of_its_module():
     digests = [engine_code(engine) for engine in NAMES]
-    assert len(set(digests)) == len(NAMES)
+    assert len(set(digests)) == len({engine.make.__module__ for engine in ENGINES}) > 1
     for engine in NAMES:
         if not why_not(engine, composed=True):
             assert made(engine, 3).initial == 3

@@ -1,7 +1,9 @@
-"""How a camera's pictures look besides where things are in them: brightness, sharpness, noise and blemishes.
+"""The look of a camera's pictures besides where things are in them: brightness, sharpness, noise and blemishes.
 
-How blurred a camera's edges are, by the robot's motion and by poor focus.
-The noise of a camera's pixels, told from the texture of the floor.
+Sharpness: an edge's squared width is that of its drawing, plus defocus², plus blur² · speed² / 12; both are what gives
+the model's own frames the measured widths (`fit_sharpness`). Noise is told from the texture of the floor by frames
+between which the robot stood, else by the smoothest band of rows (`fit_grain`). `look_at` fits all of them with the
+light; `changes` says which there is no doubt of.
 """
 
 from collections.abc import Callable, Mapping
@@ -51,7 +53,7 @@ FOOT = 0.15
 """An edge ends where it is less steep than this share of its steepest."""
 
 FAINT = 0.35
-"""Edges that the model draws with less than this share of the measured steepness are not the same ones."""
+"""MovingEdges that the model draws with less than this share of the measured steepness are not the same ones."""
 
 MOST = 12000
 """Edge points that are enough."""
@@ -69,14 +71,14 @@ ROUGH = 0.06
 """What widths of profiles half a pixel apart are wrong by, besides their scatter [pixel²]."""
 
 SLOW = 5.0
-"""Edges that all move alike to this tell nothing of blur [pixel/s]."""
+"""MovingEdges that all move alike to this tell nothing of blur [pixel/s]."""
 
 WIDEST = (0.06, 0.01)
 """Intervals of blur [s] and defocus that still tell something."""
 
 
 @dataclass(frozen=True)
-class Edges:
+class MovingEdges:
     """Points on the edges of markings in measured frames.
 
     Attributes:
@@ -94,7 +96,7 @@ class Edges:
 
 @dataclass(frozen=True)
 class Sharpness:
-    """What makes edges soft.
+    """The softness of edges.
 
     Attributes:
         blur: How long an exposure lasts [s].
@@ -105,7 +107,7 @@ class Sharpness:
     defocus: Fitted
 
 
-def fit_sharpness(measured: Pictures, edges: Edges, draw: Draw) -> Sharpness:
+def fit_sharpness(measured: Pictures, edges: MovingEdges, draw: Draw) -> Sharpness:
     """Fit motion blur and defocus: motion widens fast edges, poor focus widens all.
 
     An edge's squared width is that of its drawing, plus defocus², plus blur² · speed² / 12. Read off directly it is
@@ -153,12 +155,12 @@ def _response(moved: Floats, followed: Floats, response: Floats) -> Floats:
     return np.clip(measured, 0.3, 1.5)
 
 
-def _thinned(edges: Edges) -> Edges:
+def _thinned(edges: MovingEdges) -> MovingEdges:
     every = max(1, -(-len(edges.frame) // MOST))
-    return Edges(edges.frame[::every], edges.place[::every], edges.normal[::every], edges.speed[::every])
+    return MovingEdges(edges.frame[::every], edges.place[::every], edges.normal[::every], edges.speed[::every])
 
 
-def _profiles(pictures: NDArray[Any], edges: Edges) -> tuple[Floats, Floats]:
+def _profiles(pictures: NDArray[Any], edges: MovingEdges) -> tuple[Floats, Floats]:
     """Brightness along each edge's normal, the steepest place in the middle (P, 2 REACH + 1), and how steep that is."""
     along = np.arange(-REACH - SHIFT, REACH + SHIFT + 1) * STEP
     column, row = (edges.place[:, axis, None] - 0.5 + edges.normal[:, axis, None] * along for axis in (0, 1))
@@ -171,7 +173,7 @@ def _profiles(pictures: NDArray[Any], edges: Edges) -> tuple[Floats, Floats]:
 
 
 def _missing(
-    seen: tuple[Floats, Floats], drawn: tuple[Floats, Floats], edges: Edges, frames: int
+    seen: tuple[Floats, Floats], drawn: tuple[Floats, Floats], edges: MovingEdges, frames: int
 ) -> tuple[Floats, Floats]:
     """Squared blur [s²] and defocus [pixel²] that the drawn edges lack, and half of their intervals."""
     same = drawn[1] > FAINT * seen[1]
@@ -239,7 +241,7 @@ LITTLE = 0.5
 
 @dataclass(frozen=True)
 class Grain:
-    """How noisy the pixels are.
+    """The noise of pixels.
 
     Attributes:
         noise: Standard deviation of a pixel as it is logged [grey level]. Where it is not identified, only the
@@ -308,14 +310,14 @@ def _band_variances(measured: Pictures, paint: NDArray[np.int8], apart: int) -> 
 
 
 def _variance(values: Floats) -> float:
-    """Of the values without stains and the like, beyond four standard deviations."""
+    """Variance without stains and the like, beyond four standard deviations."""
     spread = 1.4826 * np.median(np.abs(values)) + 0.5
     kept = values[np.abs(values) < 4.0 * spread]
     return float(np.square(kept).mean())
 
 
 SHARP_PX = 2.0
-"""Edges that lie farther from the map's are not those that the model draws."""
+"""MovingEdges that lie farther from the map's are not those that the model draws."""
 
 HORIZON_ROWS = 3
 """So many rows beneath the horizon are left out: what a pixel covers there is a metre long."""
@@ -323,7 +325,7 @@ HORIZON_ROWS = 3
 
 @dataclass(frozen=True)
 class Appearance:
-    """What the pictures' look says.
+    """All figures of the pictures' look.
 
     Attributes:
         light: Exposure and vignetting.
@@ -419,10 +421,10 @@ def _soft(blur_s: float, defocus: float) -> dict[str, float]:
     return {name: PARAMETERS[name].clipped(float(value)) for name, value in values.items()}
 
 
-def _sharp_edges(fit: CameraFit) -> Edges:
+def _sharp_edges(fit: CameraFit) -> MovingEdges:
     """The edges that the model has too, with how fast each moves through the picture."""
     there, edges = project(fit.views, fit.state), fit.views.edges
     speed = (pose_slopes(there) * there.rates).sum(axis=1)
     same = there.valid & (np.abs(there.residual) < SHARP_PX)
     place = np.stack((edges.column, edges.row), axis=-1)
-    return Edges(edges.frame[same], place[same], edges.normal[same], np.abs(speed[same]))
+    return MovingEdges(edges.frame[same], place[same], edges.normal[same], np.abs(speed[same]))

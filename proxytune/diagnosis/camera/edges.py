@@ -1,9 +1,9 @@
-"""Edges of white and yellow markings in pictures, to a fraction of a pixel.
+"""From a log's frames to views: what a diagnosis of the camera goes by.
 
-Where the robot was when pictures were taken: tracked poses, smoothed where it moves.
-A robot's camera as values in θ, for pictures of a log's own size.
-What a diagnosis of the camera goes by: edges of markings, where the robot was, and the map.
-From a log's frames to views: pictures read, edges found, poses smoothed, the map laid out.
+`find_edges` finds edges of white and yellow markings to a fraction of a pixel; `track_frames` gives the poses at which
+pictures were taken, smoothed by parabolas where the robot moves; `Optics` is the robot's camera as values in θ, for
+pictures of the log's own size; `Tape` orders the errors with which the map's lines may lie. `gather_views` reads a log
+and puts all of it together.
 """
 
 from collections.abc import Mapping

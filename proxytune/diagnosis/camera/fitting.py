@@ -1,7 +1,9 @@
 """Fitting a camera to edge points, with the tape, the whole map and every frame's pose as nuisances.
 
-Normal equations of edge points, with what is of no interest eliminated: every frame's pose, or other unknowns.
-How much a tracker scatters, from what fits of the camera add to its poses.
+Gauss–Newton steps on Geman and McClure's loss ρ(r) = ½ r² / (1 + r²/s²) of the distances r of edge points from the
+map's markings, with Gaussian priors; every frame's pose is eliminated from the normal equations by the Schur complement
+A − B C⁻¹ Bᵀ (`Normal.marginal`, `eliminate`). What fits add to tracked poses tells how much the tracker scatters
+(`pose_scatter`).
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,6 +1,8 @@
-"""How a camera's brightness differs from the drawn frames': exposure and vignetting.
+"""The light of a camera, and what hides the floor from it.
 
-What is fixed to the camera and hides the floor: dirt on the lens, a bumper in view.
+A drawn grey x is logged as 255 · gain · (x (1 − vignetting r²) / 255) ** gamma: `fit_light` fits that to the mean
+brightness of flat places, by frame, paint and ring about the picture's middle. `find_blemishes` finds places fixed to
+the camera, dirt or a bumper, in which brightness does not follow the drawn frames.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,8 @@
-"""Where edge points fall on the floor, and how far that is from the map's markings, in pixels.
+"""The model of a camera on a map: edge points projected to the floor, and pictures drawn.
 
-What a model would have seen: pictures drawn at a log's poses, with every effect on camera and picture.
+`project` gives the signed distance r of every edge point from the nearest marking of its colour [pixel]; the `…_slopes`
+are ∂r by camera, pose, map and tape. `draw_pictures` draws what a model would have seen at a log's poses, with every
+effect on camera and picture.
 """
 
 from collections.abc import Mapping, Sequence

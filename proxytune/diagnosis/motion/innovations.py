@@ -18,8 +18,8 @@ from scipy.linalg import LinAlgError, cholesky_banded
 from scipy.linalg.lapack import dtbtrs
 from scipy.optimize import minimize
 
+from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative
-from proxytune.diagnosis.rules import RULES
 from proxytune.driving import Drivetrain, Robot, drivetrain
 from proxytune.effects import (
     CATALOGUE,
@@ -193,12 +193,12 @@ def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noi
     lowest, highest = np.log(SMALLEST / scale), np.log(LARGEST / scale)
     parts = _parts(drives)
 
-    def surprise(logs: Floats) -> float:
+    def negative_log_likelihood(logs: Floats) -> float:
         return -log_likelihood(errors, _factor(np.square(scale * np.exp(logs)) @ parts)) / len(errors)
 
     def with_slope(logs: Floats) -> tuple[float, Floats]:
-        here, steps = surprise(logs), np.where(logs + STEP <= highest, STEP, -STEP)
-        return here, np.array([surprise(moved) - here for moved in logs + np.diag(steps)]) / steps
+        here, steps = negative_log_likelihood(logs), np.where(logs + STEP <= highest, STEP, -STEP)
+        return here, np.array([negative_log_likelihood(moved) - here for moved in logs + np.diag(steps)]) / steps
 
     bounds = list(zip(lowest, highest, strict=True))
     found = minimize(
@@ -208,8 +208,8 @@ def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noi
     return float(found.fun), Noise(tuple(values[:3]), tuple(values[3:]))
 
 
-def walk(twists: Floats, tick_s: float) -> Floats:
-    """The poses before the first tick and after each, from the origin on.
+def integrate_twists(twists: Floats, tick_s: float) -> Floats:
+    """Dead-reckon planar poses from body twists: before the first tick and after each, from the origin on.
 
     They are those of the planar plant but for rounding. Episodes are driven by the plant itself: they stay what they
     were to the last bit.
@@ -443,7 +443,7 @@ def _setting(drives: Drives) -> Setting:
 
 
 def _walk_and_track(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
-    return _track(drives, walk(twists, 1.0 / drives.tick_hz), measurement)
+    return _track(drives, integrate_twists(twists, 1.0 / drives.tick_hz), measurement)
 
 
 def _track(drives: Drives, walked: Floats, measurement: Chain) -> Floats:
@@ -469,10 +469,10 @@ def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[s
     return {**theta, **given}
 
 
-def at_edge(name: str, value: float, robot: Robot) -> bool:
+def at_edge(name: str, value: float, robot: Robot, rules: Rules = RULES) -> bool:
     """Whether a value lies at an end of its parameter's range that is not neutral."""
     parameter = robot.catalogue.parameters[name]
-    reach = RULES.edge_share * (parameter.high - parameter.low)
+    reach = rules.edge_share * (parameter.high - parameter.low)
     ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(robot.figures)]
     return any(abs(value - end) <= reach for end in ends)
 

@@ -10,7 +10,6 @@ from proxytune.diagnosis.motion.effect_size import trace_of
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings
 from proxytune.diagnosis.motion.fitting import Fit, evaluate
 from proxytune.diagnosis.motion.screening import Candidate
-from proxytune.diagnosis.rules import RULES
 
 SECONDS = 60.0
 
@@ -118,7 +117,7 @@ def _best_offer(found: Findings) -> Manoeuvre | None:
         return None
     offers = [(_nats_apart(found.model, shape, *pairs[0]), name, text, shape) for name, text, shape in LIBRARY]
     clear, name, text, shape = max(offers, key=lambda offer: offer[0])
-    if clear <= RULES.rival_nats:
+    if clear <= found.model.drives.rules.rival_nats:
         return None
     between = (pairs[0][0].effect, pairs[0][1].effect)
     return Manoeuvre(name, text, between, clear, _duties_of(shape, found.model.drives))

@@ -14,6 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import t as student, wilcoxon
 
+from proxytune.diagnosis.answer import RULES
 from proxytune.diagnosis.motion.drives import (
     Drives,
     Floats,
@@ -25,8 +26,13 @@ from proxytune.diagnosis.motion.drives import (
     relative,
     sum_by,
 )
-from proxytune.diagnosis.motion.innovations import tracked_paths, walk, window_features, window_paths, window_twists
-from proxytune.diagnosis.rules import RULES
+from proxytune.diagnosis.motion.innovations import (
+    integrate_twists,
+    tracked_paths,
+    window_features,
+    window_paths,
+    window_twists,
+)
 from proxytune.driving import Robot
 from proxytune.effects import Learnt, is_learnt
 from proxytune.errors import LogError
@@ -168,22 +174,24 @@ class Ratio(NamedTuple):
         interval: Its 95 % interval, from leaving blocks out in turn.
         p_below: How likely chance makes so many blocks' ratios so far below 1 (Wilcoxon's signed ranks, one-sided).
         p_above: The same above 1.
+        shown_at: The chance below which it is shown to be off 1.
     """
 
     value: float
     interval: tuple[float, float]
     p_below: float = 1.0
     p_above: float = 1.0
+    shown_at: float = RULES.ratio_p_value
 
     @property
     def below(self) -> bool:
         """Whether it is shown to be below 1, by its interval or, where few blocks weigh most, by signed ranks."""
-        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < RULES.ratio_p_value)
+        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < self.shown_at)
 
     @property
     def above(self) -> bool:
         """Whether it is shown to be above 1."""
-        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < RULES.ratio_p_value)
+        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < self.shown_at)
 
 
 def rmse(squares: Floats, blocks: Whole) -> Rmse:
@@ -191,11 +199,11 @@ def rmse(squares: Floats, blocks: Whole) -> Rmse:
     return _root(float(np.log(squares.mean())), _half_width(_log_means_without_each(squares, blocks)))
 
 
-def ratio(after: Floats, before: Floats, blocks: Whole) -> Ratio:
-    """The ratio of two root mean squares over the same windows, with its interval."""
+def ratio(after: Floats, before: Floats, blocks: Whole, shown_at: float = RULES.ratio_p_value) -> Ratio:
+    """Divide two root mean squares over the same windows, with an interval and the chance of a ratio so far off 1."""
     half = _half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
     value, interval = _root(float(np.log(after.mean() / before.mean())), half)
-    return Ratio(value, interval, *_signed_ranks(after, before, blocks))
+    return Ratio(value, interval, *_signed_ranks(after, before, blocks), shown_at)
 
 
 def _signed_ranks(after: Floats, before: Floats, blocks: Whole) -> tuple[float, float]:
@@ -379,12 +387,12 @@ class Slopes(NamedTuple):
     """Windows' poses as they are compared, in metres.
 
     Attributes:
-        left: Measured less predicted (M, 3): forward, left, and heading times the median way.
+        residuals: Measured less predicted (M, 3): forward, left, and heading times the median way.
         columns: Change of the prediction per weight (M, 3, weights), curve by curve.
         block: The block of each pose (M,).
     """
 
-    left: Floats
+    residuals: Floats
     columns: Floats
     block: Whole
 
@@ -445,7 +453,7 @@ class _Lever(NamedTuple):
 
 def _lever(twists: Floats, walked: Floats, tick_s: float) -> _Lever:
     """The lever of twists (W, length, 3), along which the tracked places (W, length + 1, 3) are."""
-    poses = walk(twists, tick_s)
+    poses = integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
     axle = 0.5 * (poses[:, 1:] + poses[:, :-1])
     about = (axle[..., 1] - 1j * axle[..., 0]) * tick_s

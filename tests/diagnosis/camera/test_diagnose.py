@@ -21,7 +21,8 @@ from scipy.ndimage import map_coordinates
 from viewed import NEUTRAL, at_truth, driven, everything, stood, tracked
 
 from proxytune.diagnosis import camera_effects, project
-from proxytune.diagnosis.camera.diagnose import _verdict, declared_camera_effects, describe_map, diagnose_camera
+from proxytune.diagnosis.answer import verdict
+from proxytune.diagnosis.camera.diagnose import declared_camera_effects, describe_map, diagnose_camera, is_explained
 from proxytune.diagnosis.camera.fitting import fit_camera
 from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
 from proxytune.diagnosis.camera.selection import NEAR
@@ -141,7 +142,7 @@ def test_a_rolled_camera_is_explained_by_its_roll():
     assert effect.nats > 6.0
     assert effect.error_without > 1.5
     assert found.pixels.after.value < 0.6 * found.pixels.before.value
-    assert [gate.open for gate in found.gates] == [True, False]
+    assert [gate.significant for gate in found.residual_fields] == [True, False]
     assert found.candidates[0].effects == ("camera_roll",)
 
 
@@ -149,12 +150,12 @@ def test_a_rolled_camera_is_explained_by_its_roll():
 def test_a_lens_that_the_catalogue_does_not_have_is_not_explained():
     found = diagnosed_of_diagnose_camera("waved")
     assert found.verdict in ("partly explained", "unexplained")
-    assert found.gates[1].open
+    assert found.residual_fields[1].significant
     assert (found.verdict == "partly explained") == bool(found.effects)
 
 
 @pytest.mark.parametrize(
-    ("left_over", "blemishes", "named", "verdict"),
+    ("left_over", "blemishes", "named", "said"),
     [
         (False, (), False, "nothing missing"),
         (False, (), True, "explained"),
@@ -164,8 +165,9 @@ def test_a_lens_that_the_catalogue_does_not_have_is_not_explained():
         (False, ("dirt",), True, "partly explained"),
     ],
 )
-def test_what_is_left_over_and_what_covers_the_picture_make_the_verdict(left_over, blemishes, named, verdict):
-    assert _verdict(SimpleNamespace(open=left_over), SimpleNamespace(blemishes=blemishes), named=named) == verdict
+def test_what_is_left_over_and_what_covers_the_picture_make_the_verdict(left_over, blemishes, named, said):
+    field, look = SimpleNamespace(significant=left_over), SimpleNamespace(blemishes=blemishes)
+    assert verdict(is_explained(field, look), named=named) == said
 
 
 @pytest.mark.slow

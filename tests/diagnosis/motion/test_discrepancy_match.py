@@ -11,9 +11,8 @@ from learnt_truth import TURNING, VEERING
 from planted import TRUTH, planted_drives
 
 from proxytune.diagnosis import AdoptedEffect, Findings, Learning, cut, pose_errors
-from proxytune.diagnosis.motion import discrepancy_match as reading
-from proxytune.diagnosis.motion.discrepancy import Remainder
-from proxytune.diagnosis.motion.discrepancy_match import learn, lookalike
+from proxytune.diagnosis.motion import discrepancy as reading
+from proxytune.diagnosis.motion.discrepancy import Discrepancy, learn, match_named_effect
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import FIRST_GUESS
 from proxytune.diagnosis.motion.screening import candidates
@@ -42,7 +41,7 @@ def test_the_error_with_names_and_remainder_is_told_beside_that_with_names_alone
     learning = learn(found(drives, {}), tested, (1.0, 2.0, 60.0))
     assert [error.horizon_s for error in learning.errors] == [1.0, 2.0]
     assert all(error.ratio.value < 0.7 and error.ratio.interval[1] < 1.0 for error in learning.errors)
-    assert learning.theta == learning.remainder.theta
+    assert learning.theta == learning.discrepancy.theta
     assert not learning.names_doubtful
 
 
@@ -53,13 +52,13 @@ def test_names_that_hide_what_curves_could_say_are_doubtful(drives, tested):
 
 
 def test_what_the_guard_refuses_is_neither_told_nor_driven():
-    learning = Learning(Remainder({"learnt.turn_rate.yaw@1.0": 0.1}, {"turn rate": 1.0}), (), False)
+    learning = Learning(Discrepancy({"learnt.turn_rate.yaw@1.0": 0.1}, {"turn rate": 1.0}), (), False)
     assert learning.theta == {}
     assert learning.depends_on(("heading",)) == ("heading",)
 
 
 def test_signals_of_used_curves_come_first_each_once():
-    learning = Learning(Remainder({}, {"heading": 0.2, "turn rate": 0.8}, {}, True), (), False)
+    learning = Learning(Discrepancy({}, {"heading": 0.2, "turn rate": 0.8}, {}, True), (), False)
     assert learning.depends_on(("position", "heading")) == ("turn rate", "heading", "position")
 
 
@@ -75,13 +74,13 @@ def _few_candidates(monkeypatch):
 
 def perfect(drives, theta):
     """What curves that say what is true would gain."""
-    return Remainder({}, {}, {}, True, pose_errors(drives, theta, cut(drives, 2.0))[:, 0] ** 2)
+    return Discrepancy({}, {}, {}, True, pose_errors(drives, theta, cut(drives, 2.0))[:, 0] ** 2)
 
 
 def test_curves_that_do_what_turn_slip_does_are_turn_slip_with_its_value():
     truth = {**TRUTH, "turn_slip": 0.13}
     drives = planted_drives(truth, episodes=2, seconds=12.0)
-    found = lookalike(drives, TRUTH, perfect(drives, truth), TAKEN)
+    found = match_named_effect(drives, TRUTH, perfect(drives, truth), TAKEN)
     assert (found.effect, found.form) == ("turn_slip", "")
     assert found.theta["turn_slip"] == pytest.approx(0.13, abs=0.02)
     assert found.share > 0.9
@@ -90,10 +89,10 @@ def test_curves_that_do_what_turn_slip_does_are_turn_slip_with_its_value():
 def test_curves_that_no_name_describes_have_none():
     truth = {**TRUTH, **VEERING}
     drives = planted_drives(truth, episodes=2, seconds=12.0)
-    assert lookalike(drives, TRUTH, perfect(drives, truth), TAKEN) is None
+    assert match_named_effect(drives, TRUTH, perfect(drives, truth), TAKEN) is None
 
 
 def test_curves_that_gain_nothing_look_like_nothing():
     drives = planted_drives(TRUTH, episodes=2, seconds=12.0)
     worse = replace(perfect(drives, TRUTH), held_out=np.ones(3))
-    assert lookalike(drives, TRUTH, worse, TAKEN) is None
+    assert match_named_effect(drives, TRUTH, worse, TAKEN) is None

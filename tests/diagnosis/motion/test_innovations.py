@@ -24,10 +24,10 @@ from proxytune.diagnosis.motion.innovations import (
     fit_noise,
     huber,
     increments_along,
+    integrate_twists,
     lateness,
     log_likelihood,
     paths,
-    walk,
     whitener,
     window_paths,
 )
@@ -311,12 +311,12 @@ def twists(turn, sideways=0.3):
 @pytest.mark.parametrize("sideways", [0.0, 0.3])
 def test_the_poses_are_those_of_the_planar_plant(turn, sideways):
     asked = twists(turn, sideways)
-    walked = walk(asked, TICK_S)
+    walked = integrate_twists(asked, TICK_S)
     np.testing.assert_allclose(walked[:, 1:], integrate(np.zeros((3, 3)), asked, TICK_S), rtol=0.0, atol=1e-12)
 
 
 def test_it_begins_at_the_origin_and_changes_no_twist():
     asked = twists(3.0)
     before = asked.copy()
-    np.testing.assert_array_equal(walk(asked, TICK_S)[:, 0], 0.0)
+    np.testing.assert_array_equal(integrate_twists(asked, TICK_S)[:, 0], 0.0)
     np.testing.assert_array_equal(asked, before)

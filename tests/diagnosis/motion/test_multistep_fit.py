@@ -14,11 +14,11 @@ from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import Noise
 from proxytune.diagnosis.motion.multistep_fit import (
     PoseNoise,
+    fit_multistep,
     fit_windows,
     held_out_squares,
     horizons,
     noise_floor,
-    polish_fit,
     pose_noise,
 )
 
@@ -147,10 +147,10 @@ def test_no_pose_is_predicted_by_what_was_fitted_to_it(drives_of_polish):
 
 def test_values_that_predict_poorly_are_fitted_again(drives_of_polish):
     poor = model(drives_of_polish, trim=0.08, delay=0.2)
-    better, polish = polish_fit(poor)
+    better, polish = fit_multistep(poor)
     assert squares(drives_of_polish, better.theta).mean() < 0.5 * squares(drives_of_polish, poor.theta).mean()
-    assert min(one.value for one in polish.ratios.values()) < RULES.polish_helps
-    assert max(one.value for one in polish.ratios.values()) <= RULES.polish_harms
+    assert min(one.value for one in polish.ratios.values()) < RULES.multistep_helps
+    assert max(one.value for one in polish.ratios.values()) <= RULES.multistep_harms
     for name, true in TRUTH.items():
         low, high = polish.intervals[name]
         assert low < better.theta[name] < high
@@ -159,16 +159,16 @@ def test_values_that_predict_poorly_are_fitted_again(drives_of_polish):
 
 def test_values_that_windows_do_not_mend_are_kept(drives_of_polish):
     right = model(drives_of_polish)
-    assert polish_fit(right) == (right, None)
+    assert fit_multistep(right) == (right, None)
 
 
-def test_values_that_would_do_harm_at_some_horizon_are_not_taken(drives_of_polish, monkeypatch):
-    poor = model(drives_of_polish, trim=0.08, delay=0.2)
-    monkeypatch.setattr("proxytune.diagnosis.motion.multistep_fit.RULES", replace(RULES, polish_harms=0.01))
-    assert polish_fit(poor) == (poor, None)
+def test_values_that_would_do_harm_at_some_horizon_are_not_taken(drives_of_polish):
+    strict = replace(drives_of_polish, rules=replace(RULES, multistep_harms=0.01))
+    poor = model(strict, trim=0.08, delay=0.2)
+    assert fit_multistep(poor) == (poor, None)
 
 
 def test_drives_too_short_for_windows_in_three_blocks_are_not_fitted_to():
     few = model(planted_drives(TRUTH, episodes=2, seconds=4.0), trim=0.08)
     assert horizons(few.drives) == ()
-    assert polish_fit(few) == (few, None)
+    assert fit_multistep(few) == (few, None)

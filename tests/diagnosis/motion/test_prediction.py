@@ -259,12 +259,12 @@ def test_the_change_per_weight_is_that_of_replays(drives, extra, named):
     none = dict.fromkeys(weights, 0.0)
     for column, name in enumerate(order):
         moved = slopes_of(drives, {**theta, **extra, **none, name: SIZE}, offered)
-        seen = (still.left - moved.left) / SIZE
+        seen = (still.residuals - moved.residuals) / SIZE
         np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=2e-3 * np.abs(seen).max() + 1e-6)
 
 
 def test_a_model_that_is_right_leaves_nothing(drives):
-    assert np.abs(slopes_of(drives, TRUTH, learnt_effect(TURNING)).left).max() < 1e-9
+    assert np.abs(slopes_of(drives, TRUTH, learnt_effect(TURNING)).residuals).max() < 1e-9
 
 
 def test_windows_are_thinned_to_a_few_poses_that_reach_their_end(drives):

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from planted import DECLARED, NOISE, ROBOT, TRUTH, planted_drives
 
-from proxytune.diagnosis import AdoptedEffect, Curve, Findings
+from proxytune.diagnosis import AdoptedEffect, Findings, SignalCurve
 from proxytune.diagnosis.motion import selection as naming, selection as searching
-from proxytune.diagnosis.motion.evidence import Evidence, FittedLead
+from proxytune.diagnosis.motion.evidence import Evidence, FittedCandidate
 from proxytune.diagnosis.motion.fitting import evaluate, fit
 from proxytune.diagnosis.motion.innovations import at_edge
 from proxytune.diagnosis.motion.random_effects import RandomEffect
-from proxytune.diagnosis.motion.screening import Lead, candidates
-from proxytune.diagnosis.motion.selection import Choice, adopt, choose_best, drop_idle
+from proxytune.diagnosis.motion.screening import ScreenedCandidate, candidates
+from proxytune.diagnosis.motion.selection import adopt, choose_best, drop_idle
 from proxytune.driving import read_robot
 from proxytune.effects import CATALOGUE
 
@@ -35,17 +35,17 @@ def drives():
 
 def lead(effect, column):
     form = FORMS[effect]
-    return Lead(form, form.probes[0], form.probes[0], 100.0, 100.0, 0.002, np.array(column))
+    return ScreenedCandidate(form, form.probes[0], form.probes[0], 100.0, 100.0, 0.002, np.array(column))
 
 
 def rivals(drives, gain, theta, column=ACROSS):
     """The rivals of an effect of 100 nats beside a second one: its gain, its values and what it does."""
     best, second = lead("yaw_scrub", (1.0, 0.0, 0.0)), lead("lateral_slip", column)
     model = evaluate(drives, {**TRUTH, "yaw_scrub": 0.16}, DECLARED, NOISE)
-    fits = {"yaw_scrub": FittedLead(best, model, 100.0)}
+    fits = {"yaw_scrub": FittedCandidate(100.0, model, best)}
     if gain is not None:
-        fits["lateral_slip"] = FittedLead(second, evaluate(drives, {**TRUTH, **theta}, DECLARED, NOISE), gain)
-    (adopted,) = adopt([], Choice(100.0, model, best), Evidence([best, second], fits, (), []))
+        fits["lateral_slip"] = FittedCandidate(gain, evaluate(drives, {**TRUTH, **theta}, DECLARED, NOISE), second)
+    (adopted,) = adopt([], FittedCandidate(100.0, model, best), Evidence([best, second], fits, (), []))
     return [rival.effect for rival in adopted.rivals]
 
 
@@ -68,7 +68,7 @@ def test_an_effect_that_does_the_same_to_the_motion_is_a_rival_whatever_its_evid
 def test_a_random_effect_has_the_other_as_rival_by_most_of_the_evidence(drives, gain, expected):
     lost, late = (RandomEffect(name, name, 0.1, (0.05, 0.2), nats, 0.01) for name, nats in
                   (("dropped_commands", 100.0), ("delay_jitter", gain)))  # fmt: skip
-    choice = Choice(100.0, evaluate(drives, TRUTH, DECLARED, NOISE), random=lost)
+    choice = FittedCandidate(100.0, evaluate(drives, TRUTH, DECLARED, NOISE), random=lost)
     (adopted,) = adopt([], choice, Evidence([], {}, (lost, late), []))
     assert [rival.effect for rival in adopted.rivals] == expected
     assert (adopted.names, adopted.interval) == (("dropped_commands",), (0.05, 0.2))
@@ -98,10 +98,10 @@ def chosen(drives, *tried, p_value=0.002, random=()):
     fits = {}
     for label, values, gain in tried:
         form = CHOICE_FORMS[label]
-        lead = Lead(form, form.probes[0], form.probes[0], gain, gain, p_value, np.ones(3))
-        fits[label] = FittedLead(lead, evaluate(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
+        lead = ScreenedCandidate(form, form.probes[0], form.probes[0], gain, gain, p_value, np.ones(3))
+        fits[label] = FittedCandidate(gain, evaluate(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), lead)
     best = choose_best(model, Evidence([], fits, random, []), 15.0)
-    return best and best.lead.candidate.label
+    return best and best.screened.candidate.label
 
 
 def patch(radius):
@@ -185,16 +185,16 @@ def searching_of_names(answers, asked):
 
 
 def named(base, monkeypatch, *answers, harmful=True):
-    whole = naming.drop_immaterial
+    whole = naming.drop_negligible
 
     def weighed(found, seed):
         kept = whole(found, seed)
-        return replace(kept, immaterial=tuple(one._replace(harmful=harmful) for one in kept.immaterial))
+        return replace(kept, negligible=tuple(one._replace(harmful=harmful) for one in kept.negligible))
 
-    monkeypatch.setattr(naming, "drop_immaterial", weighed)
+    monkeypatch.setattr(naming, "drop_negligible", weighed)
     asked, told = [], []
     monkeypatch.setattr(naming, "search", searching_of_names(answers, asked))
-    return naming.name_effects(base, 1, told.append), asked, told
+    return naming.select_effects(base, 1, told.append), asked, told
 
 
 @pytest.mark.slow
@@ -203,7 +203,7 @@ def test_an_effect_that_misled_is_left_out_of_a_second_search_and_still_told(bas
     assert asked == [(), ("lateral_slip",)]
     assert "searching again without lateral_slip" in told
     assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
-    assert [dropped.effect.effect for dropped in found.immaterial] == ["lateral_slip"]
+    assert [dropped.effect.effect for dropped in found.negligible] == ["lateral_slip"]
 
 
 def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
@@ -216,7 +216,7 @@ def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
 def test_an_effect_that_was_found_last_and_does_not_matter_misled_nobody(base, monkeypatch):
     found, asked, _ = named(base, monkeypatch, SCRUB, SLIP)
     assert asked == [()]
-    assert [dropped.effect.effect for dropped in found.immaterial] == ["lateral_slip"]
+    assert [dropped.effect.effect for dropped in found.negligible] == ["lateral_slip"]
 
 
 @pytest.mark.slow
@@ -225,7 +225,7 @@ def test_the_second_search_is_not_taken_where_it_predicts_worse(base, monkeypatc
     found, asked, _ = named(base, monkeypatch, SLIP, SCRUB)
     assert len(asked) == 2
     assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
-    assert len(found.immaterial) == 1
+    assert len(found.negligible) == 1
 
 
 SEARCH_FORMS = [
@@ -248,15 +248,15 @@ def adopted(base_of_search, monkeypatch, *rounds):
         gain, curve = next(left, (0.0, 0.0))
         form = next(form for form in SEARCH_FORMS if form.effect not in taken)
         neutral = {name: value for names, value in zip(form.free, form.neutral, strict=True) for name in names}
-        lead = Lead(form, form.probes[0], form.probes[0], gain, gain, 0.002, np.ones(3))
-        signal = Curve(SimpleNamespace(name="time", effects=()), curve, np.zeros(1))
+        lead = ScreenedCandidate(form, form.probes[0], form.probes[0], gain, gain, 0.002, np.ones(3))
+        signal = SignalCurve(SimpleNamespace(name="time", effects=()), curve, np.zeros(1))
         fitted = replace(base_of_search, theta={**base_of_search.theta, **neutral})
-        return Evidence([lead], {form.label: FittedLead(lead, fitted, gain)}, (), [signal])
+        return Evidence([lead], {form.label: FittedCandidate(gain, fitted, lead)}, (), [signal])
 
     monkeypatch.setattr(searching, "gather_evidence", gather_evidence)
     monkeypatch.setattr(searching, "drop_idle", lambda model, effects: (model, effects))
     found = searching.search(base_of_search, 1, lambda line: None)
-    return [effect.gain for effect in found.adopted], [curve.gain for curve in found.remainder]
+    return [effect.gain for effect in found.adopted], [curve.gain for curve in found.unnamed_curves]
 
 
 @pytest.mark.parametrize(("gain", "expected"), [(10.0, []), (14.9, []), (15.1, [15.1])])

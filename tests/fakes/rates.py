@@ -108,7 +108,7 @@ class Row:
             f"{1e3 * value:.1f}" for value in (self.before, self.after, self.learnt, self.true, *self.floor)
         )
         name = self.job.case.name + (f" without {self.job.without}" if self.job.without else "")
-        added += f"; immaterial: {', '.join(self.negligible)}" if self.negligible else ""
+        added += f"; immaterial: {', '.join(self.immaterial)}" if self.immaterial else ""
         rest = f" rest: {', '.join(self.depends_on)}" if self.depends_on else ""
         head = f"{self.job.kind:11s} {name:44s} {self.verdict:16s}"
         return f"{head} [{added}]{rest} {self.evidence:.0f} nats, mm: {errors} {self.problem}".rstrip()
@@ -135,7 +135,7 @@ def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
         learnt=_learnt_error(found),
         true=_true_error(job, found.parts.tested, episodes, seconds),
         floor=error.floor[:2],
-        negligible=tuple(one.effect for one in found.negligible),
+        immaterial=tuple(one.effect for one in found.negligible),
     )
 
 

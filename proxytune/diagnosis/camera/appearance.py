@@ -119,7 +119,8 @@ def fit_sharpness(measured: Pictures, edges: MovingEdges, draw: Draw) -> Sharpne
         draw: Draws the model's frames, best with the fitted light; the middle of each exposure is to be at the
             instant of the frame's pose.
     """
-    edges = _thinned(edges)
+    every = max(1, -(-len(edges.frame) // MOST))
+    edges = MovingEdges(edges.frame[::every], edges.place[::every], edges.normal[::every], edges.speed[::every])
     if len(edges.frame) == 0:
         return Sharpness(Fitted(0.0, (0.0, np.inf), False), Fitted(0.0, (0.0, np.inf), False))
     rows, seen = measured.shape[1], _profiles(measured, edges)
@@ -128,36 +129,24 @@ def fit_sharpness(measured: Pictures, edges: MovingEdges, draw: Draw) -> Sharpne
         drawn = _profiles(draw(*_values(squares, rows)), edges)
         step, half = _missing(seen, drawn, edges, len(measured))
         if last is not None:
-            response = _response(squares - last[0], last[1] - step, response)
+            # How much squared widths follow what is fitted, from the last draw, where that was another.
+            moved, followed = squares - last[0], last[1] - step
+            measured_response = np.divide(followed, moved, out=response.copy(), where=np.abs(moved) > 1e-6)
+            response = np.clip(measured_response, 0.3, 1.5)
         last = squares, step
         squares = np.maximum(squares + step / response, 0.0)
         if (np.abs(squares - last[0]) * response < half / 10.0).all():
             break
     half = np.hypot(WIDER * half, (0.0, ROUGH))
     low, high = _values(squares - half / response, rows), _values(squares + half / response, rows)
-    return Sharpness(*(_fitted(*ends) for ends in zip(_values(squares, rows), low, high, WIDEST, strict=True)))
+    ends = zip(_values(squares, rows), low, high, WIDEST, strict=True)
+    return Sharpness(*(Fitted(value, (least, most), most - least < widest) for value, least, most, widest in ends))
 
 
 def _values(squares: Floats, rows: int) -> tuple[float, float]:
     """Blur [s] and defocus of squared blur [s²] and squared defocus [pixel²]."""
     blur, defocus = np.sqrt(np.maximum(squares, 0.0))
     return float(blur), float(defocus) / rows
-
-
-def _fitted(value: float, low: float, high: float, widest: float) -> Fitted:
-    return Fitted(value, (low, high), high - low < widest)
-
-
-def _response(moved: Floats, followed: Floats, response: Floats) -> Floats:
-    """How much squared widths follow what is fitted, from the last draw, where that was another."""
-    far = np.abs(moved) > 1e-6
-    measured = np.divide(followed, moved, out=response.copy(), where=far)
-    return np.clip(measured, 0.3, 1.5)
-
-
-def _thinned(edges: MovingEdges) -> MovingEdges:
-    every = max(1, -(-len(edges.frame) // MOST))
-    return MovingEdges(edges.frame[::every], edges.place[::every], edges.normal[::every], edges.speed[::every])
 
 
 def _profiles(pictures: NDArray[Any], edges: MovingEdges) -> tuple[Floats, Floats]:
@@ -398,22 +387,19 @@ def changes(look: Appearance) -> tuple[str, ...]:
     """
     names = [name for name in look.figures if _matters(name, look.figures[name])]
     exposure = [name for name in look.figures if name.startswith("exposure.")]
-    if any(_half(look.figures[name]) > NARROW for name in exposure):
+    intervals = [look.figures[name].interval for name in exposure]
+    if any((high - low) / 2.0 > NARROW for low, high in intervals):
         names = [name for name in names if name not in exposure]
     return tuple(dict.fromkeys(effect_of(name) for name in names))
 
 
 def _matters(name: str, figure: Fitted) -> bool:
-    """Whether a figure differs from its neutral value beyond doubt, by enough, and to where a camera's can be."""
+    """Tell whether a figure differs from its neutral value beyond doubt, by enough, and to where a camera's can be."""
     parameter, (low, high) = PARAMETERS[name], figure.interval
     neutral = parameter.neutral_value({})
     sure = name == NOISE or not low <= neutral <= high
     possible = parameter.low <= figure.value <= parameter.high
     return sure and possible and abs(figure.value - neutral) >= LEAST[name]
-
-
-def _half(figure: Fitted) -> float:
-    return (figure.interval[1] - figure.interval[0]) / 2.0
 
 
 def _soft(blur_s: float, defocus: float) -> dict[str, float]:

@@ -121,7 +121,7 @@ def conclude(
 
 
 def is_explained(field: ResidualField, look: Appearance) -> bool:
-    """Whether nothing fixed to the camera is left over, and nothing covers the picture."""
+    """Tell whether nothing fixed to the camera is left over, and nothing covers the picture."""
     return not (field.significant or look.blemishes)
 
 

@@ -227,18 +227,6 @@ Look = Mapping[str, float]
 """Values of effects on pictures, by name in θ."""
 
 
-def compare_displacement(views: Views, residuals: tuple[Floats, Floats, Floats], seed: int) -> Comparison:
-    """Displacement of markings before and after, from residuals on unseen frames.
-
-    Args:
-        views: Whose edge points these are.
-        residuals: Of the declared camera, of the model's and of the one with every effect (n,) each [pixel].
-        seed: Of the bootstrap.
-    """
-    before, after, floor = pixel_errors(views, residuals, seed)
-    return Comparison(before, after, floor if floor.value < after.value else after, "px")
-
-
 def displacement_ratio(views: Views, residuals: tuple[Floats, Floats], seed: int) -> float:
     """The error without an effect over the error with it, from residuals of both on unseen frames (n,) [pixel]."""
     without, with_it = pixel_errors(views, residuals, seed)
@@ -281,8 +269,10 @@ def grey_differences(
         fixed_exposure: Whether pictures compare as they are; else each at its own brightness, which no model knows.
     """
     measured, drawn = measured[:, floor], drawn[:, floor]
-    levels = 1.0 if fixed_exposure else _levels(measured, drawn)
-    return np.asarray(np.abs(measured - np.clip(drawn * levels, 0.0, 255.0)))
+    if not fixed_exposure:
+        ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
+        drawn = drawn * np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)
+    return np.asarray(np.abs(measured - np.clip(drawn, 0.0, 255.0)))
 
 
 def _grey_errors(
@@ -298,12 +288,6 @@ def _grey_errors(
         differences = grey_differences(measured, drawn, floor, fixed_exposure=gathered.frames.fixed_exposure)
         errors.append(error_over(differences.mean(axis=-1).sum(axis=1).astype(float), counts, seed))
     return errors
-
-
-def _levels(measured: Pictures, drawn: Pictures) -> Pictures:
-    """How much brighter each frame was exposed than drawn (n, 1, 1), of pixels (n, pixels, 3)."""
-    ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
-    return np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)
 
 
 MATERIAL = 1.03
@@ -350,7 +334,8 @@ def weigh_effects(named: CameraSelection, seed: int) -> Weighed:
     kept = tuple(effect for effect in named.effects if effect not in dropped)
     if dropped:
         model = without[dropped[0]] if len(dropped) == 1 else _test(_fit_without(named, dropped))
-    pixels = compare_displacement(views, (declared.residuals, model.residuals, full.residuals), seed)
+    before, after, floor = pixel_errors(views, (declared.residuals, model.residuals, full.residuals), seed)
+    pixels = Comparison(before, after, floor if floor.value < after.value else after, "px")
     return Weighed(replace(named, model=model.fit, effects=kept), named.model, pixels, ratios, nats, dropped)
 
 

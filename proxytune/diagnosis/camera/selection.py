@@ -218,7 +218,7 @@ class ResidualField:
 
     @property
     def significant(self) -> bool:
-        """Whether something fixed to the camera is left over."""
+        """Tell whether something fixed to the camera is left over."""
         return self.nats > FIELD_NATS and self.share > FIELD_SHARE and self.rms_px > LEAST_PX
 
     def displacement(self, right: Floats, down: Floats) -> Floats:

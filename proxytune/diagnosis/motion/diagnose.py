@@ -108,7 +108,7 @@ def bracket(lower: float, reached: float, again: Repeated | None, rules: Rules =
 
 
 def is_explained(after: float, floor: Bracket, *, unnamed: bool, rules: Rules = RULES) -> bool | None:
-    """Whether the error that is left is no more than noise; None where it is larger, and shows no structure.
+    """Tell whether the error that is left is no more than noise; None where it is larger, and shows no structure.
 
     Args:
         after: The error that is left [m].
@@ -123,7 +123,7 @@ def is_explained(after: float, floor: Bracket, *, unnamed: bool, rules: Rules = 
 
 
 def _is_at_floor(after: float, floor: Bracket, unnamed: bool, rules: Rules) -> bool:
-    """Whether an error is no more than noise: of poses, or of what drives do not repeat, or nothing lowers it."""
+    """Tell whether an error is no more than noise: of poses, or of what drives do not repeat, or nothing lowers it."""
     if after <= rules.floor_factor * floor.lower:
         return True
     if unnamed or floor.reached < rules.lowers * after:

@@ -327,7 +327,7 @@ def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], b
     return Discrepancy(learnt, share, guard, _helps(guard, drives.rules), after)
 
 
-def _fit_curves(drives: Drives, theta: Theta) -> tuple[Theta, Mapping[str, float], list[Theta]]:
+def _fit_curves(drives: Drives, theta: Theta) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
     """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ."""
     offer, parts = offer_curves(drives, theta), _parts(drives)
     names = np.array([curve.group for curve in offer.curves for _ in curve.knots])

@@ -67,13 +67,13 @@ class WeighedEffect(NamedTuple):
 
     @property
     def material(self) -> bool:
-        """Whether predictions are shown to need it; draws add to the error at every horizon: one is not enough."""
+        """Tell whether predictions are shown to need it; draws add to the error at every horizon: one is not enough."""
         shown = sum(one.value >= self.rules.material_factor and one.above for one in self.size.values())
         return shown >= (1 if self.effect.free else min(2, len(self.size)))
 
     @property
     def harmful(self) -> bool:
-        """Whether predictions are shown to be better without it."""
+        """Tell whether predictions are shown to be better without it."""
         return any(one.value <= 1.0 / self.rules.material_factor and one.below for one in self.size.values())
 
 

@@ -205,7 +205,7 @@ def _refit(
 
 
 def exceeds_names(curve: SignalCurve, gain: float, rules: Rules) -> bool:
-    """Whether a curve gains clearly more than a named effect of this gain [nats]."""
+    """Tell whether a curve gains clearly more than a named effect of this gain [nats]."""
     return curve.gain > rules.curve_factor * gain and curve.gain > gain + rules.curve_margin_nats
 
 

@@ -307,7 +307,7 @@ def noise_floor(drives: Drives, windows: Windows, noise: PoseNoise) -> tuple[flo
 
 
 def has_body(drives: Drives) -> bool:
-    """Whether the bullet plant has a body for this robot."""
+    """Tell whether the bullet plant has a body for this robot."""
     return drives.robot.urdf is not None
 
 

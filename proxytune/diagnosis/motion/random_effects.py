@@ -254,7 +254,7 @@ def _simulate_innovations(model: Fit, effect: RandomEffect, size: float, seed: i
     struck = model.whiten.whiten(drawn)
     noise = np.random.default_rng(seed).standard_normal(len(struck))
     share = max(QUIETEST, 1.0 - float(np.mean(struck**2)) / float(np.mean(model.innovations**2)))
-    left = struck + np.sqrt(share * np.mean(model.innovations**2)) * noise
+    left: Floats = struck + np.sqrt(share * np.mean(model.innovations**2)) * noise
     # What is left once the model's free parameters have been fitted again.
     for _ in range(STEPS):
         weighted = model.slopes * (np.abs(left) < HUBER)[:, None]

@@ -297,7 +297,7 @@ def _probes(base: Fit, form: Candidate) -> list[_Probe]:
 
 
 def _begin(form: Candidate, values: tuple[float, ...], parameters: Mapping[str, Parameter]) -> tuple[float, ...]:
-    """Where the model has a form's coordinates; what shapes an effect that is still to come may be at its probe."""
+    """The model's values of a form's coordinates; what shapes an effect that is still to come may be at its probe."""
     if values[0] == form.neutral[0]:
         return form.neutral
     pairs = zip(form.free, values, form.neutral, strict=True)
@@ -329,7 +329,7 @@ def _step(gradient: Floats, hessian: Floats) -> tuple[float, Floats]:
 
 
 def _gains(gradients: Floats, hessian: Floats) -> Floats:
-    """The same gain for many gradients (draws, columns)."""
+    """Gains of many gradients (draws, columns)."""
     best = -gradients @ np.linalg.pinv(hessian, hermitian=True)
     if np.count_nonzero(hessian.diagonal()) == 1:
         best = np.clip(best, 0.0, FURTHEST)

@@ -155,7 +155,7 @@ def choose_best(model: Fit, evidence: Evidence, least: float) -> FittedCandidate
 
 
 def _is_everywhere(one: FittedCandidate) -> bool:
-    """Whether an effect of a place acts where most of the drives were: then it is no matter of place."""
+    """Tell whether an effect of a place acts where most of the drives were: then it is no matter of place."""
     if one.screened is None:
         return False
     drives, name = one.fitted.drives, one.screened.candidate.effect
@@ -168,7 +168,7 @@ def _is_everywhere(one: FittedCandidate) -> bool:
 
 
 def _is_plain_form_of(one: FittedCandidate, best: FittedCandidate) -> bool:
-    """Whether it is the best effect's form for both wheels alike, at little loss of evidence."""
+    """Tell whether it is the best effect's form for both wheels alike, at little loss of evidence."""
     if one.screened is None or best.screened is None or one is best or one.screened.candidate.form:
         return False
     same = one.screened.candidate.effect == best.screened.candidate.effect
@@ -176,7 +176,7 @@ def _is_plain_form_of(one: FittedCandidate, best: FittedCandidate) -> bool:
 
 
 def _is_at_edge(one: FittedCandidate) -> bool:
-    """Whether one of its values was fitted to an end of its range: the effect then stands for something else."""
+    """Tell whether one of its values was fitted to an end of its range: the effect then stands for something else."""
     free = one.screened.candidate.free if one.screened else ()
     drives = one.fitted.drives
     return any(at_edge(name, one.fitted.theta[name], drives.robot, drives.rules) for names in free for name in names)
@@ -198,7 +198,7 @@ def fit_random(model: Fit, effect: RandomEffect) -> FittedCandidate:
 
 
 def predicts_no_worse(one: Fit, other: Fit) -> bool:
-    """Whether one model's error over windows is not shown to be larger than the other's beyond the guard's factor."""
+    """Tell whether one model's error over windows is not shown to exceed the other's beyond the guard's factor."""
     drives = other.drives
     windows = cut(drives, drives.rules.guard_horizon_s)
     if len(windows.begin) < 2:
@@ -220,8 +220,8 @@ def adopt(adopted: list[AdoptedEffect], best: FittedCandidate, evidence: Evidenc
         least = min(draw.gain - rules.rival_nats, rules.rival_share * draw.gain)
         close = [other for other in evidence.random if other.effect != draw.effect and other.gain > least]
         rivals = tuple(Candidate(one.effect, "", ((one.parameter,),), {}, (0.0,), ((one.value,),)) for one in close)
-        names = (draw.parameter,)
-        return [*adopted, AdoptedEffect(draw.effect, "", names, (), draw.gain, draw.p_value, rivals, draw.interval)]
+        own = (draw.parameter,)
+        return [*adopted, AdoptedEffect(draw.effect, "", own, (), draw.gain, draw.p_value, rivals, draw.interval)]
     assert best.screened is not None
     form = best.screened.candidate
     names = tuple(dict.fromkeys([name for coordinate in form.free for name in coordinate] + list(form.fixed)))

@@ -98,7 +98,7 @@ def shown(theta=()):
 
 
 @functools.cache
-def diagnosed_of_diagnose_camera(name):
+def diagnosed_frames(name):
     return diagnose_camera(LOGS[name](), ROBOT, DECLARED, report=lambda line: STEPS[name].append(line))
 
 
@@ -125,7 +125,7 @@ LOGS = {
 
 
 def test_nothing_is_missing_of_a_nominal_camera():
-    found = diagnosed_of_diagnose_camera("nominal")
+    found = diagnosed_frames("nominal")
     assert (found.verdict, found.effects) == ("nothing missing", ())
     low, high = found.declared["camera_pitch"].interval
     assert low < 19.15 < high
@@ -135,7 +135,7 @@ def test_nothing_is_missing_of_a_nominal_camera():
 
 
 def test_a_rolled_camera_is_explained_by_its_roll():
-    found = diagnosed_of_diagnose_camera("rolled")
+    found = diagnosed_frames("rolled")
     (effect,) = found.effects
     assert (found.verdict, effect.effect, effect.names) == ("explained", "camera_roll", ("camera_roll",))
     assert found.theta["camera_roll"].interval[0] < 4.0 < found.theta["camera_roll"].interval[1]
@@ -148,7 +148,7 @@ def test_a_rolled_camera_is_explained_by_its_roll():
 
 @pytest.mark.slow
 def test_a_lens_that_the_catalogue_does_not_have_is_not_explained():
-    found = diagnosed_of_diagnose_camera("waved")
+    found = diagnosed_frames("waved")
     assert found.verdict in ("partly explained", "unexplained")
     assert found.residual_fields[1].significant
     assert (found.verdict == "partly explained") == bool(found.effects)
@@ -172,7 +172,7 @@ def test_what_is_left_over_and_what_covers_the_picture_make_the_verdict(left_ove
 
 @pytest.mark.slow
 def test_frames_whose_distortion_was_taken_out_never_name_it():
-    bent, rectified = diagnosed_of_diagnose_camera("bent"), diagnosed_of_diagnose_camera("rectified")
+    bent, rectified = diagnosed_frames("bent"), diagnosed_frames("rectified")
     assert [effect.effect for effect in bent.effects] == ["lens_distortion"]
     assert "lens_distortion" not in rectified.named.full.names
     assert "lens_distortion" not in {effect.effect for effect in rectified.effects}
@@ -180,7 +180,7 @@ def test_frames_whose_distortion_was_taken_out_never_name_it():
 
 
 def test_frames_standing_still_say_what_they_hide_and_what_to_take():
-    found = diagnosed_of_diagnose_camera("nominal")
+    found = diagnosed_frames("nominal")
     assert {"camera_latency", "rolling_shutter"} <= set(found.could_not_be_seen)
     assert any("driving bends" in view for view in found.next_views)
 
@@ -219,7 +219,7 @@ def test_a_stated_readout_is_used_and_not_named(tmp_path):
 
 
 def test_steps_are_reported_as_they_begin():
-    diagnosed_of_diagnose_camera("nominal")
+    diagnosed_frames("nominal")
     assert STEPS["nominal"] == [
         "reading frames",
         "fitting the camera",

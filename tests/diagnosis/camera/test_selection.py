@@ -257,7 +257,7 @@ def test_tape_beside_its_place_is_nothing_of_the_camera_s():
     by = shift[there.marks.line, there.marks.stretch] * there.marks.side / there.metres
     moved = displaced(views, (views.edges.normal * by[:, None]).T)
     fit = fit_everything(moved, OPTICS.mounting, {}, learn_scatter=False)
-    assert not fit_residual_field(fit_set(fit, ("camera_pitch",))).open
+    assert not fit_residual_field(fit_set(fit, ("camera_pitch",))).significant
 
 
 def test_the_gate_opens_for_evidence_share_and_size_together():

@@ -11,7 +11,7 @@ import pytest
 import rates
 from planted import CALM, ROBOT, TRUTH, driven_log, drives_of, fitted, planted_log, with_poses
 
-from proxytune.diagnosis import RULES, AdoptedEffect, Estimate, Findings
+from proxytune.diagnosis import RULES, AdoptedEffect, Estimate, Findings, diagnose_log
 from proxytune.diagnosis.motion.diagnose import (
     KeptAside,
     declared_effects,
@@ -48,6 +48,14 @@ def test_the_planted_effect_is_found_with_its_value(diagnosis):
     assert abs(estimate.value - 0.12) < np.ptp(estimate.interval)
     assert estimate.unit == "m"
     assert np.ptp(estimate.interval) < 0.02
+
+
+def test_what_another_rule_would_have_said_is_an_argument(diagnosis):
+    strict = replace(RULES, p_value=1e-3)  # less than the draws of chance can show
+    asked = diagnose_log(scrubbing_log(), ROBOT, ("trim", "delay"), rules=strict).motion
+    assert [effect.effect for effect in diagnosis.effects] == ["yaw_scrub"]
+    assert asked.effects == ()
+    assert (asked.rules, diagnosis.rules) == (strict, RULES)
 
 
 def test_declared_values_are_those_before_the_effect_and_all_values_those_after(diagnosis):

@@ -201,7 +201,7 @@ def diagnosed(job: Job, episodes: int = 12, seconds: float = 60.0) -> Row:
         learnt=_learnt_error(found),
         true=_true_error(job, found.parts.tested, episodes, seconds),
         floor=error.floor[:2],
-        immaterial=tuple(one.effect for one in found.immaterial),
+        immaterial=tuple(one.effect for one in found.negligible),
     )
 
 

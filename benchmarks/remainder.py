@@ -18,7 +18,7 @@ from hidden_cases import CLEAN, IN_FORM, OTHER_FORM, OUTSIDE, PAIRS, make_log
 from proxytune.diagnosis import cut, pose_errors, robot_of
 from proxytune.diagnosis.motion.clocks import split
 from proxytune.diagnosis.motion.diagnose import declared_effects, declared_parameters
-from proxytune.diagnosis.motion.discrepancy import HORIZONS_S, remainder
+from proxytune.diagnosis.motion.discrepancy import HORIZONS_S, fit_discrepancy
 from proxytune.diagnosis.motion.fitting import fit
 from proxytune.diagnosis.motion.selection import fit_declared, search
 from proxytune.effects import PARAMETERS
@@ -50,7 +50,7 @@ def row(name, log, true_mm, names):
     else:
         models = {"before": fit(parts.fitted, start, tuple((one,) for one in declared)).theta}
     best = list(models.values())[-1]
-    learnt = remainder(parts.fitted, best)
+    learnt = fit_discrepancy(parts.fitted, best)
     models["learnt"] = {**best, **learnt.theta}
     told = {kind: " ".join(f"{value:7.1f}" for value in errors(parts.tested, theta)) for kind, theta in models.items()}
     guard = " ".join(f"{h:g}s {one.value:.2f}<{one.interval[1]:.2f}" for h, one in learnt.guard.items())

@@ -1,4 +1,4 @@
-from .answer import Diagnosis as Diagnosis, Estimate as Estimate, HorizonError as HorizonError, main_error as main_error
+from .answer import RULES as RULES, Estimate as Estimate, Rules as Rules
 from .camera.diagnose import camera_effects as camera_effects
 from .camera.edges import Edges as Edges, effects_of as effects_of
 from .camera.error import (
@@ -12,7 +12,7 @@ from .camera.error import (
 from .camera.fitting import CameraFit as CameraFit
 from .camera.light import Blemish as Blemish
 from .camera.model import project as project
-from .camera.selection import LEAST_NATS as LEAST_NATS, Leftover as Leftover, rank_subsets as rank_subsets
+from .camera.selection import LEAST_NATS as LEAST_NATS, ResidualField as ResidualField, rank_subsets as rank_subsets
 from .log_diagnosis import (
     LogDiagnosis as LogDiagnosis,
     diagnose_log as diagnose_log,
@@ -20,9 +20,10 @@ from .log_diagnosis import (
     predict_pictures as predict_pictures,
 )
 from .motion.clocks import Clocks as Clocks, Offset as Offset
-from .motion.discrepancy_match import Learning as Learning, Lookalike as Lookalike
+from .motion.diagnose import Diagnosis as Diagnosis, HorizonError as HorizonError, main_error as main_error
+from .motion.discrepancy import Learning as Learning, MatchedEffect as MatchedEffect
 from .motion.drives import Drives as Drives, Floats as Floats, Whole as Whole, robot_of as robot_of
-from .motion.effect_size import Unlike as Unlike, Worth as Worth
+from .motion.effect_size import EffectSize as EffectSize, RobotClusters as RobotClusters
 from .motion.evidence import AdoptedEffect as AdoptedEffect, Findings as Findings, TriedEffect as TriedEffect
 from .motion.fitting import Fit as Fit
 from .motion.innovations import (
@@ -44,7 +45,7 @@ from .motion.prediction import (
     predict as predict,
 )
 from .motion.screening import MOTION_EFFECTS as MOTION_EFFECTS, motion_effects as motion_effects
-from .motion.signals import Curve as Curve
+from .motion.signals import SignalCurve as SignalCurve
 from .recording import (
     PICTURES as PICTURES,
     FilmedDrive as FilmedDrive,
@@ -54,4 +55,3 @@ from .recording import (
     record as record,
     samples_text as samples_text,
 )
-from .rules import RULES as RULES

@@ -1,201 +1,18 @@
-"""The result of a diagnosis: everything that a log says of a model.
+"""The answer that both houses of a diagnosis give, motion and camera: estimates, verdicts, and the rules they go by.
 
-The verdict: the error that is left, against what noise alone would leave.
-The error of open-loop prediction at one horizon, before and after, against the bracket of the noise floor.
+Each house fits the declared model, selects the effects that it lacks by forward selection, drops those that are
+negligible, and compares the error before and after on data that was not fitted. Both then say one of five words
+(`verdict`). Every threshold that decides what is named, believed or told of motion is one of `Rules`: a diagnosis takes
+them as an argument, and its drives carry them (`Drives.rules`), so that one may ask what another rule would have said.
+What makes the arithmetic work or keeps it quick (steps, grids, numbers of draws) stands beside the arithmetic; what
+makes a log unusable stands beside the checks of logs.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
-import numpy as np
-
-from proxytune.diagnosis.motion.clocks import Clocks, Parts
-from proxytune.diagnosis.motion.discrepancy_match import Learning
-from proxytune.diagnosis.motion.drives import Drives, Floats
-from proxytune.diagnosis.motion.effect_size import Unlike, Worth
-from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings
-from proxytune.diagnosis.motion.innovations import Noise, at_edge
-from proxytune.diagnosis.motion.manoeuvres import Manoeuvre
-from proxytune.diagnosis.motion.multistep_fit import Polish, PoseNoise, noise_floor
-from proxytune.diagnosis.motion.prediction import (
-    Ratio,
-    Repeated,
-    Rmse,
-    Windows,
-    blocks_of,
-    compare_repeats,
-    cut,
-    pose_errors,
-    ratio,
-    rmse,
-)
-from proxytune.diagnosis.rules import RULES
-from proxytune.driving import Robot
-from proxytune.space import Theta
-
-
-class Bracket(NamedTuple):
-    """The two errors between which that of a right model lies.
-
-    Attributes:
-        lower: What the noise of measured poses alone makes [m].
-        upper: What a right model might have by chance where this was the lowest error that any model reached, less what
-            drives repeat of it [m].
-        reached: The lowest error that any model reached [m].
-        again: What drives from the same commands say; None where too few were driven.
-    """
-
-    lower: float
-    upper: float
-    reached: float
-    again: Repeated | None
-
-
-def bracket(lower: float, reached: float, again: Repeated | None) -> Bracket:
-    """Bracket the error of a right model; the lower end is an estimate too, and never above what a model reached.
-
-    Args:
-        lower: What the noise of poses makes [m].
-        reached: The lowest error of any model [m].
-        again: What drives from the same commands say.
-    """
-    lower = min(lower, reached)
-    upper = reached if again is None else _upper_from_repeats(reached, again)
-    return Bracket(lower, max(lower, RULES.lowest_by_chance * upper), reached, again)
-
-
-def _upper_from_repeats(reached: float, again: Repeated) -> float:
-    """The most of an error that can be noise [m]: all of it in windows that were driven once."""
-    most = min(reached, again.apart * again.share.interval[1] / again.share.value)
-    return float(np.sqrt((1.0 - again.part) * reached**2 + again.part * most**2))
-
-
-def verdict(after: float, floor: Bracket, *, named: bool, unnamed: bool) -> str:
-    """Give one of five answers; none says that all is explained where the error is beyond the floor.
-
-    Args:
-        after: The error that is left [m].
-        floor: The floor's bracket at the same horizon.
-        named: Whether effects were added.
-        unnamed: Whether a signal explains more of the rest than any named effect.
-    """
-    if is_at_floor(after, floor, unnamed=unnamed):
-        return "explained" if named else "nothing missing"
-    if unnamed or _repeats_more(floor):
-        return "partly explained" if named else "unexplained"
-    return "cannot be told"
-
-
-def is_at_floor(after: float, floor: Bracket, *, unnamed: bool) -> bool:
-    """Whether an error is no more than noise: of poses, or of what drives do not repeat, or nothing lowers it."""
-    if after <= RULES.floor_factor * floor.lower:
-        return True
-    if unnamed or floor.reached < RULES.lowers * after:
-        return False
-    if floor.again is not None:
-        return floor.again.share.value >= 1.0 / RULES.floor_factor and after <= RULES.repeats_alike * floor.again.apart
-    return floor.upper < RULES.lowest_by_chance * RULES.narrow_bracket * floor.lower
-
-
-def _repeats_more(floor: Bracket) -> bool:
-    """Whether drives repeat more than the model predicts."""
-    return floor.again is not None and floor.again.share.interval[1] < 1.0 / RULES.floor_factor
-
-
-@dataclass(frozen=True)
-class HorizonError:
-    """The error of open-loop prediction over windows of one horizon, on drives that were not fitted.
-
-    Attributes:
-        horizon_s: Length of the windows [s].
-        windows: How many there are.
-        before: Position [m] with declared effects only.
-        after: Position [m] with the effects that were found.
-        ratio: After by before.
-        floor: Between which errors a model that is right would be [m].
-        heading_before: Heading [rad].
-        heading_after: Heading [rad].
-        heading_floor: What the noise of measured headings alone makes [rad].
-    """
-
-    horizon_s: float
-    windows: int
-    before: Rmse
-    after: Rmse
-    ratio: Ratio
-    floor: Bracket
-    heading_before: Rmse
-    heading_after: Rmse
-    heading_floor: float
-
-    @property
-    def removable_left(self) -> float | None:
-        """The share of the squared error above the lower floor that is left, None where nothing was above it."""
-        above = self.before.value**2 - self.floor.lower**2
-        left = self.after.value**2 - self.floor.lower**2
-        return max(0.0, left) / above if above > 0.05 * self.before.value**2 else None
-
-
-class KeptAside(NamedTuple):
-    """The drives kept aside, on which errors are measured.
-
-    Attributes:
-        drives: Drives that nothing was fitted to.
-        whole: All drives of their log, in which some may be repeats of others.
-        noise: The noise of their poses.
-    """
-
-    drives: Drives
-    whole: Drives
-    noise: PoseNoise
-
-
-PoseErrors = Callable[[Drives, Theta, Windows], Floats]
-"""How far a model's poses are from measured ones (M, 2): [m], [rad]."""
-
-
-def horizon_error(
-    found: Findings, tested: KeptAside, horizon_s: float, learnt: Theta, how: PoseErrors = pose_errors
-) -> HorizonError | None:
-    """The error at a horizon, None where too few blocks have a window of it.
-
-    Args:
-        found: The models.
-        tested: What they are tested on.
-        horizon_s: Length of the windows [s].
-        learnt: What the extended model was taught besides its named effects; empty where nothing was.
-        how: How a plant's poses are compared with measured ones.
-    """
-    drives = tested.drives
-    windows = cut(drives, horizon_s)
-    if len(np.unique(drives.block[windows.begin])) < RULES.fewest_blocks:
-        return None
-    blocks = blocks_of(drives, windows)
-    before = how(drives, found.declared.theta, windows) ** 2
-    same = found.model.theta == found.declared.theta
-    after = before if same else how(drives, found.model.theta, windows) ** 2
-    lower, turn = noise_floor(drives, windows, tested.noise)
-    besides = [one.beside.theta for one in found.immaterial]
-    if learnt:
-        besides.append({**found.model.theta, **learnt})
-    others = [pose_errors(drives, theta, windows) ** 2 for theta in besides]
-    reached = min(float(np.sqrt(squares[:, 0].mean())) for squares in (before, after, *others))
-    return HorizonError(
-        horizon_s=horizon_s,
-        windows=len(windows.begin),
-        before=rmse(before[:, 0], blocks),
-        after=rmse(after[:, 0], blocks),
-        ratio=ratio(after[:, 0], before[:, 0], blocks),
-        floor=bracket(lower, reached, compare_repeats(tested.whole, found.model.theta, horizon_s)),
-        heading_before=rmse(before[:, 1], blocks),
-        heading_after=rmse(after[:, 1], blocks),
-        heading_floor=turn,
-    )
-
-
-MAIN_S = 2.0
-"""The horizon of the one error that stands for all."""
+Progress = Callable[[str], None]
+"""Takes a line about each step, for people who wait."""
 
 
 @dataclass(frozen=True)
@@ -207,78 +24,150 @@ class Estimate:
     unit: str
 
 
-@dataclass(frozen=True)
-class Diagnosis:
-    """What a log says of a model.
+def verdict(explained: bool | None, *, named: bool) -> str:
+    """Give one of five answers.
 
-    Attributes:
-        log: The log's name.
-        robot: The robot.
-        verdict: "nothing missing", "explained", "partly explained", "unexplained" or "cannot be told".
-        declared: Declared parameters, fitted without any other effect, by name in θ.
-        theta: All parameters of the extended model, by name in θ.
-        effects: The effects that were added, all of which matter for prediction.
-        immaterial: Effects that have evidence, and are not shown to matter for prediction: no part of the model.
-        worth: The error without each of both by the error with it, on drives that were not fitted, by name and horizon.
-        polish: How the extended model's parameters were fitted to windows, None where single steps tell as well.
-        residual_depends_on: Signals that explain what no named effect does, those of the learnt remainder first.
-        errors: On the planar plant, by horizon, shortest first.
-        confirmed: The error over 2 s on the bullet plant, None where the robot has no body for it.
-        could_not_be_seen: Effects that these drives could not have shown.
-        manoeuvre: What to drive to tell rivals apart, or noise from what is missing; None where nothing is asked.
-        parts: The drives that were fitted and tested.
-        found: What the search came to.
-        clocks: Those of the log, and of the log to test on where that is another.
-        unlike: Two groups that the drives fall in as if of two robots, by number, or None.
-        drive_names: Names of the log's drives.
-        learning: What was learnt beside the named effects, and what that is worth.
+    Args:
+        explained: Whether nothing is left over that is known to be no noise; None where that cannot be told.
+        named: Whether effects were added.
+    """
+    if explained is None:
+        return "cannot be told"
+    if explained:
+        return "explained" if named else "nothing missing"
+    return "partly explained" if named else "unexplained"
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Thresholds of a diagnosis of motion.
+
+    Nats are of log-likelihood on blocks that were not fitted; shares lie in [0, 1].
     """
 
-    log: str
-    robot: Robot
-    verdict: str
-    declared: Mapping[str, Estimate]
-    theta: Mapping[str, Estimate]
-    effects: tuple[AdoptedEffect, ...]
-    immaterial: tuple[AdoptedEffect, ...]
-    worth: Mapping[str, Worth]
-    polish: Polish | None
-    residual_depends_on: tuple[str, ...]
-    errors: tuple[HorizonError, ...]
-    confirmed: HorizonError | None
-    could_not_be_seen: tuple[str, ...]
-    manoeuvre: Manoeuvre | None
-    parts: Parts
-    found: Findings
-    clocks: tuple[Clocks, ...]
-    unlike: Unlike | None
-    drive_names: tuple[str, ...]
-    learning: Learning
+    p_value: float = 0.01
+    """Chance of an effect as good without anything missing, over all effects and forms: one log in a hundred. The
+    smallest value that 499 draws can show is 0.002."""
 
-    @property
-    def dropped_values(self) -> dict[str, Estimate]:
-        """Values that effects had which do not matter, by name in θ; they are not in the model."""
-        return {
-            name: Estimate(beside.theta[name], (beside.theta[name],) * 2, self.robot.catalogue.parameters[name].unit)
-            for effect, beside, _ in self.found.immaterial
-            for name in effect.names
-        }
+    least_gain_nats: float = 15.0
+    """Evidence that an effect needs. On logs that lack nothing even the most flexible curve gains less (tested)."""
 
-    def at_edge(self, effect: AdoptedEffect) -> tuple[str, ...]:
-        """Parameters of an effect, by name in θ, that were fitted to an end of their range which is not neutral.
+    least_gain_share: float = 0.01
+    """Evidence that an effect needs, as a share of all gained before: less may only mend the form of those effects."""
 
-        The effect then stands for something else.
-        """
-        fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
-        known = [name for name in effect.names if name in fitted and name in self.theta]
-        return tuple(name for name in known if at_edge(name, self.theta[name].value, self.robot))
+    least_random_gain_nats: float = 30.0
+    """Evidence that a random effect needs: twice as much, for its chance is drawn from shifted innovations, roughly."""
 
-    @property
-    def noise(self) -> Noise:
-        """Drive and pose noise of the extended model."""
-        return self.found.model.noise
+    most_effects: int = 5
+    """Effects that may be adopted: a search that goes astray ends."""
+
+    curve_factor: float = 1.2
+    curve_margin_nats: float = 30.0
+    """A curve over a signal is believed over named effects if it gains by this factor more, and by so many nats. It has
+    more weights than any effect, and some lead over a right but idealised name is usual."""
+
+    share_of_curve: float = 0.3
+    """Beside such a curve an effect is still added if it gains this share of it, but never as the first effect: that
+    one might be wrong altogether."""
+
+    plain_share: float = 0.8
+    """Two wheels alike are preferred to one odd wheel if that gains this share: the simpler claim."""
+
+    inside_share: float = 0.8
+    """An effect within its range is preferred to one at an end of it if it gains this share and predicts no worse: a
+    value at an end stands for something else."""
+
+    edge_share: float = 0.01
+    """A value this near to an end of its range, as a share of the range, is at the end: fits stop just short of it."""
+
+    patch_share: float = 0.9
+    """A patch of floor that holds more of the driven places than this is no patch: the effect is then everywhere."""
+
+    guard_horizon_s: float = 2.0
+    guard_factor: float = 1.05
+    """An effect is not adopted, whatever its evidence in single steps, if the error over windows of this horizon [s] is
+    shown to be larger by more than this factor: what would make an effect material, the other way round."""
+
+    rival_nats: float = 3.0
+    """Effects closer than this in evidence are rivals: odds of 20 to 1 are not enough to name one alone."""
+
+    rival_cosine: float = 0.95
+    """Effects are rivals if their changes of the innovations point the same way by this cosine."""
+
+    rival_share: float = 0.7
+    """Effects are rivals if the second has this share of the evidence and predicts no worse. On long logs two
+    effects that predict alike can lie many nats apart."""
+
+    material_factor: float = 1.05
+    """An effect matters if the error without it is shown to be larger, by this factor at some horizon. In the drives
+    this was set on, effects of no matter lay between 0.97 and 1.02, the weakest true one at 1.16."""
+
+    ratio_p_value: float = 0.025
+    """Chance (one-sided, signed ranks of blocks) below which a ratio of errors is shown to be off 1: as a 95 %
+    interval has it."""
+
+    fewest_blocks: int = 3
+    """Blocks with a window of a horizon, for errors at it to be told: fewer give no interval."""
+
+    multistep_helps: float = 0.98
+    multistep_harms: float = 1.02
+    """Parameters fitted to windows are taken if they bring the held-out error beneath the first share at some horizon,
+    and above the second at none. Where they change nothing, single steps tell the parameters more sharply."""
+
+    visible_nats: float = 10.0
+    """Drives could have shown an effect if its middle probe changes the log-likelihood by so much."""
+
+    struck_share: float = 0.1
+    """The share of commands that a random effect of usual size is taken to strike, to say whether it would be seen."""
+
+    robot_drives: int = 2
+    robot_share: float = 0.3
+    """Each of two robots in one log has at least so many drives and this share of them all: a few drives may be alike
+    by their commands."""
+
+    robot_gain_apart: float = 0.04
+    """Robots whose wheels' gains differ by less are one robot, on another floor or another charge perhaps."""
+
+    robot_gap: float = 4.0
+    """Two groups of drives are two robots if their gap is so many times the spread within a group, and the deviation
+    of one drive's gain."""
+
+    discrepancy_blocks: int = 6
+    """Blocks without which no curve is learnt: its held-out error would have no interval to speak of."""
+
+    group_share: float = 0.02
+    group_t: float = 2.0
+    """A group of learnt curves is added if it takes away this share of the held-out squared error, and so many
+    standard errors of that."""
+
+    discrepancy_helps: float = 0.95
+    discrepancy_harms: float = 1.02
+    """Learnt curves are used if they bring the held-out error beneath the first share at some horizon, and above the
+    second at none. More is asked of them than of parameters, for they have many more weights."""
+
+    doubtful_names: float = 0.95
+    """Names are doubtful if curves beside the declared effects alone bring the error beneath this share of that with
+    names and curves."""
+
+    match_share: float = 0.9
+    """A name is told for learnt curves if it alone keeps this share of their gain."""
+
+    floor_factor: float = 1.15
+    """An error of no more than so many times the floor is at the floor: the floor is an estimate too."""
+
+    narrow_bracket: float = 1.5
+    """All is explained only within a bracket of the floor whose upper end is at most so many times its lower one."""
+
+    lowest_by_chance: float = 1.03
+    """The lowest of several errors is by chance lower than that of the right model, by no more than this factor."""
+
+    lowers: float = 0.95
+    """A model lowers the error if it brings it to this share: the inverse of what makes an effect material."""
+
+    repeats_alike: float = 1.3
+    """Repeated drives speak for all drives if the error is at most so many times what they do not repeat: a manoeuvre
+    that never meets what is missing is repeated well, too."""
 
 
-def main_error(errors: Sequence[HorizonError]) -> HorizonError:
-    """The error at the main horizon, which stands for all."""
-    return min(errors, key=lambda error: abs(error.horizon_s - MAIN_S))
+RULES = Rules()
+"""The rules that every diagnosis goes by."""

@@ -1,6 +1,7 @@
-"""Everything that a log says of a robot: its motion where it has commands, its camera where it has frames.
+"""The diagnosis of a whole log: of motion where it has commands, of the camera where it has frames.
 
-What a model's camera would have seen on a log's drives, and how far that is from what was seen.
+`diagnose_log` asks the two houses, which know nothing of one another, and joins their answers; a house that refuses is
+told with its reason. `predict_pictures` draws what a fitted model's camera would have seen on a log's drives.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -10,12 +11,12 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.diagnosis.answer import Diagnosis
+from proxytune.diagnosis.answer import RULES, Progress, Rules
 from proxytune.diagnosis.camera.diagnose import camera_effects, declared_camera_effects, diagnose_camera
 from proxytune.diagnosis.camera.edges import Edges, Optics, Views, read_road, track_frames
 from proxytune.diagnosis.camera.error import CameraDiagnosis, grey_differences
 from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
-from proxytune.diagnosis.motion.diagnose import declared_effects, diagnose
+from proxytune.diagnosis.motion.diagnose import Diagnosis, declared_effects, diagnose
 from proxytune.diagnosis.motion.screening import motion_effects
 from proxytune.driving import Markings, Robot, ground_points
 from proxytune.effects import effect_of
@@ -24,13 +25,12 @@ from proxytune.logs import Frames, Log, read_pictures
 from proxytune.settings import nearest
 from proxytune.space import Theta
 
-Report = Callable[[str], None]
-Part = TypeVar("Part")
+House = TypeVar("House")
 
 
 @dataclass(frozen=True)
 class LogDiagnosis:
-    """What a log says of a robot; at least one part is there.
+    """The diagnosis of a robot from a log; at least one part is there.
 
     Attributes:
         log: The log's name.
@@ -56,7 +56,8 @@ def diagnose_log(
     *,
     test: Log | None = None,
     seed: int = 1,
-    report: Report = lambda _: None,
+    report: Progress = lambda _: None,
+    rules: Rules = RULES,
 ) -> LogDiagnosis:
     """Diagnose motion where the log has commands, and the camera where it has frames.
 
@@ -67,6 +68,7 @@ def diagnose_log(
         test: Another log to test motion on; without it a part of the drives is kept.
         seed: Of the null distributions and the bootstrap.
         report: Takes a line about each step, as it begins.
+        rules: Thresholds of what is named, believed and told of motion.
 
     Raises:
         LogError: If neither drives nor frames can bear the question, or a declared effect is unknown.
@@ -75,7 +77,7 @@ def diagnose_log(
     on_motion, on_camera = _declared_by_kind(log, robot, declared)
 
     def motion() -> Diagnosis:
-        return diagnose(log, robot, on_motion, test=test, seed=seed, report=report)
+        return diagnose(log, robot, on_motion, test=test, seed=seed, report=report, rules=rules)
 
     def camera() -> CameraDiagnosis:
         return diagnose_camera(log, robot, on_camera, seed=seed, report=report)
@@ -94,10 +96,10 @@ def diagnose_log(
     return LogDiagnosis(log.name, robot, moved, pictured, no_motion, no_camera)
 
 
-def _or_refusal(part: Callable[[], Part]) -> tuple[Part | None, str]:
-    """A part of the diagnosis, or why there is none."""
+def _or_refusal(house: Callable[[], House]) -> tuple[House | None, str]:
+    """The answer of a house, or why there is none."""
     try:
-        return part(), ""
+        return house(), ""
     except (LogError, SettingsError) as problem:
         return None, str(problem)
 
@@ -159,7 +161,7 @@ def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[Predicted
 
 
 def frames_of(log: Log) -> Frames:
-    """The log's frames.
+    """Give the log's frames.
 
     Raises:
         LogError: If it has none.
@@ -170,7 +172,7 @@ def frames_of(log: Log) -> Frames:
 
 
 def _views(log: Log, frames: Frames, robot: Robot) -> tuple[Views, NDArray[np.intp]]:
-    """Where the robot was at each frame, and which of the log's frames these are."""
+    """Poses and optics for drawing, without edges, and the numbers of the frames whose pose is known."""
     tracks, numbers = track_frames(log, frames)
     rows, columns = read_pictures(frames, numbers[:1].tolist()).shape[1:3]
     no_edge, nowhere = np.empty(0, dtype=np.intp), np.empty(0)

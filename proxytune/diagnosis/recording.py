@@ -1,6 +1,6 @@
-"""Logs of a domain instance: manoeuvres driven and measured as a robot's would be.
+"""Logs of a simulated domain: driven through manoeuvres and measured as a robot's would be (`record`).
 
-Lane drives of a domain instance, with the pictures that its camera takes on the way.
+`film` lets the robot's expert drive along the lanes, with the pictures that its camera takes on the way.
 """
 
 import functools
@@ -70,15 +70,11 @@ def record(family: LaneFollowing, *, name: str, repeats: int, seconds: float, se
     episodes = []
     for number in range(repeats * len(LIBRARY)):
         random = np.random.default_rng((seed, number))
-        duties = _vary(LIBRARY[number % len(LIBRARY)][2](times), random, number // len(LIBRARY))
+        sized = LIBRARY[number % len(LIBRARY)][2](times) * random.uniform(0.75, 1.0)
+        duties = np.round(sized if number // len(LIBRARY) % 2 == 0 else sized[:, ::-1], 4)
         poses = _drive(family, duties, random, number)
         episodes.append(LogEpisode(str(number), times, duties, poses, None))
     return Log(name, family.robot, "duty", rate, {}, tuple(episodes))
-
-
-def _vary(duties: Floats, random: np.random.Generator, repeat: int) -> Floats:
-    sized = duties * random.uniform(0.75, 1.0)
-    return np.round(sized if repeat % 2 == 0 else sized[:, ::-1], 4)
 
 
 def _drive(family: LaneFollowing, duties: Floats, random: np.random.Generator, number: int) -> Floats:
@@ -222,11 +218,7 @@ def _instants(instance: Instance, driven: Drive, lap: _Lap) -> tuple[list[int], 
             "pictures; record fewer frames, or correct the model"
         )
     steps = fresh[(np.arange(lap.frames) + 1) * len(fresh) // lap.frames - 1]
-    return steps.tolist(), finished[steps] / TICK_HZ - _middle(instance)
-
-
-def _middle(instance: Instance) -> float:
-    """How long before a picture is finished the middle of its exposure is, that of its middle row [s]."""
+    # The middle of a picture's exposure, that of its middle row, is half of both before it is finished.
     lasting = {Blur.name: "blur", RollingShutter.name: "readout"}
     parts = [getattr(effect, lasting[effect.name]) for effect in instance.image.effects if effect.name in lasting]
-    return float(sum(parts)) / 2.0
+    return steps.tolist(), finished[steps] / TICK_HZ - float(sum(parts)) / 2.0

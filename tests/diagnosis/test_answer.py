@@ -7,7 +7,8 @@ import pytest
 from planted import CALM, DECLARED, NOISE, TRUTH, planted_drives
 
 from proxytune.diagnosis import AdoptedEffect, Findings, Ratio, pose_errors
-from proxytune.diagnosis.answer import KeptAside, bracket, horizon_error, verdict
+from proxytune.diagnosis.answer import verdict
+from proxytune.diagnosis.motion.diagnose import KeptAside, bracket, horizon_error, is_explained
 from proxytune.diagnosis.motion.evidence import DroppedEffect, Variant
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.multistep_fit import pose_noise
@@ -70,7 +71,7 @@ UNSURE = Repeated(Ratio(0.75, (0.5, 1.1)), 0.009, 0.8)
 
 def said(after, lower, *, reached=None, repeated=None, named=True, unnamed=False):
     floor = bracket(lower, after if reached is None else reached, repeated)
-    return verdict(after, floor, named=named, unnamed=unnamed)
+    return verdict(is_explained(after, floor, unnamed=unnamed), named=named)
 
 
 @pytest.mark.parametrize("unnamed", [True, False])

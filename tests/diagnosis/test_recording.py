@@ -65,7 +65,7 @@ def test_most_pictures_are_taken_in_the_lane_on_straights_and_in_bends(family, e
 
 
 def test_more_pictures_make_no_drive_longer_than_twenty_seconds(family, monkeypatch):
-    monkeypatch.setattr(filming, "_drive", lambda family, instance, lap, seed: lap)
+    monkeypatch.setattr(filming, "_film_drive", lambda family, instance, lap, seed: lap)
     for frames in (120, 800, 801, 10_000):
         laps = list(film(family, frames, 1))
         assert sum(lap.frames for lap in laps) == frames

@@ -12,7 +12,7 @@ from pictured import ROBOT, lane_poses, write_still_frames
 from proxytune.diagnosis import Blemish, CameraEffect, Estimate, LaidLine, LaidMap
 from proxytune.diagnosis.camera import error as weighing
 from proxytune.diagnosis.camera.appearance import look_at
-from proxytune.diagnosis.camera.diagnose import Evidence, conclude, diagnose_camera
+from proxytune.diagnosis.camera.diagnose import conclude, diagnose_camera
 from proxytune.logs import read_log
 from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure, measured_displacements
 from proxytune.report.diagnosis.camera.document import camera_document
@@ -75,7 +75,7 @@ def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis,
     monkeypatch.setattr(weighing, "MATERIAL", math.inf)
     weighed = weighing.weigh_effects(diagnosis.named, 1)
     look = look_at(diagnosis.gathered, weighed.named.model)
-    dropped = conclude(Evidence(diagnosis.gathered, weighed, look, DECLARED, ()), 1)
+    dropped = conclude(diagnosis.gathered, weighed, look, DECLARED, (), 1)
     document = camera_document(dropped)
     assert "camera_roll" not in document["extended"]
     low, high = document["immaterial"][0]["parameters"]["camera_roll"]["interval"]
@@ -201,10 +201,10 @@ def test_the_headline_says_what_a_verdict_means(clean):
 
 
 def test_something_left_over_is_told_in_pixels(diagnosis):
-    gate = replace(diagnosis.gates[0], nats=100.0, share=0.2)
-    still_open = replace(diagnosis, gates=(gate, gate))
+    gate = replace(diagnosis.residual_fields[0], nats=100.0, share=0.2)
+    still_open = replace(diagnosis, residual_fields=(gate, gate))
     (note,) = [line for line in camera_notes(still_open) if line.startswith("left over")]
-    assert f"{diagnosis.gates[0].rms_px:.2f} px" in note
+    assert f"{diagnosis.residual_fields[0].rms_px:.2f} px" in note
     assert "no physics yet" in note
 
 

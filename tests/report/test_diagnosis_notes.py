@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from proxytune.diagnosis import AdoptedEffect, Estimate, Learning, Ratio
-from proxytune.diagnosis.motion.discrepancy import Remainder
+from proxytune.diagnosis.motion.discrepancy import Discrepancy
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, Manoeuvre
-from proxytune.diagnosis.motion.multistep_fit import Polish
+from proxytune.diagnosis.motion.multistep_fit import MultistepFit
 from proxytune.report.diagnosis.notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
 
 SLIP = AdoptedEffect("lateral_slip", "", ("lateral_slip",), (("lateral_slip",),), 75.2, 0.002, ())
@@ -24,16 +24,16 @@ def diagnosis(**changes):
         "log": "run",
         "verdict": "explained",
         "effects": (),
-        "immaterial": (),
-        "worth": {},
-        "polish": None,
+        "negligible": (),
+        "effect_sizes": {},
+        "multistep": None,
     }
     plain |= {"errors": (), "residual_depends_on": (), "could_not_be_seen": (), "manoeuvre": None}
     plain |= {
         "clocks": (),
-        "unlike": None,
+        "robot_clusters": None,
         "drive_names": (),
-        "learning": Learning(Remainder(), (), False),
+        "learning": Learning(Discrepancy(), (), False),
         "theta": {},
     }
     plain |= {"dropped_values": {"lateral_slip": Estimate(0.0024, (0.0024, 0.0024), "s")}}
@@ -46,7 +46,7 @@ def test_every_verdict_is_told_with_its_meaning(verdict):
 
 
 def test_an_effect_that_was_added_says_what_the_error_is_without_it():
-    (note,) = notes(diagnosis(effects=(BAND,), worth={"dead_band": MUCH}))
+    (note,) = notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
     assert note == (
         "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
         "without it the error grows by 34 % (20 to +50) at 2 s"
@@ -54,7 +54,7 @@ def test_an_effect_that_was_added_says_what_the_error_is_without_it():
 
 
 def test_an_effect_that_is_shown_not_to_matter_is_called_immaterial():
-    (note,) = notes(diagnosis(immaterial=(SLIP,), worth={"lateral_slip": SURE}))
+    (note,) = notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": SURE}))
     assert note == (
         "detectable but immaterial: lateral_slip 0.0024 s, log-likelihood gain 75 nats, "
         "changes the error at 5 s by 1.0 % (−1.0 to +3.0)"
@@ -62,14 +62,14 @@ def test_an_effect_that_is_shown_not_to_matter_is_called_immaterial():
 
 
 def test_an_effect_that_may_matter_is_not_called_immaterial():
-    (note,) = notes(diagnosis(immaterial=(SLIP,), worth={"lateral_slip": LITTLE}))
+    (note,) = notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": LITTLE}))
     assert note.startswith(
         "not shown to matter: lateral_slip 0.0024 s, log-likelihood gain 75 nats, changes the error at 5 s by 1.0 % "
     )
 
 
 def test_an_effect_that_could_not_be_weighed_is_not_shown_to_matter():
-    assert notes(diagnosis(immaterial=(SLIP,))) == ["not shown to matter: lateral_slip, log-likelihood gain 75 nats"]
+    assert notes(diagnosis(negligible=(SLIP,))) == ["not shown to matter: lateral_slip, log-likelihood gain 75 nats"]
 
 
 def test_where_noise_is_not_known_a_manoeuvre_is_to_be_driven_ten_times():
@@ -87,8 +87,8 @@ def test_where_noise_is_not_known_a_manoeuvre_is_to_be_driven_ten_times():
 
 
 def test_parameters_fitted_to_windows_are_told_with_what_that_did():
-    polish = Polish(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
-    (note,) = notes(diagnosis(polish=polish))
+    polish = MultistepFit(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
+    (note,) = notes(diagnosis(multistep=polish))
     assert "fitted to windows of 2 s" in note
     assert "1 s: 0.95, 2 s: 0.80" in note
 

@@ -2,17 +2,16 @@
 
 import json
 
-from proxytune.diagnosis import Learning, Lookalike, Ratio, Rmse
-from proxytune.diagnosis.motion.discrepancy import Remainder
-from proxytune.diagnosis.motion.discrepancy_match import LearntError
+from proxytune.diagnosis import Learning, MatchedEffect, Ratio, Rmse
+from proxytune.diagnosis.motion.discrepancy import Discrepancy, LearntError
 from proxytune.report.diagnosis.learnt import learnt_document, learnt_notes
 
 RATIO = Ratio(0.5, (0.4, 0.6))
 ERROR = LearntError(2.0, Rmse(0.01, (0.009, 0.011)), Rmse(0.02, (0.01, 0.03)), RATIO)
 THETA = {"learnt.turn_rate.yaw@1.0": 0.1}
 SHARE = {"heading": 0.25, "turn rate": 0.75}
-USED = Learning(Remainder(THETA, SHARE, {2.0: RATIO}, True), (ERROR,), False)
-REFUSED = Learning(Remainder(THETA, SHARE, {2.0: RATIO}, False), (), True)
+USED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, True), (ERROR,), False)
+REFUSED = Learning(Discrepancy(THETA, SHARE, {2.0: RATIO}, False), (), True)
 
 
 def test_the_document_has_groups_shares_and_ratios_by_horizon():
@@ -45,11 +44,11 @@ def test_what_was_tried_and_left_out_is_told_and_doubtful_names_are_warned_of():
 
 
 def test_nothing_is_said_where_nothing_was_found():
-    assert learnt_notes(Learning(Remainder(), (), False)) == []
+    assert learnt_notes(Learning(Discrepancy(), (), False)) == []
 
 
 def test_a_name_that_would_do_as_well_is_told():
-    like = Learning(USED.remainder, USED.errors, False, Lookalike("turn_slip", "", {"turn_slip": 0.1}, 0.93))
+    like = Learning(USED.discrepancy, USED.errors, False, MatchedEffect("turn_slip", "", {"turn_slip": 0.1}, 0.93))
     assert learnt_notes(like)[1] == "the curves look like turn_slip (turn_slip 0.1), which alone keeps 93 % of it"
     assert learnt_document(like)["looks_like"]["share"] == 0.93
     assert learnt_document(USED)["looks_like"] is None

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 
 from proxytune.diagnosis import Learning
-from proxytune.diagnosis.motion.discrepancy import Remainder
+from proxytune.diagnosis.motion.discrepancy import Discrepancy
 from proxytune.effects import GROUPS, Curve, Learnt, Seen, learnt_theta
 from proxytune.report.diagnosis.learnt_figure import learnt_figure
 
@@ -20,7 +20,9 @@ def learning(*groups):
         for knots in [KNOTS.get(group, (0.5, 1.0, 2.0))]
     ]
     theta = learnt_theta(Learnt(Seen((-0.3, 0.4), (-3.0, 3.0)), tuple(curves)))
-    return Learning(Remainder(theta, {GROUPS[group].title: 1.0 / len(groups) for group in groups}, {}, True), (), False)
+    return Learning(
+        Discrepancy(theta, {GROUPS[group].title: 1.0 / len(groups) for group in groups}, {}, True), (), False
+    )
 
 
 def test_every_group_is_drawn_without_a_warning_and_every_panel_has_units():
@@ -50,4 +52,4 @@ def test_harmonics_of_the_heading_are_drawn_as_what_they_add_up_to():
 
 
 def test_nothing_is_drawn_where_nothing_is_used():
-    assert learnt_figure(Learning(Remainder({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
+    assert learnt_figure(Learning(Discrepancy({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None

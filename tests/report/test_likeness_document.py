@@ -2,10 +2,10 @@
 
 import json
 
-from proxytune.diagnosis import Unlike
+from proxytune.diagnosis import RobotClusters
 from proxytune.report.diagnosis.likeness import unlike_document, unlike_notes
 
-FOUND = Unlike("left", (0.88, 1.02), ((0, 2), (1, 3)))
+FOUND = RobotClusters("left", (0.88, 1.02), ((0, 2), (1, 3)))
 NAMES = ("a", "b", "c", "d")
 
 

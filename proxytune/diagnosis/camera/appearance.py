@@ -1,7 +1,9 @@
-"""How a camera's pictures look besides where things are in them: brightness, sharpness, noise and blemishes.
+"""The look of a camera's pictures besides where things are in them: brightness, sharpness, noise and blemishes.
 
-How blurred a camera's edges are, by the robot's motion and by poor focus.
-The noise of a camera's pixels, told from the texture of the floor.
+Sharpness: an edge's squared width is that of its drawing, plus defocus², plus blur² · speed² / 12; both are what gives
+the model's own frames the measured widths (`fit_sharpness`). Noise is told from the texture of the floor by frames
+between which the robot stood, else by the smoothest band of rows (`fit_grain`). `look_at` fits all of them with the
+light; `changes` says which there is no doubt of.
 """
 
 from collections.abc import Callable, Mapping
@@ -51,7 +53,7 @@ FOOT = 0.15
 """An edge ends where it is less steep than this share of its steepest."""
 
 FAINT = 0.35
-"""Edges that the model draws with less than this share of the measured steepness are not the same ones."""
+"""MovingEdges that the model draws with less than this share of the measured steepness are not the same ones."""
 
 MOST = 12000
 """Edge points that are enough."""
@@ -69,14 +71,14 @@ ROUGH = 0.06
 """What widths of profiles half a pixel apart are wrong by, besides their scatter [pixel²]."""
 
 SLOW = 5.0
-"""Edges that all move alike to this tell nothing of blur [pixel/s]."""
+"""MovingEdges that all move alike to this tell nothing of blur [pixel/s]."""
 
 WIDEST = (0.06, 0.01)
 """Intervals of blur [s] and defocus that still tell something."""
 
 
 @dataclass(frozen=True)
-class Edges:
+class MovingEdges:
     """Points on the edges of markings in measured frames.
 
     Attributes:
@@ -94,7 +96,7 @@ class Edges:
 
 @dataclass(frozen=True)
 class Sharpness:
-    """What makes edges soft.
+    """The softness of edges.
 
     Attributes:
         blur: How long an exposure lasts [s].
@@ -105,7 +107,7 @@ class Sharpness:
     defocus: Fitted
 
 
-def fit_sharpness(measured: Pictures, edges: Edges, draw: Draw) -> Sharpness:
+def fit_sharpness(measured: Pictures, edges: MovingEdges, draw: Draw) -> Sharpness:
     """Fit motion blur and defocus: motion widens fast edges, poor focus widens all.
 
     An edge's squared width is that of its drawing, plus defocus², plus blur² · speed² / 12. Read off directly it is
@@ -117,7 +119,8 @@ def fit_sharpness(measured: Pictures, edges: Edges, draw: Draw) -> Sharpness:
         draw: Draws the model's frames, best with the fitted light; the middle of each exposure is to be at the
             instant of the frame's pose.
     """
-    edges = _thinned(edges)
+    every = max(1, -(-len(edges.frame) // MOST))
+    edges = MovingEdges(edges.frame[::every], edges.place[::every], edges.normal[::every], edges.speed[::every])
     if len(edges.frame) == 0:
         return Sharpness(Fitted(0.0, (0.0, np.inf), False), Fitted(0.0, (0.0, np.inf), False))
     rows, seen = measured.shape[1], _profiles(measured, edges)
@@ -126,14 +129,18 @@ def fit_sharpness(measured: Pictures, edges: Edges, draw: Draw) -> Sharpness:
         drawn = _profiles(draw(*_values(squares, rows)), edges)
         step, half = _missing(seen, drawn, edges, len(measured))
         if last is not None:
-            response = _response(squares - last[0], last[1] - step, response)
+            # How much squared widths follow what is fitted, from the last draw, where that was another.
+            moved, followed = squares - last[0], last[1] - step
+            measured_response = np.divide(followed, moved, out=response.copy(), where=np.abs(moved) > 1e-6)
+            response = np.clip(measured_response, 0.3, 1.5)
         last = squares, step
         squares = np.maximum(squares + step / response, 0.0)
         if (np.abs(squares - last[0]) * response < half / 10.0).all():
             break
     half = np.hypot(WIDER * half, (0.0, ROUGH))
     low, high = _values(squares - half / response, rows), _values(squares + half / response, rows)
-    return Sharpness(*(_fitted(*ends) for ends in zip(_values(squares, rows), low, high, WIDEST, strict=True)))
+    ends = zip(_values(squares, rows), low, high, WIDEST, strict=True)
+    return Sharpness(*(Fitted(value, (least, most), most - least < widest) for value, least, most, widest in ends))
 
 
 def _values(squares: Floats, rows: int) -> tuple[float, float]:
@@ -142,23 +149,7 @@ def _values(squares: Floats, rows: int) -> tuple[float, float]:
     return float(blur), float(defocus) / rows
 
 
-def _fitted(value: float, low: float, high: float, widest: float) -> Fitted:
-    return Fitted(value, (low, high), high - low < widest)
-
-
-def _response(moved: Floats, followed: Floats, response: Floats) -> Floats:
-    """How much squared widths follow what is fitted, from the last draw, where that was another."""
-    far = np.abs(moved) > 1e-6
-    measured = np.divide(followed, moved, out=response.copy(), where=far)
-    return np.clip(measured, 0.3, 1.5)
-
-
-def _thinned(edges: Edges) -> Edges:
-    every = max(1, -(-len(edges.frame) // MOST))
-    return Edges(edges.frame[::every], edges.place[::every], edges.normal[::every], edges.speed[::every])
-
-
-def _profiles(pictures: NDArray[Any], edges: Edges) -> tuple[Floats, Floats]:
+def _profiles(pictures: NDArray[Any], edges: MovingEdges) -> tuple[Floats, Floats]:
     """Brightness along each edge's normal, the steepest place in the middle (P, 2 REACH + 1), and how steep that is."""
     along = np.arange(-REACH - SHIFT, REACH + SHIFT + 1) * STEP
     column, row = (edges.place[:, axis, None] - 0.5 + edges.normal[:, axis, None] * along for axis in (0, 1))
@@ -171,7 +162,7 @@ def _profiles(pictures: NDArray[Any], edges: Edges) -> tuple[Floats, Floats]:
 
 
 def _missing(
-    seen: tuple[Floats, Floats], drawn: tuple[Floats, Floats], edges: Edges, frames: int
+    seen: tuple[Floats, Floats], drawn: tuple[Floats, Floats], edges: MovingEdges, frames: int
 ) -> tuple[Floats, Floats]:
     """Squared blur [s²] and defocus [pixel²] that the drawn edges lack, and half of their intervals."""
     same = drawn[1] > FAINT * seen[1]
@@ -239,7 +230,7 @@ LITTLE = 0.5
 
 @dataclass(frozen=True)
 class Grain:
-    """How noisy the pixels are.
+    """The noise of pixels.
 
     Attributes:
         noise: Standard deviation of a pixel as it is logged [grey level]. Where it is not identified, only the
@@ -308,14 +299,14 @@ def _band_variances(measured: Pictures, paint: NDArray[np.int8], apart: int) -> 
 
 
 def _variance(values: Floats) -> float:
-    """Of the values without stains and the like, beyond four standard deviations."""
+    """Variance without stains and the like, beyond four standard deviations."""
     spread = 1.4826 * np.median(np.abs(values)) + 0.5
     kept = values[np.abs(values) < 4.0 * spread]
     return float(np.square(kept).mean())
 
 
 SHARP_PX = 2.0
-"""Edges that lie farther from the map's are not those that the model draws."""
+"""MovingEdges that lie farther from the map's are not those that the model draws."""
 
 HORIZON_ROWS = 3
 """So many rows beneath the horizon are left out: what a pixel covers there is a metre long."""
@@ -323,7 +314,7 @@ HORIZON_ROWS = 3
 
 @dataclass(frozen=True)
 class Appearance:
-    """What the pictures' look says.
+    """All figures of the pictures' look.
 
     Attributes:
         light: Exposure and vignetting.
@@ -396,13 +387,14 @@ def changes(look: Appearance) -> tuple[str, ...]:
     """
     names = [name for name in look.figures if _matters(name, look.figures[name])]
     exposure = [name for name in look.figures if name.startswith("exposure.")]
-    if any(_half(look.figures[name]) > NARROW for name in exposure):
+    intervals = [look.figures[name].interval for name in exposure]
+    if any((high - low) / 2.0 > NARROW for low, high in intervals):
         names = [name for name in names if name not in exposure]
     return tuple(dict.fromkeys(effect_of(name) for name in names))
 
 
 def _matters(name: str, figure: Fitted) -> bool:
-    """Whether a figure differs from its neutral value beyond doubt, by enough, and to where a camera's can be."""
+    """Tell whether a figure differs from its neutral value beyond doubt, by enough, and to where a camera's can be."""
     parameter, (low, high) = PARAMETERS[name], figure.interval
     neutral = parameter.neutral_value({})
     sure = name == NOISE or not low <= neutral <= high
@@ -410,19 +402,15 @@ def _matters(name: str, figure: Fitted) -> bool:
     return sure and possible and abs(figure.value - neutral) >= LEAST[name]
 
 
-def _half(figure: Fitted) -> float:
-    return (figure.interval[1] - figure.interval[0]) / 2.0
-
-
 def _soft(blur_s: float, defocus: float) -> dict[str, float]:
     values = {BLUR: blur_s, "defocus": defocus}
     return {name: PARAMETERS[name].clipped(float(value)) for name, value in values.items()}
 
 
-def _sharp_edges(fit: CameraFit) -> Edges:
+def _sharp_edges(fit: CameraFit) -> MovingEdges:
     """The edges that the model has too, with how fast each moves through the picture."""
     there, edges = project(fit.views, fit.state), fit.views.edges
     speed = (pose_slopes(there) * there.rates).sum(axis=1)
     same = there.valid & (np.abs(there.residual) < SHARP_PX)
     place = np.stack((edges.column, edges.row), axis=-1)
-    return Edges(edges.frame[same], place[same], edges.normal[same], np.abs(speed[same]))
+    return MovingEdges(edges.frame[same], place[same], edges.normal[same], np.abs(speed[same]))

@@ -1,15 +1,15 @@
-"""From a log's frames to a verdict on the camera: tuned, tested, named, and the error before and after.
+"""The diagnosis of a robot's camera: tuned, tested, its missing effects named, and the error before and after.
 
-How a map was laid: what its lines and the whole of it are off, as a camera's fit has it.
-What a camera's fits and the look of its pictures come to.
+`diagnose_camera` goes through the whole house: frames to edges, a fit with every effect, the fewest effects that do as
+well, their size on frames kept aside, and how the pictures look. `conclude` gives the verdict, and `describe_map`
+how the map was laid, as the fit has it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from proxytune.diagnosis.answer import Estimate
+from proxytune.diagnosis.answer import Estimate, Progress, verdict
 from proxytune.diagnosis.camera.appearance import Appearance, changes, look_at
 from proxytune.diagnosis.camera.edges import DISTORTION, MOVING, READOUT, Gathered, Tape, effects_of, gather_views
 from proxytune.diagnosis.camera.error import (
@@ -28,15 +28,15 @@ from proxytune.diagnosis.camera.error import (
 from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.camera.selection import (
     ALWAYS,
-    Leftover,
-    Named,
+    CameraSelection,
+    ResidualField,
     check_match,
-    find_leftover,
     fit_everything,
+    fit_residual_field,
     hidden_effects,
     matched_share,
-    name_camera_effects,
     next_views,
+    select_camera_effects,
 )
 from proxytune.driving import LINES, Robot
 from proxytune.effects import DECLARED, PARAMETERS, Catalogue, Stage, effect_of
@@ -50,7 +50,7 @@ WIDTHS = ("white lines", "yellow lines", "yellow dashes")
 
 
 def describe_map(fit: CameraFit) -> LaidMap:
-    """What the fit says of the map."""
+    """Describe how the map was laid, as the fit has it."""
     degrees = np.array((1.0, 1.0, np.degrees(1.0)))
     offsets = zip(("x_m", "y_m", "heading_deg"), fit.state.offset * degrees, fit.offset_sd * degrees, strict=True)
     offset = {name: estimate_of(value, sd, name.rpartition("_")[-1]) for name, value, sd in offsets}
@@ -71,91 +71,78 @@ def _lines(fit: CameraFit, stretches: int) -> tuple[LaidLine, ...]:
     return tuple(sorted(lines, key=lambda line: -abs(line.right_m)))
 
 
-@dataclass(frozen=True)
-class Evidence:
-    """All that a verdict goes by.
+def conclude(
+    gathered: Gathered, weighed: Weighed, look: Appearance, declared: Sequence[str], notes: Sequence[str], seed: int
+) -> CameraDiagnosis:
+    """Give the verdict, with everything that it goes by.
 
-    Attributes:
+    Args:
         gathered: The frames.
-        weighed: The camera's fits, and what each effect is worth.
+        weighed: The camera's fits, and the size of each effect.
         look: Brightness and sharpness of the pictures.
         declared: Effects that were tuned in any case.
-        notes: What is to be said of how frames and poses match.
+        notes: On how frames and poses match.
+        seed: Of the bootstrap.
     """
-
-    gathered: Gathered
-    weighed: Weighed
-    look: Appearance
-    declared: tuple[str, ...]
-    notes: tuple[str, ...]
-
-
-def conclude(found: Evidence, seed: int) -> CameraDiagnosis:
-    """Give the verdict, with everything that it goes by."""
-    named, look = found.weighed.named, found.look
-    tuned = tuple(name for name, one in look.figures.items() if effect_of(name) in found.declared and one.identified)
-    grey, on_look = _compare_look(found, tuned, seed)
-    effects = _geometric(found, named.effects) + on_look
-    gates, hidden = (find_leftover(named.declared), find_leftover(named.model)), _hidden(found)
+    named = weighed.named
+    tuned = tuple(name for name, one in look.figures.items() if effect_of(name) in declared and one.identified)
+    grey, on_look = _compare_look(gathered, named, look, declared, tuned, seed)
+    effects = tuple(_told(weighed, effect) for effect in named.effects) + on_look
+    fields = (fit_residual_field(named.declared), fit_residual_field(named.model))
+    fitted = effects_of(named.model.names)
+    unseen = [effect for effect in hidden_effects(named.full, fitted) if effect not in fitted]
+    dark = [name for name, figure in look.figures.items() if not figure.identified]
+    changed = changes(look)
+    hidden = effects_of(tuple(name for name in (*unseen, *dark) if effect_of(name) not in changed))
+    readout = named.full.theta[READOUT]
+    stated = readout > 0.0 and READOUT not in named.full.names
     return CameraDiagnosis(
-        verdict=_verdict(gates[1], look, named=bool(effects)),
-        declared=_estimates(named.declared, found.declared) | _figures(look, tuned),
-        theta=_estimates(named.model, (*found.declared, *named.effects))
-        | _stated(named)
+        verdict=verdict(is_explained(fields[1], look), named=bool(effects)),
+        declared=_estimates(named.declared, declared) | _figures(look, tuned),
+        theta=_estimates(named.model, (*declared, *named.effects))
+        | ({READOUT: Estimate(readout, (readout, readout), PARAMETERS[READOUT].unit)} if stated else {})
         | _figures(look, (*tuned, *(name for effect in on_look for name in effect.names))),
         effects=effects,
-        immaterial=_geometric(found, found.weighed.dropped),
-        dropped=_estimates(found.weighed.with_dropped, found.weighed.dropped),
+        negligible=tuple(_told(weighed, effect) for effect in weighed.dropped),
+        dropped=_estimates(weighed.with_dropped, weighed.dropped),
         candidates=named.alone,
-        pixels=found.weighed.pixels,
+        pixels=weighed.pixels,
         grey=grey,
-        gates=gates,
+        residual_fields=fields,
         blemishes=look.blemishes,
         could_not_be_seen=hidden,
         next_views=next_views(hidden, repeated=look.grain.still_pairs > 0),
         laid=describe_map(named.model),
         matched=matched_share(named.model),
-        notes=found.notes,
+        notes=tuple(notes),
         named=named,
-        gathered=found.gathered,
+        gathered=gathered,
     )
 
 
-def _compare_look(found: Evidence, tuned: Sequence[str], seed: int) -> tuple[Comparison, tuple[CameraEffect, ...]]:
+def is_explained(field: ResidualField, look: Appearance) -> bool:
+    """Tell whether nothing fixed to the camera is left over, and nothing covers the picture."""
+    return not (field.significant or look.blemishes)
+
+
+def _compare_look(
+    gathered: Gathered,
+    named: CameraSelection,
+    look: Appearance,
+    declared: Sequence[str],
+    tuned: Sequence[str],
+    seed: int,
+) -> tuple[Comparison, tuple[CameraEffect, ...]]:
     """Brightness before and after, and the effects that were added for how pictures look.
 
-    Exposure is one of them where the error without it is larger.
+    Exposure is one of them where the error without it is larger. Floors may look like noise.
     """
-    look = found.look
-    changed = tuple(effect for effect in changes(look) if effect not in found.declared)
+    changed = tuple(effect for effect in changes(look) if effect not in declared)
     looks = (look_values(look, tuned), look_values(look, (*tuned, *_names(look, changed))))
-    grey, ratios = compare_brightness(found.gathered, found.weighed.named, looks, seed)
-    added = tuple(effect for effect in changed if effect != "exposure" or ratios[effect] >= MATERIAL)
-    return grey, _on_look(look, added, ratios)
-
-
-def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
-    """Values of the look's figures by name in θ, within their bounds."""
-    return {name: PARAMETERS[name].clipped(look.figures[name].value) for name in names}
-
-
-def _geometric(found: Evidence, effects: Sequence[str]) -> tuple[CameraEffect, ...]:
-    """Effects on where things are in the picture, as they are told."""
-    return tuple(_told(found.weighed, effect) for effect in effects)
-
-
-def _told(weighed: Weighed, effect: str) -> CameraEffect:
-    named = weighed.named
-    names = tuple(name for name in named.full.names if effect_of(name) == effect)
-    others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
-    always = (ALWAYS[effect],) if effect in ALWAYS else ()
-    return CameraEffect(effect, names, weighed.nats[effect], weighed.ratios[effect], (*always, *sorted(others)))
-
-
-def _on_look(look: Appearance, added: Sequence[str], ratios: dict[str, float]) -> tuple[CameraEffect, ...]:
-    """Effects on how pictures look; floors may look like noise."""
+    grey, ratios = compare_brightness(gathered, named, looks, seed)
+    added = (effect for effect in changed if effect != "exposure" or ratios[effect] >= MATERIAL)
     texture = {} if look.grain.noise.identified else {"image_noise": ("texture of the floor",)}
-    return tuple(
+    return grey, tuple(
         CameraEffect(
             effect,
             _names(look, (effect,)),
@@ -167,16 +154,23 @@ def _on_look(look: Appearance, added: Sequence[str], ratios: dict[str, float]) -
     )
 
 
+def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
+    """Values of the look's figures by name in θ, within their bounds."""
+    return {name: PARAMETERS[name].clipped(look.figures[name].value) for name in names}
+
+
+def _told(weighed: Weighed, effect: str) -> CameraEffect:
+    """An effect on where things are in the picture, as it is told."""
+    named = weighed.named
+    names = tuple(name for name in named.full.names if effect_of(name) == effect)
+    others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
+    always = (ALWAYS[effect],) if effect in ALWAYS else ()
+    return CameraEffect(effect, names, weighed.nats[effect], weighed.ratios[effect], (*always, *sorted(others)))
+
+
 def _names(look: Appearance, effects: Sequence[str]) -> tuple[str, ...]:
     """Their figures by name in θ, effect by effect."""
     return tuple(name for effect in effects for name in look.figures if effect_of(name) == effect)
-
-
-def _stated(named: Named) -> dict[str, Estimate]:
-    """What the log states of the camera: its readout."""
-    value = named.full.theta[READOUT]
-    known = value > 0.0 and READOUT not in named.full.names
-    return {READOUT: Estimate(value, (value, value), PARAMETERS[READOUT].unit)} if known else {}
 
 
 def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:
@@ -194,25 +188,6 @@ def _estimates(fit: CameraFit, effects: Sequence[str]) -> dict[str, Estimate]:
     }
 
 
-def _hidden(found: Evidence) -> tuple[str, ...]:
-    """Effects that could not be seen, or that there were no means to."""
-    named = found.weighed.named
-    fitted = effects_of(named.model.names)
-    hidden = [effect for effect in hidden_effects(named.full, fitted) if effect not in fitted]
-    dark = [name for name, figure in found.look.figures.items() if not figure.identified]
-    changed = changes(found.look)
-    return effects_of(tuple(name for name in (*hidden, *dark) if effect_of(name) not in changed))
-
-
-def _verdict(gate: Leftover, look: Appearance, *, named: bool) -> str:
-    if gate.open or look.blemishes:
-        return "partly explained" if named else "unexplained"
-    return "explained" if named else "nothing missing"
-
-
-Report = Callable[[str], None]
-
-
 def camera_effects(catalogue: Catalogue) -> tuple[str, ...]:
     """The effects on a camera and its pictures."""
     return tuple(name for name in catalogue.names if catalogue.effect(name).stage in (Stage.CAMERA, Stage.IMAGE))
@@ -224,7 +199,7 @@ def declared_camera_effects(robot: Robot) -> tuple[str, ...]:
 
 
 def diagnose_camera(
-    log: Log, robot: Robot, declared: Sequence[str], *, seed: int = 1, report: Report = lambda _: None
+    log: Log, robot: Robot, declared: Sequence[str], *, seed: int = 1, report: Progress = lambda _: None
 ) -> CameraDiagnosis:
     """Tune what is declared of a camera, find what is missing, and test both on frames kept aside.
 
@@ -249,12 +224,12 @@ def diagnose_camera(
     full = fit_everything(gathered.views, names, fixed, learn_scatter=unknown)
     notes = check_match(log.name, full)
     report("looking for what the camera lacks")
-    named = name_camera_effects(full, [effect for effect in declared if effect in effects_of(names)])
+    named = select_camera_effects(full, [effect for effect in declared if effect in effects_of(names)])
     report("testing on frames kept aside")
     weighed = weigh_effects(named, seed)
     report("looking at brightness and sharpness")
     look = look_at(gathered, weighed.named.model)
-    return conclude(Evidence(gathered, weighed, look, tuple(declared), (*gathered.notes, *notes)), seed)
+    return conclude(gathered, weighed, look, tuple(declared), (*gathered.notes, *notes), seed)
 
 
 def _parameters(gathered: Gathered, frames: Frames) -> tuple[tuple[str, ...], Mapping[str, float]]:

@@ -1,9 +1,9 @@
-"""Edges of white and yellow markings in pictures, to a fraction of a pixel.
+"""From a log's frames to views: what a diagnosis of the camera goes by.
 
-Where the robot was when pictures were taken: tracked poses, smoothed where it moves.
-A robot's camera as values in θ, for pictures of a log's own size.
-What a diagnosis of the camera goes by: edges of markings, where the robot was, and the map.
-From a log's frames to views: pictures read, edges found, poses smoothed, the map laid out.
+`find_edges` finds edges of white and yellow markings to a fraction of a pixel; `track_frames` gives the poses at which
+pictures were taken, smoothed by parabolas where the robot moves; `Optics` is the robot's camera as values in θ, for
+pictures of the log's own size; `Tape` orders the errors with which the map's lines may lie. `gather_views` reads a log
+and puts all of it together.
 """
 
 from collections.abc import Mapping
@@ -71,7 +71,7 @@ def find_edges(pictures: NDArray[np.uint8]) -> Edges:
 
 
 def _colour_maps(picture: NDArray[np.uint8]) -> tuple[tuple[bool, Floats], tuple[bool, Floats]]:
-    """How white and how yellow each pixel is, from 0 to 1; NaN where there is sky."""
+    """Whiteness and yellowness of each pixel, from 0 to 1; NaN where there is sky."""
     colours = picture.astype(np.float32)
     red, green, blue = colours[..., 0], colours[..., 1], colours[..., 2]
     sky = binary_dilation(blue > red + SKY, iterations=SKY_MARGIN)
@@ -161,7 +161,7 @@ class Tracks:
 
     @property
     def moving(self) -> bool:
-        """Whether any picture was taken in motion."""
+        """Tell whether any picture was taken in motion."""
         return bool(np.any(self.rates))
 
 
@@ -264,12 +264,12 @@ class Optics:
         return self.robot.catalogue.parameters[name].neutral_value(self.robot.figures)
 
     def spread(self, name: str) -> float:
-        """How far a parameter may be expected from its neutral value, as a standard deviation."""
+        """Standard deviation that is expected of a parameter about its neutral value."""
         parameter, neutral = self.robot.catalogue.parameters[name], self.neutral(name)
         return SPREAD * max(parameter.high - neutral, neutral - parameter.low)
 
     def step(self, name: str, value: float) -> float:
-        """How far a parameter is moved from a value for a derivative, away from the end of its range."""
+        """Step of a parameter from a value for a derivative, away from the end of its range."""
         parameter = self.robot.catalogue.parameters[name]
         step = STEP * (parameter.high - parameter.low)
         return step if value + step <= parameter.high else -step
@@ -321,7 +321,7 @@ class Views:
 
     @property
     def count(self) -> int:
-        """How many pictures there are."""
+        """The number of pictures."""
         return len(self.tracks.instants)
 
     @property
@@ -336,13 +336,13 @@ class Views:
         return np.full(Tape(self.markings.stretches).size, max(self.tape_m, LEAST_TAPE_M))
 
     def with_scatter(self, position_m: float, heading_rad: float) -> "Views":
-        """The same views with another scatter of poses."""
+        """Replace the scatter of poses."""
         return replace(self, position_m=position_m, heading_rad=heading_rad)
 
 
 @dataclass(frozen=True)
 class Tape:
-    """Where the errors of the tape stand in one row of numbers.
+    """The order of the tape's errors in one row of numbers.
 
     Attributes:
         stretches: Of the road.
@@ -352,7 +352,7 @@ class Tape:
 
     @property
     def size(self) -> int:
-        """How many errors there are: a shift per line and stretch, a tilt, and three widths."""
+        """The number of errors: a shift per line and stretch, a tilt, and three widths."""
         return self.stretches * (len(LINES) + TILTED) + 3
 
     def shift(self, stretch: NDArray[np.intp], line: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -393,7 +393,7 @@ FEWEST_FRAMES = 20
 
 @dataclass(frozen=True)
 class Gathered:
-    """What a log shows of its camera.
+    """Everything that a log shows of its camera.
 
     Attributes:
         views: Edges, poses and map.
@@ -420,18 +420,23 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     robot.camera_figures()  # Refuses a robot without a camera before anything is read
     road = read_road(frames.road)
     tracks, numbers = track_frames(log, frames)
-    used = _spread(len(numbers), MOST_FRAMES)
+    most = min(len(numbers), MOST_FRAMES)
+    used = np.unique(np.linspace(0, len(numbers) - 1, most).round().astype(np.intp))
     tracks, numbers = tracks.only(used), numbers[used]
     pictures, swapped = in_rgb(read_pictures(frames, numbers.tolist()))
     edges = find_edges(pictures)
-    _check_markings(log, np.bincount(edges.frame, minlength=len(numbers)))
+    showing = int((np.bincount(edges.frame, minlength=len(numbers)) >= FEWEST_POINTS).sum())
+    if showing < FEWEST_FRAMES:
+        problem = f"{showing} of {len(numbers)} frames show markings; the camera needs {FEWEST_FRAMES}"
+        raise LogError(f"{log.name}: frames: {problem}: drive nearer to the lines, or check the map")
     edges = edges.only(np.arange(len(edges.row)) % EVERY == 0)
     optics = Optics(robot, *pictures.shape[1:3])
     position_m = tracks.share * _stated(frames.position_m, ASSUMED_M)
     heading_rad = tracks.share * np.radians(_stated(frames.heading_deg, ASSUMED_DEG))
     views = Views(edges, tracks, Markings(road), optics, position_m, float(heading_rad), road.paint.tape_m)
-    notes = (*_note_used(numbers, frames), *((SWAPPED,) if swapped else ()))
-    return Gathered(views, numbers, pictures, frames, notes)
+    count, every = len(numbers), len(frames.paths)
+    notes = [f"{count} of {every} frames are used, evenly spread: more tell no more"] if count < every else []
+    return Gathered(views, numbers, pictures, frames, (*notes, *((SWAPPED,) if swapped else ())))
 
 
 def read_road(name: str) -> Road:
@@ -452,22 +457,5 @@ def in_rgb(pictures: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], bool]:
     return (np.ascontiguousarray(pictures[..., ::-1]) if swapped else pictures), swapped
 
 
-def _note_used(numbers: NDArray[np.intp], frames: Frames) -> tuple[str, ...]:
-    """What is said where not all frames are used."""
-    used, every = len(numbers), len(frames.paths)
-    return (f"{used} of {every} frames are used, evenly spread: more tell no more",) if used < every else ()
-
-
 def _stated(value: float | None, otherwise: float) -> float:
     return otherwise if value is None else value
-
-
-def _spread(count: int, most: int) -> NDArray[np.intp]:
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
-
-
-def _check_markings(log: Log, counts: NDArray[np.intp]) -> None:
-    showing = int((counts >= FEWEST_POINTS).sum())
-    if showing < FEWEST_FRAMES:
-        problem = f"{showing} of {len(counts)} frames show markings; the camera needs {FEWEST_FRAMES}"
-        raise LogError(f"{log.name}: frames: {problem}: drive nearer to the lines, or check the map")

@@ -1,8 +1,8 @@
-"""Errors of cameras on frames that they were not fitted to: displacement of markings, and brightness of the floor.
+"""Errors of cameras on frames that they were not fitted to, and the size of effects by them.
 
-The error of a camera on frames that it was not fitted to, in pixels of marking displacement.
-What a log's frames say of a robot's camera.
-What each effect on where things are in the picture is worth; those of no matter leave the model.
+Displacement of markings [pixel] of every edge point, by cameras fitted without its frame, and brightness of the floor
+[grey levels], with intervals from a bootstrap over frames. An effect's size is the error without it over the error with
+it; `weigh_effects` drops effects whose size is below MATERIAL. `CameraDiagnosis` is what the house answers.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from proxytune.diagnosis.camera.edges import Gathered, Views, effects_of
 from proxytune.diagnosis.camera.fitting import SCALE_PX, CameraFit, count_points, eliminate_poses, fit_camera
 from proxytune.diagnosis.camera.light import Blemish
 from proxytune.diagnosis.camera.model import Pictures, State, draw_pictures, project
-from proxytune.diagnosis.camera.selection import Leftover, Named, Subset, cost_of, fit_set
+from proxytune.diagnosis.camera.selection import CameraSelection, ResidualField, Subset, cost_of, fit_set
 from proxytune.effects import effect_of
 
 FOLDS = 3
@@ -155,7 +155,7 @@ class LaidLine:
 
 @dataclass(frozen=True)
 class LaidMap:
-    """How the map was laid.
+    """The map as it was laid.
 
     Attributes:
         offset: Of the whole map by name: x_m, y_m, heading_deg.
@@ -170,19 +170,19 @@ class LaidMap:
 
 @dataclass(frozen=True)
 class CameraDiagnosis:
-    """What frames say of a camera.
+    """The diagnosis of a camera, from one log's frames.
 
     Attributes:
         verdict: As a diagnosis of motion has it.
         declared: Declared parameters, fitted without any other effect, by name in θ.
         theta: All parameters of the extended model, by name in θ.
         effects: The effects that were added.
-        immaterial: Effects that there is evidence for, and which hardly change the error: no part of the model.
+        negligible: Effects that there is evidence for, and which hardly change the error: no part of the model.
         dropped: Parameters of those effects, as they were fitted before they were dropped, by name in θ.
         candidates: What each effect of the catalogue costs if it is the only one added [nats], the best first.
         pixels: Displacement of markings.
         grey: Differences in brightness on the floor.
-        gates: What is fixed to the camera and left over, before and after.
+        residual_fields: What is fixed to the camera and left over, before and after.
         blemishes: Places in the picture that no camera effect explains: dirt, a bumper in view.
         could_not_be_seen: Effects that these frames could not have shown.
         next_views: What to take to tell what could not be told.
@@ -197,19 +197,19 @@ class CameraDiagnosis:
     declared: Mapping[str, Estimate]
     theta: Mapping[str, Estimate]
     effects: tuple[CameraEffect, ...]
-    immaterial: tuple[CameraEffect, ...]
+    negligible: tuple[CameraEffect, ...]
     dropped: Mapping[str, Estimate]
     candidates: Sequence[Subset]
     pixels: Comparison
     grey: Comparison
-    gates: tuple[Leftover, Leftover]
+    residual_fields: tuple[ResidualField, ResidualField]
     blemishes: tuple[Blemish, ...]
     could_not_be_seen: tuple[str, ...]
     next_views: tuple[str, ...]
     laid: LaidMap
     matched: float
     notes: tuple[str, ...]
-    named: Named
+    named: CameraSelection
     gathered: Gathered
 
 
@@ -227,18 +227,6 @@ Look = Mapping[str, float]
 """Values of effects on pictures, by name in θ."""
 
 
-def compare_displacement(views: Views, residuals: tuple[Floats, Floats, Floats], seed: int) -> Comparison:
-    """Displacement of markings before and after, from residuals on unseen frames.
-
-    Args:
-        views: Whose edge points these are.
-        residuals: Of the declared camera, of the model's and of the one with every effect (n,) each [pixel].
-        seed: Of the bootstrap.
-    """
-    before, after, floor = pixel_errors(views, residuals, seed)
-    return Comparison(before, after, floor if floor.value < after.value else after, "px")
-
-
 def displacement_ratio(views: Views, residuals: tuple[Floats, Floats], seed: int) -> float:
     """The error without an effect over the error with it, from residuals of both on unseen frames (n,) [pixel]."""
     without, with_it = pixel_errors(views, residuals, seed)
@@ -246,7 +234,7 @@ def displacement_ratio(views: Views, residuals: tuple[Floats, Floats], seed: int
 
 
 def compare_brightness(
-    gathered: Gathered, named: Named, looks: tuple[Look, Look], seed: int
+    gathered: Gathered, named: CameraSelection, looks: tuple[Look, Look], seed: int
 ) -> tuple[Comparison, dict[str, float]]:
     """Differences of brightness on the floor, of a third of the frames, and the error without each effect.
 
@@ -281,8 +269,10 @@ def grey_differences(
         fixed_exposure: Whether pictures compare as they are; else each at its own brightness, which no model knows.
     """
     measured, drawn = measured[:, floor], drawn[:, floor]
-    levels = 1.0 if fixed_exposure else _levels(measured, drawn)
-    return np.asarray(np.abs(measured - np.clip(drawn * levels, 0.0, 255.0)))
+    if not fixed_exposure:
+        ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
+        drawn = drawn * np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)
+    return np.asarray(np.abs(measured - np.clip(drawn, 0.0, 255.0)))
 
 
 def _grey_errors(
@@ -298,12 +288,6 @@ def _grey_errors(
         differences = grey_differences(measured, drawn, floor, fixed_exposure=gathered.frames.fixed_exposure)
         errors.append(error_over(differences.mean(axis=-1).sum(axis=1).astype(float), counts, seed))
     return errors
-
-
-def _levels(measured: Pictures, drawn: Pictures) -> Pictures:
-    """How much brighter each frame was exposed than drawn (n, 1, 1), of pixels (n, pixels, 3)."""
-    ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
-    return np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)
 
 
 MATERIAL = 1.03
@@ -323,7 +307,7 @@ class Weighed:
         dropped: Effects that there is evidence for, and which hardly change the error.
     """
 
-    named: Named
+    named: CameraSelection
     with_dropped: CameraFit
     pixels: Comparison
     ratios: Mapping[str, float]
@@ -338,7 +322,7 @@ class _Tested(NamedTuple):
     residuals: Floats
 
 
-def weigh_effects(named: Named, seed: int) -> Weighed:
+def weigh_effects(named: CameraSelection, seed: int) -> Weighed:
     """Weigh every effect that was named, and fit the camera again without those of no matter."""
     views, cost = named.full.views, cost_of(named.model)
     declared, model, full = (_test(fit) for fit in (named.declared, named.model, named.full))
@@ -350,7 +334,8 @@ def weigh_effects(named: Named, seed: int) -> Weighed:
     kept = tuple(effect for effect in named.effects if effect not in dropped)
     if dropped:
         model = without[dropped[0]] if len(dropped) == 1 else _test(_fit_without(named, dropped))
-    pixels = compare_displacement(views, (declared.residuals, model.residuals, full.residuals), seed)
+    before, after, floor = pixel_errors(views, (declared.residuals, model.residuals, full.residuals), seed)
+    pixels = Comparison(before, after, floor if floor.value < after.value else after, "px")
     return Weighed(replace(named, model=model.fit, effects=kept), named.model, pixels, ratios, nats, dropped)
 
 
@@ -358,5 +343,5 @@ def _test(fit: CameraFit) -> _Tested:
     return _Tested(fit, unseen_residuals(fit.views, fit.state, fit.names))
 
 
-def _fit_without(named: Named, effects: Sequence[str]) -> CameraFit:
+def _fit_without(named: CameraSelection, effects: Sequence[str]) -> CameraFit:
     return fit_set(named.full, [one for one in effects_of(named.model.names) if one not in effects])

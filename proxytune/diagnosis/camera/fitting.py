@@ -1,7 +1,9 @@
 """Fitting a camera to edge points, with the tape, the whole map and every frame's pose as nuisances.
 
-Normal equations of edge points, with what is of no interest eliminated: every frame's pose, or other unknowns.
-How much a tracker scatters, from what fits of the camera add to its poses.
+Gauss–Newton steps on Geman and McClure's loss ρ(r) = ½ r² / (1 + r²/s²) of the distances r of edge points from the
+map's markings, with Gaussian priors; every frame's pose is eliminated from the normal equations by the Schur complement
+A − B C⁻¹ Bᵀ (`Normal.marginal`, `eliminate`). What fits add to tracked poses tells how much the tracker scatters
+(`pose_scatter`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -95,7 +97,7 @@ def eliminate_poses(views: Views, state: State, there: Projection, points: Count
 
 
 def eliminate(own: Floats, across: Floats, inner: Floats, other: Floats) -> Floats:
-    """What is left of normal equations for some unknowns with all others eliminated: the Schur complement.
+    """Eliminate all other unknowns from the normal equations of some: the Schur complement.
 
     Args:
         own: Block or right side of the unknowns that are kept.
@@ -225,7 +227,9 @@ def fit_camera(
 def _solve(views: Views, state: State, names: tuple[str, ...], there: Projection, points: Counted) -> _Step:
     columns = common_slopes(views, state, there, names)[points.rows]
     matrix, right, inverse, coupling, own = eliminate_poses(views, state, there, points, columns)
-    precision, pull = _priors(views, state, names)
+    precision = np.concatenate((_precisions(views, names), MAP_SCATTER**-2.0, views.tape_scatter**-2.0))
+    off = np.array([state.theta[name] - views.optics.neutral(name) for name in names])
+    pull = precision * np.concatenate((off, state.offset, state.tape))
     matrix[np.diag_indices_from(matrix)] += precision
     common = np.asarray(-np.linalg.solve(matrix, right + pull), dtype=float)
     poses = -own - np.einsum("fij,j->fi", coupling, common)
@@ -233,7 +237,7 @@ def _solve(views: Views, state: State, names: tuple[str, ...], there: Projection
 
 
 def common_slopes(views: Views, state: State, there: Projection, names: tuple[str, ...]) -> Floats:
-    """How residuals change with camera, map and tape (n, names + 3 + tape)."""
+    """Slopes of the residuals by camera, map and tape (n, names + 3 + tape)."""
     first = len(names) + 3
     columns = np.zeros((len(there.residual), first + Tape(views.markings.stretches).size))
     columns[:, : len(names)] = camera_slopes(views, state, there, names)
@@ -246,13 +250,6 @@ def common_slopes(views: Views, state: State, there: Projection, names: tuple[st
 
 def _precisions(views: Views, names: tuple[str, ...]) -> Floats:
     return np.array([views.optics.spread(name) ** -2.0 for name in names])
-
-
-def _priors(views: Views, state: State, names: tuple[str, ...]) -> tuple[Floats, Floats]:
-    """Precision of each common column, and its pull to where it is expected."""
-    precision = np.concatenate((_precisions(views, names), MAP_SCATTER**-2.0, views.tape_scatter**-2.0))
-    off = np.array([state.theta[name] - views.optics.neutral(name) for name in names])
-    return precision, precision * np.concatenate((off, state.offset, state.tape))
 
 
 def _moved(views: Views, state: State, names: tuple[str, ...], step: _Step) -> State:

@@ -1,6 +1,8 @@
-"""How a camera's brightness differs from the drawn frames': exposure and vignetting.
+"""The light of a camera, and what hides the floor from it.
 
-What is fixed to the camera and hides the floor: dirt on the lens, a bumper in view.
+A drawn grey x is logged as 255 · gain · (x (1 − vignetting r²) / 255) ** gamma: `fit_light` fits that to the mean
+brightness of flat places, by frame, paint and ring about the picture's middle. `find_blemishes` finds places fixed to
+the camera, dirt or a bumper, in which brightness does not follow the drawn frames.
 """
 
 from collections.abc import Callable
@@ -68,7 +70,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Light:
-    """How a drawn grey x becomes a logged one, 255 · gain · (x (1 − vignetting r²) / 255) ** gamma.
+    """The light by which a drawn grey x is logged as 255 · gain · (x (1 − vignetting r²) / 255) ** gamma.
 
     r is the distance from the picture's middle, 1 in its corners. Gain and gamma are relative to the declared paint:
     they make the drawn frames match, and say little of the camera where the paint is not known. Vignetting does not
@@ -91,7 +93,7 @@ class Light:
         return replace(self, levels=self.levels[frames])
 
     def shine(self, predicted: NDArray[Any]) -> NDArray[np.float32]:
-        """What a camera of this light logs of drawn frames (N, rows, columns[, colours]), before it is rounded."""
+        """Give what a camera of this light logs of drawn frames (N, rows, columns[, colours]), before it is rounded."""
         shape = (*predicted.shape[1:3], *(1,) * (predicted.ndim - 3))
         factor = 1.0 - self.vignetting.value * squared_radius(*predicted.shape[1:3]).reshape(shape)
         level = 255.0 * self.gain.value * self.levels.reshape(-1, *(1,) * (predicted.ndim - 1))
@@ -106,7 +108,7 @@ def squared_radius(rows: int, columns: int) -> Floats:
 
 
 def flat_places(predicted: NDArray[Any], floor: NDArray[np.bool_], margin: int = MARGIN) -> NDArray[np.int8]:
-    """Which of PAINTS each pixel (N, rows, columns) shows with its neighbours; −1 near edges and off the floor."""
+    """The number in PAINTS that a pixel (N, rows, columns) shows with its neighbours; −1 near edges and off floor."""
     paint = np.full(predicted.shape[:3], -1, dtype=np.int8)
     for number, colour in enumerate(PAINTS):
         paint[(np.abs(predicted - colour.astype(np.float32)) < 2.0).all(axis=-1)] = number
@@ -135,7 +137,11 @@ def fit_light(
     half = _half_intervals(means, best, lambda kept: _fit(kept, fixed_exposure)[0], len(measured))
     levels = np.ones(len(measured))
     levels[: len(gains)] = gains
-    gain, gamma, vignetting = (_fitted(*figure) for figure in zip(best, half, RANGES, WIDEST, strict=True))
+    figures = []
+    for value, wide, (low, high), widest in zip(best, half, RANGES, WIDEST, strict=True):
+        interval = (max(low, float(value - wide)), min(high, float(value + wide)))
+        figures.append(Fitted(float(value), interval, bool(wide < widest)))
+    gain, gamma, vignetting = figures
     return Light(gain, gamma, vignetting, levels)
 
 
@@ -160,12 +166,6 @@ def jackknife(fit: Callable[[int], Floats], parts: NDArray[np.intp]) -> Floats:
         return np.full(values.shape[1], np.inf)
     variance = (count - 1) ** 2 / count * values.var(axis=0, ddof=1)
     return np.asarray(student.ppf(0.975, count - 1) * np.sqrt(variance))
-
-
-def _fitted(value: float, half: float, ends: tuple[float, float], widest: float) -> Fitted:
-    low, high = ends
-    interval = (max(low, float(value - half)), min(high, float(value + half)))
-    return Fitted(float(value), interval, bool(half < widest))
 
 
 class _Means(NamedTuple):
@@ -219,9 +219,13 @@ def _fit(means: _Means, fixed_exposure: bool) -> tuple[Floats, Floats]:
             gains -= gains[np.unique(means.frame)].mean()
         left = left - gains[means.frame]
         slope = -gamma * means.squared_radius / (1.0 - vignetting * means.squared_radius)
-        vignetting = float(np.clip(vignetting + _slope(slope, left, level, weight), *RANGES[2]))
+        # Least-squares step of what has this slope, with a free mean per level.
+        inner = slope - _mean_by(level, slope, weight, 9)[level]
+        step = float((weight * inner * left).sum() / max((weight * inner * inner).sum(), 1e-12))
+        vignetting = float(np.clip(vignetting + step, *RANGES[2]))
         log_gain, gamma = _exposure(paint, np.unique(level))
-        weight = means.weight * _huber(left)
+        spread = 1.5 * 1.4826 * np.median(np.abs(left)) + 1e-6
+        weight = means.weight * np.asarray(np.minimum(1.0, spread / np.maximum(np.abs(left), 1e-9)))
     return np.array([np.clip(np.exp(log_gain), *RANGES[0]), gamma, vignetting]), np.exp(gains)
 
 
@@ -231,12 +235,6 @@ def _mean_by(key: NDArray[np.intp], values: Floats, weight: Floats, count: int) 
     return np.asarray(np.bincount(key, weight * values, count) / np.where(sums > 0.0, sums, 1.0))
 
 
-def _slope(slope: Floats, left: Floats, level: NDArray[np.intp], weight: Floats) -> float:
-    """Least-squares step of what has this slope, with a free mean per level."""
-    inner = slope - _mean_by(level, slope, weight, 9)[level]
-    return float((weight * inner * left).sum() / max((weight * inner * inner).sum(), 1e-12))
-
-
 def _exposure(paint: Floats, seen: NDArray[np.intp]) -> tuple[float, float]:
     """Logarithm of the gain, and gamma, that make the declared paints the levels of those that are in the frames."""
     declared = np.log(PAINTS / 255.0).ravel()[seen]
@@ -244,12 +242,6 @@ def _exposure(paint: Floats, seen: NDArray[np.intp]) -> tuple[float, float]:
         return float((paint[seen] - declared).mean()), 1.0
     gamma = float(np.clip(np.polyfit(declared, paint[seen], 1)[0], *RANGES[1]))
     return float((paint[seen] - gamma * declared).mean()), gamma
-
-
-def _huber(left: Floats) -> Floats:
-    """Weights of residuals, below 1 beyond one and a half standard deviations."""
-    spread = 1.5 * 1.4826 * np.median(np.abs(left)) + 1e-6
-    return np.asarray(np.minimum(1.0, spread / np.maximum(np.abs(left), 1e-9)))
 
 
 Singles = NDArray[np.float32]
@@ -366,7 +358,7 @@ def _against_usual(contrast: Singles) -> Singles:
 def _blemish(
     part: NDArray[np.bool_], place: tuple[slice, ...], contrast: NDArray[Any], shape: tuple[int, ...]
 ) -> Blemish:
-    """What a connected part of the windows' middles is called in pixels."""
+    """Measure a connected part of the windows' middles in pixels."""
     ends = [
         (max(0, side.start * STEP - 1), min(size - 1, (side.stop - 1) * STEP + 1))
         for side, size in zip(place, shape, strict=True)
@@ -378,14 +370,17 @@ def _blemish(
 def _contrast(
     measured: Pictures, predicted: NDArray[Any], floor: NDArray[np.bool_], light: Light, fewest: int = FEWEST_FRAMES
 ) -> tuple[Singles, Singles, Singles]:
-    """How the measured brightness of each window follows the expected one over the frames; NaN if unknown.
+    """Regress the measured brightness of each window on the expected one over the frames; NaN if unknown.
 
     Returns:
         The slope, its standard error, and the standard deviation of the measured over that of the expected.
     """
     green = np.ascontiguousarray(predicted[..., 1], dtype=np.float32)
     level = light.levels.astype(np.float32)[:, None, None]
-    expected, logged = (_windows(one) / level for one in (light.shine(green), measured[..., 1].astype(np.float32)))
+    expected, logged = (
+        uniform_filter(one, (0, WINDOW, WINDOW), mode="nearest")[:, ::STEP, ::STEP] / level
+        for one in (light.shine(green), measured[..., 1].astype(np.float32))
+    )
     on_map = minimum_filter(green, (0, WINDOW, WINDOW))[:, ::STEP, ::STEP] > DARKEST
     weight = on_map.astype(np.float32)
     slope, error = _regress(expected, logged, weight)
@@ -401,11 +396,6 @@ def _spread(grey: Singles, weight: Singles) -> Singles:
     total = np.maximum(weight.sum(axis=0), 1.0)
     off = grey - (weight * grey).sum(axis=0) / total
     return np.asarray(np.sqrt((weight * off**2).sum(axis=0) / total), dtype=np.float32)
-
-
-def _windows(grey: Singles) -> Singles:
-    """Mean brightness of each window in each frame."""
-    return uniform_filter(grey, (0, WINDOW, WINDOW), mode="nearest")[:, ::STEP, ::STEP]
 
 
 def _regress(expected: Singles, logged: Singles, weight: Singles) -> tuple[Singles, Singles]:

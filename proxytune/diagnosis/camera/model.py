@@ -1,6 +1,8 @@
-"""Where edge points fall on the floor, and how far that is from the map's markings, in pixels.
+"""The model of a camera on a map: edge points projected to the floor, and pictures drawn.
 
-What a model would have seen: pictures drawn at a log's poses, with every effect on camera and picture.
+`project` gives the signed distance r of every edge point from the nearest marking of its colour [pixel]; the `…_slopes`
+are ∂r by camera, pose, map and tape. `draw_pictures` draws what a model would have seen at a log's poses, with every
+effect on camera and picture.
 """
 
 from collections.abc import Mapping, Sequence
@@ -78,17 +80,20 @@ def neutral_state(views: Views, theta: Mapping[str, float]) -> State:
 def project(views: Views, state: State) -> Projection:
     """Project every edge point to the floor and compare it with the map."""
     edges, figures = views.edges, views.optics.figures(state.theta)
-    poses, rates = (each[edges.frame] for each in _poses(views, state))
+    poses, rates = views.tracks.at(state.theta.get(LATENCY, 0.0))
+    poses, rates = (each[edges.frame] for each in (poses + state.poses, rates))
     poses = poses + rates * (_row_share(views) * state.theta.get(READOUT, 0.0))[:, None]
     ground = [_ground(figures, views, half) for half in (0.0, 0.5, -0.5)]
-    places = [_in_world(points, poses) for points in ground]
+    places = [(poses[:, :2] + _turned(points, poses[:, 2])) for points in ground]
     across = places[1] - places[2]
     on_floor = np.asarray(np.isfinite(across).all(axis=1) & np.isfinite(places[0]).all(axis=1))
     place, across = (np.where(on_floor[:, None], each, 1.0) for each in (places[0], across))
     metres = np.linalg.norm(across, axis=1)
     marks = _marks(views, place, state.offset)
     reach = np.linalg.norm(np.where(on_floor[:, None], ground[0], np.inf) - (figures.forward_m, 0.0), axis=1)
-    near = on_floor & (reach < FARTHEST_M) & (_widths(views) / metres > NARROWEST_PX)
+    paint = views.markings.road.paint
+    wide = np.where(edges.white, paint.white_width, paint.yellow_width) / metres > NARROWEST_PX
+    near = on_floor & (reach < FARTHEST_M) & wide
     outward = _turned(marks.slope, state.offset[2])
     aligned = -(outward * across).sum(axis=1) / metres > ALIGNED
     residual = (marks.distance + _tape_shift(views, state.tape, marks)) / metres
@@ -98,7 +103,7 @@ def project(views: Views, state: State) -> Projection:
 
 
 def camera_slopes(views: Views, state: State, there: Projection, names: Sequence[str]) -> Floats:
-    """How the residuals change with parameters of the camera (n, names)."""
+    """Slopes of the residuals by parameters of the camera (n, names)."""
     figures = views.optics.figures(state.theta)
     points = _ground(figures, views, 0.0)
     ahead = _turned(there.slope, -there.heading)
@@ -116,21 +121,21 @@ def camera_slopes(views: Views, state: State, there: Projection, names: Sequence
 
 
 def pose_slopes(there: Projection) -> Floats:
-    """How the residuals change with the robot's x, y and heading (n, 3)."""
+    """Slopes of the residuals by the robot's x, y and heading (n, 3)."""
     slope, lever = there.slope, there.lever
     turning = slope[:, 1] * lever[:, 0] - slope[:, 0] * lever[:, 1]
     return np.column_stack((slope, turning))
 
 
 def map_slopes(views: Views, state: State, there: Projection) -> Floats:
-    """How they change with the whole map's x, y and heading about its middle (n, 3)."""
+    """Slopes by the whole map's x, y and heading about its middle (n, 3)."""
     from_middle = there.place - state.offset[:2] - _middle(views)
     turning = there.slope[:, 0] * from_middle[:, 1] - there.slope[:, 1] * from_middle[:, 0]
     return np.column_stack((-there.slope, turning))
 
 
 def tape_slopes(views: Views, there: Projection) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
-    """How they change with the tape: places in the row of `Tape` and slopes (n,), for shift, tilt and width."""
+    """Slopes by the tape: places in the row of `Tape` and slopes (n,), for shift, tilt and width."""
     tape, marks, white = Tape(views.markings.stretches), there.marks, views.edges.white
     across = marks.side / there.metres
     return (
@@ -141,7 +146,7 @@ def tape_slopes(views: Views, there: Projection) -> tuple[tuple[NDArray[np.intp]
 
 
 def _tape_shift(views: Views, errors: Floats, marks: Marks) -> Floats:
-    """What the tape's errors add to the distances [m]."""
+    """Distances that the tape's errors add [m]."""
     tape, white = Tape(views.markings.stretches), views.edges.white
     shift = errors[tape.shift(marks.stretch, marks.line)]
     shift = shift + errors[tape.tilt(marks.stretch, marks.line)] * _askew(marks)
@@ -153,13 +158,8 @@ def _askew(marks: Marks) -> Floats:
     return np.where(marks.line == len(LINES) - 1, 0.0, 2.0 * marks.share - 1.0)
 
 
-def _poses(views: Views, state: State) -> tuple[Floats, Floats]:
-    poses, rates = views.tracks.at(state.theta.get(LATENCY, 0.0))
-    return poses + state.poses, rates
-
-
 def _row_share(views: Views) -> Floats:
-    """How far below the picture's middle each point is, as a share of its height: rows are read from the top."""
+    """Distance of each point below the picture's middle, as a share of its height: rows are read from the top."""
     return views.edges.row / views.optics.rows - 0.5
 
 
@@ -167,10 +167,6 @@ def _ground(figures: CameraFigures, views: Views, along: float) -> Floats:
     """Floor points (n, 2) in the robot's frame, of edge points moved along their normals [pixel]."""
     edges = views.edges
     return floor_points(figures, edges.column + along * edges.normal[:, 0], edges.row + along * edges.normal[:, 1])
-
-
-def _in_world(points: Floats, poses: Floats) -> Floats:
-    return poses[:, :2] + _turned(points, poses[:, 2])
 
 
 def _turned(vectors: Floats, angle: Floats | float) -> Floats:
@@ -181,11 +177,6 @@ def _turned(vectors: Floats, angle: Floats | float) -> Floats:
 
 def _middle(views: Views) -> Floats:
     return np.array(views.markings.road.size) / 2.0
-
-
-def _widths(views: Views) -> Floats:
-    paint = views.markings.road.paint
-    return np.where(views.edges.white, paint.white_width, paint.yellow_width)
 
 
 def _marks(views: Views, places: Floats, offset: Floats) -> Marks:

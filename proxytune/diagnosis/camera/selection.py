@@ -1,9 +1,11 @@
-"""Naming what a camera lacks: fit everything, find the fewest effects that do as well, and fit those.
+"""Selection of a camera's effects: fit everything, find the fewest effects that do as well, and fit those.
 
-Which camera effects are needed: the fewest whose fit is no worse than with all of them free.
-Whether anything fixed to the camera is left over: a smooth field of displacements over the picture.
-Whether frames, poses and map belong together; if not, what is wrong with them.
-What frames cannot show of a camera, what cannot be told apart, and what to take next.
+With θ̂ of the camera with every effect free, H its information and δ the way of all effects but a set S to their neutral
+values, the set loses ½ δᵀ(H_δδ − H_δS H_SS⁻¹ H_Sδ)δ nats: exact near neutral values, and cheap enough for every set
+(`rank_subsets`). The most promising sets of each size are fitted, until one costs no more than all effects together
+(`select_camera_effects`). `fit_residual_field` tests whether anything fixed to the camera is left over, as a cubic
+field of displacements fitted to one half of the frames and tested on the other. `check_match` tells whether frames,
+poses and map belong together at all; `hidden_effects` and `next_views` what these frames cannot show, and what to take.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -67,7 +69,7 @@ def rank_subsets(full: CameraFit, declared: Sequence[str], size: int) -> list[Su
 
 
 def _loss(full: CameraFit, effects: Sequence[str]) -> float:
-    """What is lost if only these effects' parameters may differ from their neutral values [nats]."""
+    """The loss if only these effects' parameters may differ from their neutral values [nats]."""
     kept = np.array([effect_of(name) in effects for name in full.names])
     if kept.all():
         return 0.0
@@ -97,8 +99,8 @@ RIVAL_NATS = 3.0
 
 
 @dataclass(frozen=True)
-class Named:
-    """What a camera was found to be.
+class CameraSelection:
+    """The effects that a camera was found to need, with all fits.
 
     Attributes:
         declared: With the declared effects alone.
@@ -138,7 +140,7 @@ def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float
     return fit
 
 
-def name_camera_effects(full: CameraFit, declared: Sequence[str]) -> Named:
+def select_camera_effects(full: CameraFit, declared: Sequence[str]) -> CameraSelection:
     """Find the fewest effects besides those declared that explain what all together do."""
     least = cost_of(full)
     enough = max(LEAST_NATS, LEAST_SHARE * least)
@@ -148,14 +150,19 @@ def name_camera_effects(full: CameraFit, declared: Sequence[str]) -> Named:
         sets = rank_subsets(full, declared, size)[:TRIED]
         if not sets:
             break
-        fits = sorted((_fitted(full, least, declared, one) for one in sets), key=lambda pair: pair[0].loss)
+        tried = [(one, fit_set(full, (*declared, *one.effects))) for one in sets]
+        # A set may really cost less beyond the full fit than was promised.
+        costs = [(Subset(one.effects, min(one.loss, cost_of(fit) - least)), fit) for one, fit in tried]
+        fits = sorted(costs, key=lambda pair: pair[0].loss)
         best.append(fits[0])
         rivals = [one for one, _ in fits[1:] if one.loss <= fits[0][0].loss + RIVAL_NATS]
         if fits[0][0].loss <= enough:
             break
     subset, model = best[-1]
     losses, others = tuple(one for one, _ in best), tuple(one.effects for one in rivals)
-    return Named(best[0][1], model, full, subset.effects, losses, tuple(rank_subsets(full, declared, 1)), others)
+    return CameraSelection(
+        best[0][1], model, full, subset.effects, losses, tuple(rank_subsets(full, declared, 1)), others
+    )
 
 
 def cost_of(fit: CameraFit) -> float:
@@ -177,12 +184,6 @@ def fit_set(full: CameraFit, effects: Sequence[str]) -> CameraFit:
     return fit_camera(full.views, state, names, FROM_ALL)
 
 
-def _fitted(full: CameraFit, least: float, declared: Sequence[str], subset: Subset) -> tuple[Subset, CameraFit]:
-    """A set fitted, with what it really costs beyond the full fit where that is less than promised."""
-    fit = fit_set(full, (*declared, *subset.effects))
-    return Subset(subset.effects, min(subset.loss, cost_of(fit) - least)), fit
-
-
 POWERS = tuple((right, down) for right in range(4) for down in range(4) if right + down <= 3)
 """The terms of a cubic polynomial of the place in the picture."""
 
@@ -200,7 +201,7 @@ LEAST_PX = 0.1
 
 
 @dataclass(frozen=True)
-class Leftover:
+class ResidualField:
     """A field of displacements that a fitted camera leaves over.
 
     Attributes:
@@ -216,16 +217,16 @@ class Leftover:
     field: Floats
 
     @property
-    def open(self) -> bool:
-        """Whether something fixed to the camera is left over."""
+    def significant(self) -> bool:
+        """Tell whether something fixed to the camera is left over."""
         return self.nats > FIELD_NATS and self.share > FIELD_SHARE and self.rms_px > LEAST_PX
 
     def displacement(self, right: Floats, down: Floats) -> Floats:
-        """How far the model has markings from where they lie [pixel], at places from −1 to 1 across the picture."""
+        """Displacement of the model's markings from those measured [pixel], at places from −1 to 1 in the picture."""
         return _terms(right, down) @ self.field
 
 
-def find_leftover(fit: CameraFit) -> Leftover:
+def fit_residual_field(fit: CameraFit) -> ResidualField:
     """Fit the field to one half of the frames and test it on the other, both ways.
 
     What the free parameters, the tape, the map and the poses could explain is left to them.
@@ -235,16 +236,14 @@ def find_leftover(fit: CameraFit) -> Leftover:
     systems = [_system(fit, there, half) for half in halves]
     ridge = np.eye(len(systems[0][1])) / FIELD_PX**2
     fields = [np.asarray(-np.linalg.solve(matrix + ridge, right), dtype=float) for matrix, right, _ in systems]
-    gains = [_gain(fields[1 - part], *systems[part][:2]) for part in (0, 1)]
+    gains = []
+    for (matrix, right, _), field in zip(systems, fields[::-1], strict=True):
+        gains.append(float(-(right @ field + 0.5 * field @ matrix @ field)))
     cost = sum(system[2] for system in systems)
     field = np.mean(fields, axis=0).reshape(2, -1).T
     moved = _terms(*_places(fit.views))[there.valid] @ field
     rms = float(np.sqrt((moved**2).sum(axis=1).mean())) if len(moved) else 0.0
-    return Leftover(float(sum(gains)), float(sum(gains) / max(cost, 1e-9)), rms, field)
-
-
-def _gain(field: Floats, matrix: Floats, right: Floats) -> float:
-    return float(-(right @ field + 0.5 * field @ matrix @ field))
+    return ResidualField(float(sum(gains)), float(sum(gains) / max(cost, 1e-9)), rms, field)
 
 
 def _system(fit: CameraFit, there: Projection, half: NDArray[np.bool_]) -> tuple[Floats, Floats, float]:
@@ -303,7 +302,7 @@ def matched_share(fit: CameraFit) -> float:
 
 
 def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
-    """What is to be said of frames that match poorly; nothing where they match as usual.
+    """Refuse frames that do not belong to the poses, and give a note on those that match poorly.
 
     Raises:
         LogError: If they do not belong to the poses, with what would make them, where that is found.
@@ -377,27 +376,22 @@ def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
     hidden = [] if full.views.tracks.moving else list(MOVING)
     kept = [name for name in full.names if effect_of(name) in model]
     for name in full.names:
-        if name not in kept and 2.0 * _sd_beside(full, kept, name) > _smallest(full, name):
+        if name in kept:
+            continue
+        # The standard deviation of a parameter that is free beside those kept, against its nearest probe.
+        chosen = [full.names.index(one) for one in (*kept, name)]
+        matrix = full.information[np.ix_(chosen, chosen)]
+        sd = float(np.sqrt(np.linalg.pinv(matrix, rcond=1e-12)[-1, -1])) if matrix[-1, -1] > 0.0 else float("inf")
+        parameter = full.views.optics.robot.catalogue.parameters[name]
+        neutral = full.views.optics.neutral(name)
+        away = (abs(probe - neutral) for probe in parameter.probes if probe != neutral)
+        if 2.0 * sd > min(away, default=parameter.high):
             hidden.append(name)
     return effects_of(tuple(hidden))
 
 
-def _sd_beside(full: CameraFit, kept: Sequence[str], name: str) -> float:
-    """Standard deviation of a parameter if it is free beside those kept."""
-    chosen = [full.names.index(one) for one in (*kept, name)]
-    matrix = full.information[np.ix_(chosen, chosen)]
-    return float(np.sqrt(np.linalg.pinv(matrix, rcond=1e-12)[-1, -1])) if matrix[-1, -1] > 0.0 else float("inf")
-
-
-def _smallest(full: CameraFit, name: str) -> float:
-    """How far the nearest probe lies from the neutral value."""
-    parameter = full.views.optics.robot.catalogue.parameters[name]
-    neutral = full.views.optics.neutral(name)
-    return min((abs(probe - neutral) for probe in parameter.probes if probe != neutral), default=parameter.high)
-
-
 def next_views(hidden: Sequence[str], *, repeated: bool) -> tuple[str, ...]:
-    """What to take to see what was hidden.
+    """Advise what to take to see what was hidden.
 
     Args:
         hidden: Effects that could not be seen.

@@ -1,12 +1,12 @@
-"""Whether commands and poses share one clock, and drives put right where they do not.
+"""The clocks of commands and poses, and drives put right, cut and kept aside for a diagnosis.
 
 Motion before its command is proof of two clocks; so is motion so late that no delay accounts for it, a drive that
 answers at another time than the others, and a drive that changes its time to answer in the middle. A constant offset
 that leaves a latency which a delay may have is no proof: delay and offset are one number.
 
-Drives cut at long rests: an hour of standing says nothing of motion, and costs as much as an hour of driving.
-Long drives made short enough to fit in seconds: increments are joined, and blocks are shortened.
-Which drives are fitted and which are kept to test on, and the blocks that are left out in turn.
+`read_clocks` measures all this, `put_in_step` puts drives on one clock. `cut_out_long_rests` cuts a log where it stands
+for long: an hour of rest says nothing of motion. `split` chooses which drives are fitted and which are kept aside, in
+blocks that are left out in turn, and `thin` makes long ones short enough to fit in seconds.
 """
 
 import math
@@ -61,7 +61,7 @@ PROOF_BLOCK_S = 5.0
 
 
 class Offset(NamedTuple):
-    """How much later poses are stamped than commands, with a 95 % interval [s]."""
+    """Time by which poses are stamped later than commands, with a 95 % interval [s]."""
 
     value: float
     interval: tuple[float, float]
@@ -72,7 +72,7 @@ NONE = Offset(0.0, (0.0, 0.0))
 
 @dataclass(frozen=True)
 class Clocks:
-    """What a log says of the clocks of its commands and poses.
+    """The clocks of a log's commands and poses.
 
     Attributes:
         latency: From command to motion, beyond the motors' lag, drives of another clock apart [s].
@@ -102,7 +102,7 @@ class Clocks:
 
     @property
     def differ(self) -> bool:
-        """Whether any clock differs from another."""
+        """Tell whether any clock differs from another."""
         return bool(self.offset.value or self.drives or self.jumps)
 
 
@@ -121,7 +121,9 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     drives = gather(log, robot, log.episodes)
     speeds = measured_speeds(drives)
     if not len(speeds.first):
-        return replace(_one_clock(len(log.episodes)), declared_s=log.clock_offset_s)
+        # Drives too short to tell are taken to have one clock.
+        kept_s, later_s = np.tile((0.0, np.inf), (len(log.episodes), 1)), np.zeros(len(log.episodes))
+        return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), later_s, kept_s, log.clock_offset_s)
     squares, latencies, apart = _squares(log, drives, speeds)
     kept, jumps = stretches(log, squares, latencies)
     varied = not _is_rare(len({jump.drive for jump in jumps}), len(log.episodes))
@@ -150,35 +152,25 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
 
 
 def _is_rare(count: int, drives: int) -> bool:
-    """Whether so few drives are odd that it may be their clocks.
+    """Tell whether so few drives are odd that it may be their clocks.
 
     A robot whose lag is another in every manoeuvre, as one that ramps its duties, has many.
     """
     return count <= max(1.0, RARE * drives)
 
 
-def _one_clock(episodes: int) -> Clocks:
-    """The clocks of drives too short to tell: taken as one."""
-    kept = np.tile((0.0, np.inf), (episodes, 1))
-    return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), np.zeros(episodes), kept)
-
-
 def _squares(log: Log, drives: Drives, speeds: Speeds) -> tuple[Blocks, Floats, bool]:
-    """What the best reaction leaves of blocks, the latencies that is given at, and whether its own is impossible."""
+    """Squares of blocks that the best reaction leaves, their latencies, and whether its own is impossible."""
     best, apart = _reaction(drives, speeds)
-    latencies = best.latency_s + _grid(_reach(drives))
+    count = int(_reach(drives) / STEP_S)
+    latencies = best.latency_s + np.arange(-count, count + 1) * STEP_S
     ends = np.array([len(e.times) for e in log.episodes]) * round(drives.tick_hz / log.rate_hz)
     squares = squares_by_latency(drives, speeds, best, latencies, ends)
     return Blocks(*sum_in_blocks(LATENCY_BLOCK_S, drives, speeds, squares)), latencies, apart
 
 
-def _grid(reach_s: float) -> Floats:
-    count = int(reach_s / STEP_S)
-    return np.arange(-count, count + 1) * STEP_S
-
-
 def _reach(drives: Drives) -> float:
-    """How far apart clocks are looked for: no further than drives are long."""
+    """Time by which clocks are looked for apart: no further than drives are long."""
     return float(np.clip(drives.last.max() / drives.tick_hz / 3.0, 0.5, FURTHEST_S))
 
 
@@ -188,7 +180,7 @@ def _offset(latency: Latency, besides: float) -> Offset:
 
 
 def _is_impossible(latency: Latency) -> bool:
-    """Whether no delay accounts for this latency."""
+    """Tell whether no delay accounts for this latency."""
     half = 1.96 * latency.deviation
     early = latency.value + half < 0.0 and latency.value < -EARLIEST_S
     return early or latency.value - half > PARAMETERS["delay"].high

@@ -1,33 +1,310 @@
-"""From a log to a verdict: what the declared model leaves over, which effect explains it, and what that is worth."""
+"""The diagnosis of a robot's motion: what its declared model leaves over, the effects that explain it, and their use.
 
-from collections.abc import Iterable
-from dataclasses import replace
+`diagnose` goes through the whole house: clocks, fit, forward selection, multistep fit, model discrepancy, and errors on
+drives kept aside. Its verdict compares the error of open-loop prediction that is left with the bracket of what a right
+model could have: from what the noise of measured poses alone makes, to the lowest error that any model reached.
+"""
 
-from proxytune.diagnosis.answer import Diagnosis, Estimate, HorizonError, KeptAside, horizon_error, main_error, verdict
-from proxytune.diagnosis.motion.clocks import Parts, all_drives, cut_into_blocks, cut_out_long_rests, read_clocks, split
-from proxytune.diagnosis.motion.discrepancy_match import Learning, learn
-from proxytune.diagnosis.motion.effect_size import Worth, invisible_effects, two_robots, worth
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from proxytune.diagnosis.answer import RULES, Estimate, Progress, Rules, verdict
+from proxytune.diagnosis.motion.clocks import (
+    Clocks,
+    Parts,
+    all_drives,
+    cut_into_blocks,
+    cut_out_long_rests,
+    read_clocks,
+    split,
+)
+from proxytune.diagnosis.motion.discrepancy import Learning, learn
+from proxytune.diagnosis.motion.drives import Drives, Floats
+from proxytune.diagnosis.motion.effect_size import (
+    EffectSize,
+    RobotClusters,
+    find_robot_clusters,
+    invisible_effects,
+    measure_effect_size,
+)
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Findings, Variant
 from proxytune.diagnosis.motion.fitting import Fit, check_motion, check_units, intervals
-from proxytune.diagnosis.motion.manoeuvres import next_manoeuvre
+from proxytune.diagnosis.motion.innovations import Noise, at_edge
+from proxytune.diagnosis.motion.manoeuvres import Manoeuvre, next_manoeuvre
 from proxytune.diagnosis.motion.multistep_fit import (
     HORIZONS_S,
-    Polish,
+    MultistepFit,
+    PoseNoise,
     bullet_pose_errors,
+    fit_multistep,
     has_body,
-    polish_fit,
+    noise_floor,
     pose_noise,
 )
+from proxytune.diagnosis.motion.prediction import (
+    Ratio,
+    Repeated,
+    Rmse,
+    Windows,
+    blocks_of,
+    compare_repeats,
+    cut,
+    pose_errors,
+    ratio,
+    rmse,
+)
 from proxytune.diagnosis.motion.screening import MOTION_EFFECTS, motion_effects
-from proxytune.diagnosis.motion.selection import Report, fit_declared, name_effects
+from proxytune.diagnosis.motion.selection import fit_declared, select_effects
 from proxytune.driving import Robot
 from proxytune.effects import DECLARED, SHIPPED, Catalogue, effect_of
 from proxytune.errors import LogError
 from proxytune.logs import Log
 from proxytune.settings import nearest
+from proxytune.space import Theta
 
 CONFIRMED_S = 2.0
 """The horizon at which errors are confirmed on the bullet plant."""
+
+MAIN_S = 2.0
+"""The horizon of the one error that stands for all."""
+
+
+class Bracket(NamedTuple):
+    """The two errors between which that of a right model lies.
+
+    Attributes:
+        lower: What the noise of measured poses alone makes [m].
+        upper: What a right model might have by chance where this was the lowest error that any model reached, less what
+            drives repeat of it [m].
+        reached: The lowest error that any model reached [m].
+        again: What drives from the same commands say; None where too few were driven.
+    """
+
+    lower: float
+    upper: float
+    reached: float
+    again: Repeated | None
+
+
+def bracket(lower: float, reached: float, again: Repeated | None, rules: Rules = RULES) -> Bracket:
+    """Bracket the error of a right model; the lower end is an estimate too, and never above what a model reached.
+
+    Args:
+        lower: What the noise of poses makes [m].
+        reached: The lowest error of any model [m].
+        again: What drives from the same commands say.
+        rules: Of the diagnosis.
+    """
+    lower = min(lower, reached)
+    upper = reached
+    if again is not None:
+        # All of the error is noise in windows that were driven once.
+        most = min(reached, again.apart * again.share.interval[1] / again.share.value)
+        upper = float(np.sqrt((1.0 - again.part) * reached**2 + again.part * most**2))
+    return Bracket(lower, max(lower, rules.lowest_by_chance * upper), reached, again)
+
+
+def is_explained(after: float, floor: Bracket, *, unnamed: bool, rules: Rules = RULES) -> bool | None:
+    """Tell whether the error that is left is no more than noise; None where it is larger, and shows no structure.
+
+    Args:
+        after: The error that is left [m].
+        floor: The floor's bracket at the same horizon.
+        unnamed: Whether a signal explains more of the rest than any named effect.
+        rules: Of the diagnosis.
+    """
+    if _is_at_floor(after, floor, unnamed, rules):
+        return True
+    repeats_more = floor.again is not None and floor.again.share.interval[1] < 1.0 / rules.floor_factor
+    return False if unnamed or repeats_more else None
+
+
+def _is_at_floor(after: float, floor: Bracket, unnamed: bool, rules: Rules) -> bool:
+    """Tell whether an error is no more than noise: of poses, or of what drives do not repeat, or nothing lowers it."""
+    if after <= rules.floor_factor * floor.lower:
+        return True
+    if unnamed or floor.reached < rules.lowers * after:
+        return False
+    if floor.again is not None:
+        return floor.again.share.value >= 1.0 / rules.floor_factor and after <= rules.repeats_alike * floor.again.apart
+    return floor.upper < rules.lowest_by_chance * rules.narrow_bracket * floor.lower
+
+
+@dataclass(frozen=True)
+class HorizonError:
+    """The error of open-loop prediction over windows of one horizon, on drives that were not fitted.
+
+    Attributes:
+        horizon_s: Length of the windows [s].
+        windows: How many there are.
+        before: Position [m] with declared effects only.
+        after: Position [m] with the effects that were found.
+        ratio: After by before.
+        floor: Between which errors a model that is right would be [m].
+        heading_before: Heading [rad].
+        heading_after: Heading [rad].
+        heading_floor: What the noise of measured headings alone makes [rad].
+    """
+
+    horizon_s: float
+    windows: int
+    before: Rmse
+    after: Rmse
+    ratio: Ratio
+    floor: Bracket
+    heading_before: Rmse
+    heading_after: Rmse
+    heading_floor: float
+
+    @property
+    def removable_left(self) -> float | None:
+        """The share of the squared error above the lower floor that is left, None where nothing was above it."""
+        above = self.before.value**2 - self.floor.lower**2
+        left = self.after.value**2 - self.floor.lower**2
+        return max(0.0, left) / above if above > 0.05 * self.before.value**2 else None
+
+
+class KeptAside(NamedTuple):
+    """The drives kept aside, on which errors are measured.
+
+    Attributes:
+        drives: Drives that nothing was fitted to.
+        whole: All drives of their log, in which some may be repeats of others.
+        noise: The noise of their poses.
+    """
+
+    drives: Drives
+    whole: Drives
+    noise: PoseNoise
+
+
+PoseErrors = Callable[[Drives, Theta, Windows], Floats]
+"""Gives the distance of a model's poses from measured ones (M, 2): [m], [rad]."""
+
+
+def horizon_error(
+    found: Findings, tested: KeptAside, horizon_s: float, learnt: Theta, how: PoseErrors = pose_errors
+) -> HorizonError | None:
+    """Measure the error at a horizon, None where too few blocks have a window of it.
+
+    Args:
+        found: The models.
+        tested: What they are tested on.
+        horizon_s: Length of the windows [s].
+        learnt: What the extended model was taught besides its named effects; empty where nothing was.
+        how: How a plant's poses are compared with measured ones.
+    """
+    drives, rules = tested.drives, tested.drives.rules
+    windows = cut(drives, horizon_s)
+    if len(np.unique(drives.block[windows.begin])) < rules.fewest_blocks:
+        return None
+    blocks = blocks_of(drives, windows)
+    before = how(drives, found.declared.theta, windows) ** 2
+    same = found.model.theta == found.declared.theta
+    after = before if same else how(drives, found.model.theta, windows) ** 2
+    lower, turn = noise_floor(drives, windows, tested.noise)
+    besides = [one.beside.theta for one in found.negligible]
+    if learnt:
+        besides.append({**found.model.theta, **learnt})
+    others = [pose_errors(drives, theta, windows) ** 2 for theta in besides]
+    reached = min(float(np.sqrt(squares[:, 0].mean())) for squares in (before, after, *others))
+    return HorizonError(
+        horizon_s=horizon_s,
+        windows=len(windows.begin),
+        before=rmse(before[:, 0], blocks),
+        after=rmse(after[:, 0], blocks),
+        ratio=ratio(after[:, 0], before[:, 0], blocks, rules.ratio_p_value),
+        floor=bracket(lower, reached, compare_repeats(tested.whole, found.model.theta, horizon_s), rules),
+        heading_before=rmse(before[:, 1], blocks),
+        heading_after=rmse(after[:, 1], blocks),
+        heading_floor=turn,
+    )
+
+
+def main_error(errors: Sequence[HorizonError]) -> HorizonError:
+    """The error at the main horizon, which stands for all."""
+    return min(errors, key=lambda error: abs(error.horizon_s - MAIN_S))
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The diagnosis of a model of motion, from one log.
+
+    Attributes:
+        log: The log's name.
+        robot: The robot.
+        verdict: "nothing missing", "explained", "partly explained", "unexplained" or "cannot be told".
+        declared: Declared parameters, fitted without any other effect, by name in θ.
+        theta: All parameters of the extended model, by name in θ.
+        effects: The effects that were added, all of which matter for prediction.
+        negligible: Effects that have evidence, and are not shown to matter for prediction: no part of the model.
+        effect_sizes: The error without each of both by the error with it, on drives that were not fitted, by name and
+            horizon.
+        multistep: The fit of the extended model's parameters to windows, None where single steps tell as well.
+        residual_depends_on: Signals that explain what no named effect does, those of the learnt discrepancy first.
+        errors: On the planar plant, by horizon, shortest first.
+        confirmed: The error over 2 s on the bullet plant, None where the robot has no body for it.
+        could_not_be_seen: Effects that these drives could not have shown.
+        manoeuvre: What to drive to tell rivals apart, or noise from what is missing; None where nothing is asked.
+        parts: The drives that were fitted and tested.
+        found: What the search came to.
+        clocks: Those of the log, and of the log to test on where that is another.
+        robot_clusters: Two groups that the drives fall in as if of two robots, by number, or None.
+        drive_names: Names of the log's drives.
+        learning: What was learnt beside the named effects, and what that is worth.
+    """
+
+    log: str
+    robot: Robot
+    verdict: str
+    declared: Mapping[str, Estimate]
+    theta: Mapping[str, Estimate]
+    effects: tuple[AdoptedEffect, ...]
+    negligible: tuple[AdoptedEffect, ...]
+    effect_sizes: Mapping[str, EffectSize]
+    multistep: MultistepFit | None
+    residual_depends_on: tuple[str, ...]
+    errors: tuple[HorizonError, ...]
+    confirmed: HorizonError | None
+    could_not_be_seen: tuple[str, ...]
+    manoeuvre: Manoeuvre | None
+    parts: Parts
+    found: Findings
+    clocks: tuple[Clocks, ...]
+    robot_clusters: RobotClusters | None
+    drive_names: tuple[str, ...]
+    learning: Learning
+
+    @property
+    def dropped_values(self) -> dict[str, Estimate]:
+        """Values that effects had which do not matter, by name in θ; they are not in the model."""
+        return {
+            name: Estimate(beside.theta[name], (beside.theta[name],) * 2, self.robot.catalogue.parameters[name].unit)
+            for effect, beside, _ in self.found.negligible
+            for name in effect.names
+        }
+
+    def at_edge(self, effect: AdoptedEffect) -> tuple[str, ...]:
+        """Parameters of an effect, by name in θ, that were fitted to an end of their range which is not neutral.
+
+        The effect then stands for something else.
+        """
+        fitted = {name for coordinate in effect.free for name in coordinate} or set(effect.names)
+        known = [name for name in effect.names if name in fitted and name in self.theta]
+        return tuple(name for name in known if at_edge(name, self.theta[name].value, self.robot, self.rules))
+
+    @property
+    def rules(self) -> Rules:
+        """The rules that it went by."""
+        return self.found.model.drives.rules
+
+    @property
+    def noise(self) -> Noise:
+        """Drive and pose noise of the extended model."""
+        return self.found.model.noise
 
 
 def diagnose(
@@ -37,7 +314,8 @@ def diagnose(
     *,
     test: Log | None = None,
     seed: int = 1,
-    report: Report = lambda _: None,
+    report: Progress = lambda _: None,
+    rules: Rules = RULES,
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside.
 
@@ -48,6 +326,7 @@ def diagnose(
         test: Another log to test on; without it a part of the drives is kept.
         seed: Of the null distributions.
         report: Takes a line about each step, as it begins.
+        rules: Thresholds of what is named, believed and told.
 
     Raises:
         LogError: If the log cannot bear the question: too short, no motion, other units.
@@ -61,41 +340,58 @@ def diagnose(
     # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.
     if any(one.offset.value for one in clocks) and "delay" not in names:
         names, start = (*names, "delay"), {**start, "delay": own.assumed_delay_s}
-    parts = split(log, robot, test, clocks)
+    parts = Parts(*(replace(drives, rules=rules) for drives in split(log, robot, test, clocks)))
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
     report("fitting what is declared")
-    found = name_effects(fit_declared(parts.fitted, start, names), seed, report)
+    found = select_effects(fit_declared(parts.fitted, start, names), seed, report)
     report("fitting to windows of prediction")
-    found, polishes = _polish_models(found)
+    declared_fit, before = fit_multistep(found.declared)
+    # Before and after are compared on equal terms.
+    added = found.adopted or found.negligible
+    model, after = fit_multistep(found.model) if added else (declared_fit, before)
+    found = replace(found, declared=declared_fit, model=model)
     report("learning what no named effect explains")
     learning = learn(found, parts.tested, HORIZONS_S)
     report("testing on drives kept aside")
-    whole = all_drives(test or log, robot, clocks[-1])
+    whole = replace(all_drives(test or log, robot, clocks[-1]), rules=rules)
     tested = KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
     errors = tuple(error for h in HORIZONS_S if (error := horizon_error(found, tested, h, learning.theta)) is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
-    answer = _give_verdict(found, learning, main_error(errors))
+    main, unnamed = main_error(errors), bool(found.unnamed_curves) or learning.discrepancy.used
+    explained = is_explained(main.after.value, main.floor, unnamed=unnamed, rules=rules)
+    confirmed = None
+    if has_body(parts.tested):
+        report("confirming on the bullet plant")
+        confirmed = horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors)
+    every = whole if test is None else replace(all_drives(log, robot, own), rules=rules)
+    dropped = tuple(one.effect for one in found.negligible)
+    beside = Variant(found.model.theta, found.model.free)
+    weighed = [DroppedEffect(effect, beside) for effect in found.adopted] + list(found.negligible)
+    seen = {effect_of(name) for name in names} | {effect.effect for effect in (*found.adopted, *dropped)}
     return Diagnosis(
         log=log.name,
         robot=robot,
-        verdict=answer,
-        declared=estimates(found.declared, (), polishes[0]),
-        theta=estimates(found.model, found.adopted, polishes[1]),
+        verdict=verdict(explained, named=bool(found.adopted)),
+        declared=estimates(found.declared, (), before),
+        theta=estimates(found.model, found.adopted, after),
         effects=found.adopted,
-        immaterial=tuple(dropped.effect for dropped in found.immaterial),
-        worth=_weigh_effects(found, parts, seed),
-        polish=polishes[1],
-        residual_depends_on=learning.depends_on(curve.group.name for curve in found.remainder),
+        negligible=dropped,
+        effect_sizes={
+            effect.effect: measure_effect_size(parts.fitted, parts.tested, model_with, effect, seed)
+            for effect, model_with, _ in weighed
+        },
+        multistep=after,
+        residual_depends_on=learning.depends_on(curve.group.name for curve in found.unnamed_curves),
         errors=errors,
-        confirmed=_confirm_on_bullet(found, tested, report),
-        could_not_be_seen=_list_invisible(found, names),
-        manoeuvre=next_manoeuvre(found, again=answer == "cannot be told"),
+        confirmed=confirmed,
+        could_not_be_seen=invisible_effects(found.model, seen),
+        manoeuvre=next_manoeuvre(found, again=explained is None),
         parts=parts,
         found=found,
         clocks=clocks,
-        unlike=two_robots(cut_into_blocks(whole if test is None else all_drives(log, robot, own)), found.model),
+        robot_clusters=find_robot_clusters(cut_into_blocks(every), found.model),
         drive_names=tuple(episode.name for episode in log.episodes),
         learning=learning,
     )
@@ -107,7 +403,7 @@ def declared_effects(robot: Robot) -> tuple[str, ...]:
 
 
 def declared_parameters(effects: Iterable[str], catalogue: Catalogue = SHIPPED) -> tuple[str, ...]:
-    """The names in θ of declared effects' parameters.
+    """List the names in θ of declared effects' parameters.
 
     Raises:
         LogError: If an effect is unknown or does not act on motion.
@@ -121,10 +417,10 @@ def declared_parameters(effects: Iterable[str], catalogue: Catalogue = SHIPPED) 
     return tuple(dict.fromkeys(names))
 
 
-def estimates(fitted: Fit, adopted: Iterable[AdoptedEffect], polish: Polish | None) -> dict[str, Estimate]:
-    """The values of a fitted model with their intervals; the interval of a fixed value has no width."""
+def estimates(fitted: Fit, adopted: Iterable[AdoptedEffect], multistep: MultistepFit | None) -> dict[str, Estimate]:
+    """Give the values of a fitted model with their intervals; the interval of a fixed value has no width."""
     parameters = fitted.drives.robot.catalogue.parameters
-    known = intervals(fitted) | (dict(polish.intervals) if polish else {})
+    known = intervals(fitted) | (dict(multistep.intervals) if multistep else {})
     for effect in adopted:
         if effect.interval is not None:
             known[effect.names[0]] = effect.interval
@@ -132,36 +428,3 @@ def estimates(fitted: Fit, adopted: Iterable[AdoptedEffect], polish: Polish | No
         name: Estimate(value, known.get(name, (value, value)), parameters[name].unit)
         for name, value in fitted.theta.items()
     }
-
-
-def _polish_models(found: Findings) -> tuple[Findings, tuple[Polish | None, Polish | None]]:
-    """Fit both models to windows, where that helps: before and after are compared on equal terms."""
-    declared, before = polish_fit(found.declared)
-    if not found.adopted and not found.immaterial:
-        return replace(found, declared=declared, model=declared), (before, before)
-    model, after = polish_fit(found.model)
-    return replace(found, declared=declared, model=model), (before, after)
-
-
-def _list_invisible(found: Findings, declared: Iterable[str]) -> tuple[str, ...]:
-    seen = {effect.effect for effect in (*found.adopted, *(dropped.effect for dropped in found.immaterial))}
-    return invisible_effects(found.model, set(map(effect_of, declared)) | seen)
-
-
-def _give_verdict(found: Findings, learning: Learning, error: HorizonError) -> str:
-    unnamed = bool(found.remainder) or learning.remainder.used
-    return verdict(error.after.value, error.floor, named=bool(found.adopted), unnamed=unnamed)
-
-
-def _confirm_on_bullet(found: Findings, tested: KeptAside, report: Report) -> HorizonError | None:
-    if not has_body(tested.drives):
-        return None
-    report("confirming on the bullet plant")
-    return horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors)
-
-
-def _weigh_effects(found: Findings, parts: Parts, seed: int) -> dict[str, Worth]:
-    """Weigh every effect on the drives kept aside, the dropped ones too."""
-    model = Variant(found.model.theta, found.model.free)
-    weighed = [DroppedEffect(effect, model) for effect in found.adopted] + list(found.immaterial)
-    return {effect.effect: worth(parts.fitted, parts.tested, beside, effect, seed) for effect, beside, _ in weighed}

@@ -1,33 +1,44 @@
-"""The learnt remainder: what no named effect explains, as curves over features; used only if shown to help.
+"""Model discrepancy: what no named effect explains, learnt as curves over features and used only if shown to help.
 
-The curves that may be learnt from drives: their knots lie where the drives have been.
-The choice of groups of curves by ridge regression, one scale a group, on blocks that are left out.
+    e = Σ_k w_k φ_k(twists) + noise,    w = (Σ φᵀφ + Λ)⁻¹ Σ φᵀe,
+
+with e the errors of poses over windows, linearised in the weights w of curves φ. `offer_curves` lays knots where the
+drives have been; `choose_groups` adds groups of curves by forward selection with a ridge Λ of one scale a group, on
+parts that are left out; `fit_discrepancy` guards the whole by held-out windows (after Kennedy and O'Hagan's model
+discrepancy). `match_named_effect` reads what was learnt back into a name, and `learn` tells what the curves are worth
+on drives that were not fitted, and whether the names do worse than curves alone.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize
 
+from proxytune.diagnosis.answer import Rules
 from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
-from proxytune.diagnosis.motion.innovations import twists_of
+from proxytune.diagnosis.motion.evidence import Findings
+from proxytune.diagnosis.motion.innovations import span, theta_at, twists_of
 from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S
 from proxytune.diagnosis.motion.prediction import (
     FITTED_S,
     Ratio,
+    Rmse,
     Slopes,
     Windows,
     blocks_of,
     cut,
     pose_errors,
     ratio,
+    rmse,
     select_windows,
     slopes_of,
 )
-from proxytune.diagnosis.rules import RULES
-from proxytune.effects import GROUPS, LEVEL, Curve, Knots, Learnt, Seen, learnt_theta
+from proxytune.diagnosis.motion.screening import Candidate, candidates
+from proxytune.driving import Robot
+from proxytune.effects import GROUPS, LEVEL, Curve, Knots, Learnt, Seen, effect_of, learnt_theta
 from proxytune.space import Theta
 
 RARE = 0.002
@@ -65,10 +76,11 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
     turn = yaw * drives.robot.figures["effective_baseline"] / 2.0
     effort = (np.abs(forward - turn) + np.abs(forward + turn)) / 2.0 / drives.robot.figures["full_speed"]
     seconds = float(drives.last.max()) / drives.tick_hz
+    both = product(sorted((0.0, *_corners(forward, GRID[0]))), sorted((0.0, *_corners(yaw, GRID[1]))))
     knots: dict[str, Knots] = {
         "wheel_speed": _corners(np.concatenate((forward - turn, forward + turn)), WHEEL_KNOTS),
         "turn_rate": _corners(yaw, TURN_KNOTS),
-        "speed_and_turn": _pairs(_corners(forward, GRID[0]), _corners(yaw, GRID[1])),
+        "speed_and_turn": tuple((speed, turning) for speed, turning in both if speed or turning),
         LEVEL: (1.0,),
         "transients": TRANSIENTS_S,
         "start": STARTS_S,
@@ -120,12 +132,6 @@ def _corners(signal: Floats, count: int) -> tuple[float, ...]:
     return tuple(kept)
 
 
-def _pairs(speeds: tuple[float, ...], turns: tuple[float, ...]) -> Knots:
-    return tuple(
-        (speed, turn) for speed, turn in product(sorted((0.0, *speeds)), sorted((0.0, *turns))) if speed or turn
-    )
-
-
 def _steps(last: float) -> tuple[float, ...]:
     values = [_round_knot(last * number / TIME_KNOTS) for number in range(1, TIME_KNOTS + 1)]
     return tuple(dict.fromkeys(value for value in values if value > 1e-3))
@@ -152,23 +158,23 @@ ROBUST = 1.5
 class Sums(NamedTuple):
     """Weighted squares by part (P, …): of the columns with each other, with the errors, and of the errors."""
 
-    curve: Floats
-    pull: Floats
+    hessian: Floats
+    gradient: Floats
     size: Floats
 
     def only(self, chosen: Whole) -> "Sums":
         """Some of the parts."""
-        return Sums(self.curve[chosen], self.pull[chosen], self.size[chosen])
+        return Sums(self.hessian[chosen], self.gradient[chosen], self.size[chosen])
 
 
-class Choice(NamedTuple):
+class ChosenGroups(NamedTuple):
     """The weights of all columns, 0 where a group was not chosen, and the squared error that each group took away."""
 
     weights: Floats
     gains: Mapping[str, float]
 
 
-def sums(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
+def sum_squares(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
     """Sum over the poses of each part; errors are counted from weights of 0.
 
     Args:
@@ -177,32 +183,33 @@ def sums(slopes: Slopes, weights: Floats, part: Whole, parts: int) -> Sums:
         part: The part of each pose (M,).
         parts: How many parts there are.
     """
-    errors = slopes.left + slopes.columns @ weights
-    size = np.sqrt((slopes.left**2).sum(axis=1))
+    errors = slopes.residuals + slopes.columns @ weights
+    size = np.sqrt((slopes.residuals**2).sum(axis=1))
     trust = 1.0 / np.sqrt(1.0 + (size / (ROBUST * np.median(size) + 1e-12)) ** 2)
-    curve = []
+    hessian = []
     for number in range(parts):
         own = part == number
         columns = slopes.columns[own].reshape(-1, slopes.columns.shape[2])
-        curve.append((columns * np.repeat(trust[own], 3)[:, None]).T @ columns)
-    pull = sum_by(part, np.einsum("mck,mc,m->mk", slopes.columns, errors, trust), parts)
-    return Sums(np.stack(curve), pull, sum_by(part, (errors**2).sum(axis=1) * trust, parts))
+        hessian.append((columns * np.repeat(trust[own], 3)[:, None]).T @ columns)
+    gradient = sum_by(part, np.einsum("mck,mc,m->mk", slopes.columns, errors, trust), parts)
+    return Sums(np.stack(hessian), gradient, sum_by(part, (errors**2).sum(axis=1) * trust, parts))
 
 
-def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
+def choose_groups(given: Sums, groups: Mapping[str, Whole], rules: Rules) -> ChosenGroups:
     """Add groups one by one, the best first, as long as they pay on parts that are left out; the level is always there.
 
     Args:
         given: Sums over the parts.
         groups: The columns of each group.
+        rules: Of the diagnosis.
     """
-    mean = given.curve.sum(axis=0).diagonal()
+    mean = given.hessian.sum(axis=0).diagonal()
     pulls = {name: FREE for name in groups if name == LEVEL}
     gains: dict[str, float] = {}
     (losses,) = _held_out_losses(given, *_penalise(groups, [pulls], mean))
     while True:
         tried = {name: _try_group(given, groups, pulls, name, mean) for name in groups if name not in pulls}
-        paying = {name: found for name, found in tried.items() if _pays(losses, found[1])}
+        paying = {name: found for name, found in tried.items() if _pays(losses, found[1], rules)}
         if not paying:
             break
         best = min(paying, key=lambda name: float(paying[name][1].sum()))
@@ -211,9 +218,9 @@ def choose(given: Sums, groups: Mapping[str, Whole]) -> Choice:
         losses = after
     weights = np.zeros(len(mean))
     columns, (penalty,) = _penalise(groups, [pulls], mean)
-    total = given.curve.sum(axis=0)[np.ix_(columns, columns)]
-    weights[columns] = np.linalg.solve(total + np.diag(penalty), given.pull.sum(axis=0)[columns])
-    return Choice(weights, gains)
+    total = given.hessian.sum(axis=0)[np.ix_(columns, columns)]
+    weights[columns] = np.linalg.solve(total + np.diag(penalty), given.gradient.sum(axis=0)[columns])
+    return ChosenGroups(weights, gains)
 
 
 def _try_group(
@@ -230,10 +237,10 @@ def _try_group(
     return ridges[-1], found[-1]
 
 
-def _pays(before: Floats, after: Floats) -> bool:
+def _pays(before: Floats, after: Floats, rules: Rules) -> bool:
     gain = before - after
     spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-    return bool(gain.sum() > RULES.group_share * before.sum() and gain.sum() > RULES.group_t * spread)
+    return bool(gain.sum() > rules.group_share * before.sum() and gain.sum() > rules.group_t * spread)
 
 
 def _penalise(
@@ -258,11 +265,11 @@ def _penalise(
 
 def _held_out_losses(given: Sums, columns: Whole, penalties: Floats) -> Floats:
     """The squared error of each part with weights from all others, under each penalty (R, K): (R, P)."""
-    curve, pull = given.curve[:, columns[:, None], columns], given.pull[:, columns]
-    rest = curve.sum(axis=0) - curve + penalties[:, None, :, None] * np.eye(len(columns))
-    weights = np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[..., 0]
-    bent = (weights * (curve @ weights[..., None])[..., 0]).sum(axis=-1)
-    return np.asarray(given.size - 2.0 * (weights * pull).sum(axis=-1) + bent)
+    hessian, gradient = given.hessian[:, columns[:, None], columns], given.gradient[:, columns]
+    rest = hessian.sum(axis=0) - hessian + penalties[:, None, :, None] * np.eye(len(columns))
+    weights = np.linalg.solve(rest, (gradient.sum(axis=0) - gradient)[:, :, None])[..., 0]
+    bent = (weights * (hessian @ weights[..., None])[..., 0]).sum(axis=-1)
+    return np.asarray(given.size - 2.0 * (weights * gradient).sum(axis=-1) + bent)
 
 
 PARTS = 16
@@ -276,8 +283,8 @@ ROUNDS = 2
 
 
 @dataclass(frozen=True)
-class Remainder:
-    """What was learnt beside a model.
+class Discrepancy:
+    """The discrepancy of a model, as curves were fitted to it.
 
     Attributes:
         theta: Its values by their names in θ, empty where no group pays.
@@ -294,8 +301,8 @@ class Remainder:
     held_out: Floats = field(default_factory=lambda: np.empty(0))
 
 
-def remainder(drives: Drives, theta: Theta, promises: Callable[[Floats], bool] = lambda _: True) -> Remainder:
-    """Fit what a model leaves over of its windows, and say whether that helps.
+def fit_discrepancy(drives: Drives, theta: Theta, promises: Callable[[Floats], bool] = lambda _: True) -> Discrepancy:
+    """Fit the discrepancy of a model over windows, and say whether that helps.
 
     Args:
         drives: What the model was fitted to.
@@ -306,57 +313,41 @@ def remainder(drives: Drives, theta: Theta, promises: Callable[[Floats], bool] =
     windows = cut(drives, FITTED_S)
     blocks = len(np.unique(drives.block[windows.begin]))
     before = pose_errors(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
-    if blocks < RULES.remainder_parts:
-        return Remainder(held_out=before)
-    whole, folds = _fit_curves(drives, theta)
-    if not whole.gains:
-        return Remainder(held_out=before)
+    if blocks < drives.rules.discrepancy_blocks:
+        return Discrepancy(held_out=before)
+    learnt, gains, folds = _fit_curves(drives, theta)
+    if not gains:
+        return Discrepancy(held_out=before)
     after = _cross_validate(drives, theta, folds, windows)
     if not promises(after):
-        return Remainder(held_out=after)
+        return Discrepancy(held_out=after)
     guard = _guard(drives, theta, folds, {FITTED_S: (before, after)})
-    total = sum(whole.gains.values())
-    share = {GROUPS[group].title: gain / total for group, gain in whole.gains.items()}
-    return Remainder(whole.theta, share, guard, _helps(guard), after)
+    total = sum(gains.values())
+    share = {GROUPS[group].title: gain / total for group, gain in gains.items()}
+    return Discrepancy(learnt, share, guard, _helps(guard, drives.rules), after)
 
 
-@dataclass(frozen=True)
-class _CurveFit:
-    """A fit's values by their names in θ, and what each group gained."""
-
-    theta: Mapping[str, float]
-    gains: Mapping[str, float]
-
-
-def _fit_curves(drives: Drives, theta: Theta) -> tuple[_CurveFit, list[_CurveFit]]:
-    """Fit the curves to all parts, and without each fold in turn."""
+def _fit_curves(drives: Drives, theta: Theta) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
+    """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ."""
     offer, parts = offer_curves(drives, theta), _parts(drives)
-    groups = _columns(offer)
+    names = np.array([curve.group for curve in offer.curves for _ in curve.knots])
+    groups = {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist())}
     weights = np.zeros(sum(len(curve.knots) for curve in offer.curves))
     now: Mapping[str, float] = {}
     for _ in range(ROUNDS):
         slopes = slopes_of(drives, {**theta, **now}, offer)
-        given = sums(slopes, weights, slopes.block % parts, parts)
-        choice = choose(given, groups)
-        weights, now = choice.weights, _theta(offer, choice)
-        if not choice.gains:
+        given = sum_squares(slopes, weights, slopes.block % parts, parts)
+        chosen = choose_groups(given, groups, drives.rules)
+        weights, now = chosen.weights, _theta(offer, chosen)
+        if not chosen.gains:
             break
-    folds = [_fit_without_fold(offer, given, groups, fold) for fold in range(FOLDS)] if now else []
-    return _CurveFit(now, choice.gains), folds
+    number = np.arange(parts) % FOLDS
+    without = [given.only(number != fold) for fold in range(FOLDS)] if now else []
+    folds = [_theta(offer, choose_groups(some, groups, drives.rules)) for some in without]
+    return now, chosen.gains, folds
 
 
-def _fit_without_fold(offer: Learnt, given: Sums, groups: Mapping[str, Whole], fold: int) -> _CurveFit:
-    choice = choose(given.only(np.arange(len(given.size)) % FOLDS != fold), groups)
-    return _CurveFit(_theta(offer, choice), choice.gains)
-
-
-def _columns(offer: Learnt) -> dict[str, Whole]:
-    """The columns of each group."""
-    names = np.array([curve.group for curve in offer.curves for _ in curve.knots])
-    return {name: np.flatnonzero(names == name) for name in dict.fromkeys(names.tolist())}
-
-
-def _theta(offer: Learnt, choice: Choice) -> dict[str, float]:
+def _theta(offer: Learnt, choice: ChosenGroups) -> dict[str, float]:
     """The chosen groups with their weights, by their names in θ."""
     if not choice.gains:
         return {}
@@ -371,23 +362,23 @@ def _theta(offer: Learnt, choice: Choice) -> dict[str, float]:
 
 
 def _guard(
-    drives: Drives, theta: Theta, folds: list[_CurveFit], known: Mapping[float, tuple[Floats, Floats]]
+    drives: Drives, theta: Theta, folds: Sequence[Theta], known: Mapping[float, tuple[Floats, Floats]]
 ) -> dict[float, Ratio]:
     """The ratios of held-out errors with and without curves, by horizon; squares of some are known already."""
     found = {}
     for horizon_s in HORIZONS_S:
         windows = cut(drives, horizon_s)
         blocks = blocks_of(drives, windows)
-        if len(np.unique(blocks)) >= RULES.remainder_parts:
+        if len(np.unique(blocks)) >= drives.rules.discrepancy_blocks:
             before, after = known.get(horizon_s) or (
                 pose_errors(drives, theta, windows)[:, 0] ** 2,
                 _cross_validate(drives, theta, folds, windows),
             )
-            found[horizon_s] = ratio(after, before, blocks)
+            found[horizon_s] = ratio(after, before, blocks, drives.rules.ratio_p_value)
     return found
 
 
-def _cross_validate(drives: Drives, theta: Theta, folds: list[_CurveFit], windows: Windows) -> Floats:
+def _cross_validate(drives: Drives, theta: Theta, folds: Sequence[Theta], windows: Windows) -> Floats:
     """Squared distance at every compared pose (M,), each predicted by the fit that left its block out."""
     squares = np.empty(len(windows.increment))
     fold_of = drives.block[windows.begin] % _parts(drives) % FOLDS
@@ -395,15 +386,170 @@ def _cross_validate(drives: Drives, theta: Theta, folds: list[_CurveFit], window
         own = fold_of == number
         if own.any():
             part = select_windows(windows, own)
-            squares[own[windows.window]] = pose_errors(drives, {**theta, **fold.theta}, part)[:, 0] ** 2
+            squares[own[windows.window]] = pose_errors(drives, {**theta, **fold}, part)[:, 0] ** 2
     return squares
 
 
 def _parts(drives: Drives) -> int:
-    """How many parts blocks are dealt out to."""
+    """The number of parts that blocks are dealt out to."""
     return min(PARTS, int(drives.block.max()) + 1)
 
 
-def _helps(guard: Mapping[float, Ratio]) -> bool:
-    helps = any(one.value < RULES.remainder_helps and one.below for one in guard.values())
-    return helps and all(one.value <= RULES.remainder_harms for one in guard.values())
+def _helps(guard: Mapping[float, Ratio], rules: Rules) -> bool:
+    helps = any(one.value < rules.discrepancy_helps and one.below for one in guard.values())
+    return helps and all(one.value <= rules.discrepancy_harms for one in guard.values())
+
+
+PROMISING = 3
+"""So many forms are tuned, those whose probes gain most."""
+
+EVALUATIONS = 25
+"""So often the windows are replayed to tune one."""
+
+
+class MatchedEffect(NamedTuple):
+    """A named effect that keeps most of what curves gain.
+
+    Attributes:
+        effect: Its name.
+        form: What is special about its form.
+        theta: Its values by their names in θ.
+        share: The share of the gain that it keeps; it was tuned to all windows, the curves to others than these.
+    """
+
+    effect: str
+    form: str
+    theta: Mapping[str, float]
+    share: float
+
+
+def match_named_effect(
+    drives: Drives, theta: Theta, discrepancy: Discrepancy, taken: Iterable[str]
+) -> MatchedEffect | None:
+    """Find the named effect that removes as much error as the learnt curves, if one keeps most of their gain.
+
+    Args:
+        drives: What both were fitted to.
+        theta: The model beside which the curves were learnt.
+        discrepancy: The curves.
+        taken: Names of effects that the model has.
+    """
+    windows = cut(drives, FITTED_S)
+
+    def loss(candidate: Candidate, values: Floats) -> float:
+        low, high = np.array([span(coordinate, drives.robot) for coordinate in candidate.free]).T
+        moved = theta_at({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
+        return float(np.mean(pose_errors(drives, moved, windows)[:, 0] ** 2))
+
+    plain = float(np.mean(pose_errors(drives, theta, windows)[:, 0] ** 2))
+    gained = plain - float(discrepancy.held_out.mean())
+    if gained <= 0.0:
+        return None
+    forms = candidates(drives.robot, theta, taken)
+    probed = [min((loss(one, np.array(p)), number, p) for p in one.probes) for number, one in enumerate(forms)]
+    tuned = [
+        _tune(forms[number], np.array(probe), loss, drives.robot) for _, number, probe in sorted(probed)[:PROMISING]
+    ]
+    least, form, values = min(tuned, key=lambda found: found[0])
+    share = (plain - least) / gained
+    found = theta_at(form.fixed, form.free, values)
+    return MatchedEffect(form.effect, form.form, found, share) if share >= drives.rules.match_share else None
+
+
+def _tune(
+    form: Candidate, probe: Floats, loss: Callable[[Candidate, Floats], float], robot: Robot
+) -> tuple[float, Candidate, Floats]:
+    """The least loss of a form near a probe, and where it is."""
+    low, high = np.array([span(coordinate, robot) for coordinate in form.free]).T
+    start = (probe - low) / (high - low)
+    simplex = np.vstack((start, start + np.eye(len(start)) * np.where(start < 0.9, 0.1, -0.1)))
+
+    def left(shares: Floats, *_: Any, **__: Any) -> float:
+        return loss(form, low + shares * (high - low))
+
+    options: Any = {"initial_simplex": simplex, "maxfev": EVALUATIONS}
+    found = minimize(left, start, method="Nelder-Mead", options=options)
+    return float(found.fun), form, np.clip(low + found.x * (high - low), low, high)
+
+
+class LearntError(NamedTuple):
+    """The error with names and learnt curves, on drives that were not fitted.
+
+    Attributes:
+        horizon_s: Length of the windows [s].
+        after: Position [m].
+        heading: Heading [rad].
+        ratio: Position, by that with names alone.
+    """
+
+    horizon_s: float
+    after: Rmse
+    heading: Rmse
+    ratio: Ratio
+
+
+@dataclass(frozen=True)
+class Learning:
+    """The learnt discrepancy and what it is worth.
+
+    Attributes:
+        discrepancy: The curves, beside all named effects.
+        errors: What they are worth, by horizon, shortest first; empty where they are not used.
+        names_doubtful: Whether curves beside what is declared alone predict clearly better: then the names are wrong.
+        looks_like: The named effect that would do nearly as well as the curves, or None.
+    """
+
+    discrepancy: Discrepancy
+    errors: tuple[LearntError, ...]
+    names_doubtful: bool
+    looks_like: MatchedEffect | None = None
+
+    @property
+    def theta(self) -> Mapping[str, float]:
+        """The parameters of the curves that are used, by name in θ; empty where none are."""
+        return self.discrepancy.theta if self.discrepancy.used else {}
+
+    def depends_on(self, others: Iterable[str]) -> tuple[str, ...]:
+        """The signals of the curves that are used, largest share first, and others, each once."""
+        share = self.discrepancy.share if self.discrepancy.used else {}
+        return tuple(dict.fromkeys([*sorted(share, key=lambda title: -share[title]), *others]))
+
+
+def learn(found: Findings, tested: Drives, horizons_s: Iterable[float]) -> Learning:
+    """Learn what the named effects leave over, and test it.
+
+    Args:
+        found: The models, fitted.
+        tested: Drives that were not fitted.
+        horizons_s: Lengths of the windows that are told [s].
+    """
+    beside = fit_discrepancy(found.model.drives, found.model.theta)
+    errors = [_error(found, beside, tested, horizon_s) for horizon_s in horizons_s] if beside.used else []
+    known = tuple(error for error in errors if error is not None)
+    taken = {effect_of(name) for name in found.model.theta}
+    like = match_named_effect(found.model.drives, found.model.theta, beside, taken) if beside.used else None
+    return Learning(beside, known, _names_are_doubtful(found, beside), like)
+
+
+def _error(found: Findings, beside: Discrepancy, drives: Drives, horizon_s: float) -> LearntError | None:
+    windows = cut(drives, horizon_s)
+    blocks = blocks_of(drives, windows)
+    if len(np.unique(blocks)) < 2:
+        return None
+    names = pose_errors(drives, found.model.theta, windows) ** 2
+    both = pose_errors(drives, {**found.model.theta, **beside.theta}, windows) ** 2
+    compared = ratio(both[:, 0], names[:, 0], blocks, drives.rules.ratio_p_value)
+    return LearntError(horizon_s, rmse(both[:, 0], blocks), rmse(both[:, 1], blocks), compared)
+
+
+def _names_are_doubtful(found: Findings, beside: Discrepancy) -> bool:
+    if not found.adopted or not len(beside.held_out):
+        return False
+    drives = found.model.drives
+    blocks = blocks_of(drives, cut(drives, FITTED_S))
+
+    def does_better(alone: Floats) -> bool:
+        compared = ratio(alone, beside.held_out, blocks, drives.rules.ratio_p_value)
+        return compared.value < drives.rules.doubtful_names and compared.below
+
+    return fit_discrepancy(drives, found.declared.theta, does_better).used

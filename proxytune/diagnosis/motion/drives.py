@@ -1,10 +1,9 @@
-"""Measured drives as arrays: commands on a fine grid of ticks, motion between measured poses.
+"""Measured drives as arrays: commands on a fine grid of ticks, and motion between measured poses.
 
-Cosine and sine of many angles.
-The latest results of a function, kept by all that determines them.
-Commands of a log as fractions of full speed, each held from its own time.
-Poses that were measured between samples, and paths at those instants.
-The robot that drove a log: one of robots/, or what the log says of its own.
+`robot_of` finds the robot that drove a log, `gather` makes one batch of `Drives` of its episodes: every command is a
+fraction of full speed, held from its own time until the next (zero-order hold) and averaged over ticks; two measured
+poses in a row make an increment of N in all, in the body frame of the first. A pose may have been measured between two
+samples: paths are then read at that instant. Drives carry the rules that a diagnosis of them goes by.
 """
 
 import math
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import SHIPPED, Catalogue
 from proxytune.errors import LogError
@@ -103,8 +103,7 @@ class Commands(NamedTuple):
     def over_ticks(self, length: int, tick_hz: float) -> Floats:
         """The mean of the command in force over each tick (length, 2); each is held from its own time."""
         if self.ticks_each:
-            held = np.repeat(self.duties, self.ticks_each, axis=0)
-            return np.concatenate((held, np.repeat(held[-1:], length - len(held), axis=0)))
+            return _hold(self.duties, self.ticks_each, length)
         ends = np.array((min(0.0, self.times[0]) - 1.0, *self.times, max(length / tick_hz, self.times[-1]) + 1.0))
         held = np.concatenate((self.rest[None], self.duties))
         total = np.concatenate((np.zeros((1, 2)), np.cumsum(held * np.diff(ends)[:, None], axis=0)))
@@ -126,7 +125,9 @@ def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Comm
     Raises:
         LogError: If it has none, or they ask for more than full speed.
     """
-    duties, rest = duties_of(log, robot, episode.commands), _rest(episode, robot)
+    duties, rest = duties_of(log, robot, episode.commands), np.zeros(2)
+    if episode.wheels is not None and np.isfinite(episode.wheels[0]).all():
+        rest = np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
     if episode.issued is None:
         return Commands(np.arange(len(duties)) / log.rate_hz, duties, rest, ticks)
     times = episode.issued - episode.times[0]
@@ -135,16 +136,9 @@ def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Comm
 
 
 def commands_a_second(log: Log, episodes: Sequence[LogEpisode]) -> float:
-    """How often commands are issued: with the samples, or at the usual interval between their own times."""
+    """Commands a second: one a sample, or one at the usual interval between their own times."""
     between = [np.diff(e.issued) for e in episodes if e.issued is not None and len(e.issued) > 1]
     return 1.0 / float(np.median(np.concatenate(between))) if between else log.rate_hz
-
-
-def _rest(episode: LogEpisode, robot: Robot) -> Floats:
-    """What the wheels did before the first row: turned as measured, or stood."""
-    if episode.wheels is None or not np.isfinite(episode.wheels[0]).all():
-        return np.zeros(2)
-    return np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
 
 
 Whole = NDArray[Any]
@@ -214,6 +208,7 @@ class Drives:
         wheels: Measured wheel speeds at each tick as fractions of full speed (E, T, 2), or None.
         after: How long after the ticks `first` and `last` its poses were measured, or before (N, 2) [ticks]; None
             where poses lie on ticks.
+        rules: Of a diagnosis of them.
     """
 
     robot: Robot
@@ -232,6 +227,7 @@ class Drives:
     travel: Floats
     wheels: Floats | None
     after: Floats | None = None
+    rules: Rules = RULES
 
     @cached_property
     def measured(self) -> Floats:
@@ -250,7 +246,7 @@ class Drives:
 
     @cached_property
     def angles(self) -> Floats:
-        """How far each wheel has turned in its episode by the measured motion (E, T, 2) [rad], interpolated."""
+        """Angles by which each wheel has turned in its episode by the measured motion (E, T, 2) [rad], interpolated."""
         figures = self.robot.figures
         turn = self.measured[:, 2] * figures["effective_baseline"] / 2.0
         wheels = np.stack((self.measured[:, 0] - turn, self.measured[:, 0] + turn), axis=1) / figures["wheel_radius"]
@@ -268,11 +264,11 @@ class Drives:
 
     @property
     def seconds(self) -> float:
-        """How long the increments last together [s]."""
+        """Seconds that the increments last together."""
         return float((self.last - self.first).sum() / self.tick_hz)
 
     def along(self, walked: Floats, path: Whole, increment: Whole, begin: Whole | int = 0, *, end: bool) -> Floats:
-        """Where paths (P, T + 1, 3) are when the poses of increments were measured (M, 3).
+        """Read paths (P, T + 1, 3) at the instants at which the poses of increments were measured (M, 3).
 
         Args:
             walked: Paths by their ticks.
@@ -287,7 +283,7 @@ class Drives:
         return path_between(walked, path, tick + self.after[increment, int(end)])
 
     def only(self, chosen: NDArray[np.bool_]) -> "Drives":
-        """The same drives with some of their increments."""
+        """Keep some of their increments."""
         kept = np.flatnonzero(chosen)
         follows = np.concatenate(([False], np.diff(kept) == 1))
         _, block = np.unique(self.block[kept], return_inverse=True)
@@ -296,7 +292,7 @@ class Drives:
         return replace(self, **parts, linked=self.linked[kept] & follows, block=block, after=after)
 
     def some(self, episodes: Whole) -> "Drives":
-        """The same drives with some of their episodes (K,), in ascending order, numbered anew."""
+        """Keep some of their episodes (K,), in ascending order, numbered anew."""
         rest = self.only(np.isin(self.episode, episodes))
         parts = {name: getattr(self, name)[episodes] for name in ("duties", "issued", "rest", "headings")}
         wheels = None if self.wheels is None else self.wheels[episodes]
@@ -350,15 +346,15 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode]) -> Drives:
     return drives.only(rows[:, 1] - rows[:, 0] <= GAP_S * log.rate_hz)
 
 
-def _ticks(rows: Floats, ticks: int, length: int) -> Floats:
-    """Rows held for some ticks each, the last one until the end."""
+def _hold(rows: Floats, ticks: int, length: int) -> Floats:
+    """Hold rows for some ticks each, the last one until the end."""
     held = np.repeat(rows, ticks, axis=0)
     return np.concatenate((held, np.repeat(held[-1:], length - len(held), axis=0)))
 
 
 def _wheels(robot: Robot, episodes: Sequence[LogEpisode], ticks: int, length: int) -> Floats | None:
     unit = robot.figures["wheel_radius"] / robot.figures["full_speed"]
-    measured = [_ticks(e.wheels * unit, ticks, length) for e in episodes if e.wheels is not None]
+    measured = [_hold(e.wheels * unit, ticks, length) for e in episodes if e.wheels is not None]
     whole = len(measured) == len(episodes) and all(np.isfinite(wheels).all() for wheels in measured)
     return np.stack(measured) if whole else None
 
@@ -384,7 +380,7 @@ def _samples(episode: LogEpisode, rate_hz: float) -> Whole:
 
 
 def _travel(number: Whole, poses: Floats, rows: Whole, rate_hz: float) -> Floats:
-    """How far each increment goes, from the chord over half a second round it."""
+    """The way of each increment, from the chord over half a second round it."""
     reach = max(1, round(0.25 * rate_hz / max(1.0, float(np.median(rows[:, 1] - rows[:, 0])))))
     index = np.arange(len(rows))
     ends = np.concatenate((np.flatnonzero(np.diff(number)), [len(rows) - 1]))

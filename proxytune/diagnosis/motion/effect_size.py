@@ -1,11 +1,14 @@
-"""Which of the named effects matter: what each is worth in error of prediction, whatever its evidence.
+"""The size of an effect: how much larger the error of prediction is without it, whatever its evidence.
 
-On much data an effect of a millimetre has clear evidence. It is kept only if a model without it, all else fitted again,
-predicts worse. Effects are weighed on the fitted drives, each block predicted by what was fitted to others, so that the
-drives kept aside can tell what that came to.
+On much data an effect of a millimetre has clear evidence. With a the error over windows of a horizon of the model with
+the effect, and b that of the model without it, all else fitted again, its size is b / a with a 95 % interval. An effect
+that draws at random moves no mean: with s the distance of drawn and expected replays and e the error, the error without
+the draws would be √(e² − s²), and its size is e / √(e² − s²). `drop_negligible` drops effects whose size is not shown
+to be above `rules.material_factor`, on the fitted drives, each block predicted by what was fitted to others, so that
+the drives kept aside can tell what that came to (`measure_effect_size`).
 
-The effects that these drives could not have shown: their usual sizes leave too little trace.
-Are all drives of one robot, on one floor? Each wheel's gain, as every drive alone would have it.
+The same traces of effects say which effects these drives could not have shown (`invisible_effects`), and the wheels'
+gains of single drives whether all are of one robot (`find_robot_clusters`).
 """
 
 import math
@@ -15,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.diagnosis.motion.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Findings, Variant, without_effect
 from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, evaluate, fit, slopes
@@ -40,7 +44,6 @@ from proxytune.diagnosis.motion.multistep_fit import (
 from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_along, pose_errors, ratio, rmse
 from proxytune.diagnosis.motion.random_effects import responses
 from proxytune.diagnosis.motion.screening import Candidate, candidates, motion_effects, project_out
-from proxytune.diagnosis.rules import RULES
 
 FITTED_S = 2.0
 """Windows that models with and without an effect are fitted to, the longest that drives have up to this."""
@@ -51,35 +54,31 @@ DRAWS = 10
 LARGEST_SHARE = 0.95
 """A random effect is said to make up no more of the error than this share, even if its draws stray further."""
 
-Worth = Mapping[float, Ratio]
+EffectSize = Mapping[float, Ratio]
 """The error without an effect by the error with it, by horizon [s]."""
 
 
 class WeighedEffect(NamedTuple):
-    """An effect, and the error without it by the error with it."""
+    """An effect with its size, judged by rules."""
 
     effect: AdoptedEffect
-    worth: Worth
+    size: EffectSize
+    rules: Rules = RULES
 
     @property
     def material(self) -> bool:
-        """Whether predictions are shown to need it; draws add to the error at every horizon: one is not enough."""
-        shown = sum(one.value >= RULES.material_factor and one.above for one in self.worth.values())
-        return shown >= (1 if self.effect.free else min(2, len(self.worth)))
+        """Tell whether predictions are shown to need it; draws add to the error at every horizon: one is not enough."""
+        shown = sum(one.value >= self.rules.material_factor and one.above for one in self.size.values())
+        return shown >= (1 if self.effect.free else min(2, len(self.size)))
 
     @property
     def harmful(self) -> bool:
-        """Whether predictions are shown to be better without it."""
-        return any(one.value <= 1.0 / RULES.material_factor and one.below for one in self.worth.values())
-
-    @property
-    def largest(self) -> float:
-        """The largest of the ratios."""
-        return max(one.value for one in self.worth.values())
+        """Tell whether predictions are shown to be better without it."""
+        return any(one.value <= 1.0 / self.rules.material_factor and one.below for one in self.size.values())
 
 
-def drop_immaterial(found: Findings, seed: int) -> Findings:
-    """Drop the effects that do not matter, the weakest first.
+def drop_negligible(found: Findings, seed: int) -> Findings:
+    """Drop the effects that are negligible for prediction, the weakest first.
 
     Args:
         found: What the search came to.
@@ -90,7 +89,8 @@ def drop_immaterial(found: Findings, seed: int) -> Findings:
     dropped: list[DroppedEffect] = []
     while kept and horizons(drives):
         weighed = _weigh_effects(drives, variant, kept, seed)
-        weakest = min((one for one in weighed if not one.material), key=lambda one: one.largest, default=None)
+        negligible = (one for one in weighed if not one.material)
+        weakest = min(negligible, key=lambda one: max(size.value for size in one.size.values()), default=None)
         if weakest is None:
             break
         dropped.append(DroppedEffect(weakest.effect, variant, weakest.harmful))
@@ -99,7 +99,7 @@ def drop_immaterial(found: Findings, seed: int) -> Findings:
     if not dropped:
         return found
     model = fit(drives, variant.theta, variant.free, found.model.noise)
-    return replace(found, model=model, adopted=tuple(kept), immaterial=tuple(dropped))
+    return replace(found, model=model, adopted=tuple(kept), negligible=tuple(dropped))
 
 
 def _weigh_effects(
@@ -112,17 +112,19 @@ def _weigh_effects(
     for effect in effects:
         if effect.free:
             theta, free = without_effect(variant, effect, drives.rate_hz)
-            worth = compare_errors(drives, held_out_squares(drives, theta, free, length), whole)
+            size = compare_errors(drives, held_out_squares(drives, theta, free, length), whole)
         else:
             # Blocks left out add errors of the fit, which are no draws.
             squares = {h: pose_errors(drives, variant.theta, cut(drives, h))[:, 0] ** 2 for h in whole}
-            worth = _worth_of_draws(drives, variant, effect, squares, seed)
-        found.append(WeighedEffect(effect, worth))
+            size = _size_of_draws(drives, variant, squares, seed)
+        found.append(WeighedEffect(effect, size, drives.rules))
     return found
 
 
-def worth(fitted: Drives, tested: Drives, variant: Variant, effect: AdoptedEffect, seed: int) -> Worth:
-    """The error without an effect by the error with it, on drives that nothing was fitted to.
+def measure_effect_size(
+    fitted: Drives, tested: Drives, variant: Variant, effect: AdoptedEffect, seed: int
+) -> EffectSize:
+    """Measure the error without an effect by the error with it, on drives that nothing was fitted to.
 
     Args:
         fitted: Drives that the model with the effect, and the one without it, are fitted to.
@@ -134,7 +136,7 @@ def worth(fitted: Drives, tested: Drives, variant: Variant, effect: AdoptedEffec
     whole = _squares(fitted, tested, variant)
     if effect.free:
         return compare_errors(tested, _squares(fitted, tested, without_effect(variant, effect, fitted.rate_hz)), whole)
-    return _worth_of_draws(tested, variant, effect, whole, seed)
+    return _size_of_draws(tested, variant, whole, seed)
 
 
 def _squares(fitted: Drives, tested: Drives, variant: Variant) -> dict[float, Floats]:
@@ -148,13 +150,10 @@ def _length(drives: Drives) -> float:
     return max((h for h in horizons(drives) if h <= FITTED_S), default=min(horizons(drives), default=FITTED_S))
 
 
-def _worth_of_draws(
-    drives: Drives, variant: Variant, effect: AdoptedEffect, whole: Mapping[float, Floats], seed: int
-) -> dict[float, Ratio]:
-    """What a random effect is worth: it moves no mean, so what counts is how much of the error its draws make up.
+def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Floats], seed: int) -> dict[float, Ratio]:
+    """The size of a random effect: how much of the error its draws make up.
 
-    With s the distance of drawn and expected replays and e the error, the error without the draws would be √(e² − s²).
-    It cannot be below what the noise of poses makes alone: draws that would leave less are not in the data.
+    What is left cannot be below what the noise of poses makes alone: draws that would leave less are not in the data.
     """
     found, noise = {}, pose_noise(drives, variant.theta)
     for horizon, squares in whole.items():
@@ -162,19 +161,12 @@ def _worth_of_draws(
         blocks, floor = blocks_of(drives, windows), noise_floor(drives, windows, noise)[0]
         share = ratio(_drawn_squares(drives, variant, windows, seed), squares, blocks)
         error = rmse(squares, blocks)
-        ends = zip((share.value, *share.interval), (error.value, *error.interval), strict=True)
-        value, low, high = (_ratio_without_draws(min(one, _room(most, floor))) for one, most in ends)
-        found[horizon] = Ratio(value, (low, high))
+        sizes = []
+        for drawn, most in zip((share.value, *share.interval), (error.value, *error.interval), strict=True):
+            room = float(np.sqrt(max(0.0, 1.0 - (floor / most) ** 2))) if most > 0.0 else 0.0
+            sizes.append(float(1.0 / np.sqrt(1.0 - min(min(drawn, room), LARGEST_SHARE) ** 2)))
+        found[horizon] = Ratio(sizes[0], (sizes[1], sizes[2]))
     return found
-
-
-def _room(error: float, floor: float) -> float:
-    """The share of an error that is not the noise of poses."""
-    return float(np.sqrt(max(0.0, 1.0 - (floor / error) ** 2))) if error > 0.0 else 0.0
-
-
-def _ratio_without_draws(share: float) -> float:
-    return float(1.0 / np.sqrt(1.0 - min(share, LARGEST_SHARE) ** 2))
 
 
 def _drawn_squares(drives: Drives, variant: Variant, windows: Windows, seed: int) -> Floats:
@@ -189,30 +181,24 @@ def _drawn_squares(drives: Drives, variant: Variant, windows: Windows, seed: int
 
 def invisible_effects(model: Fit, taken: set[str]) -> tuple[str, ...]:
     """The motion effects that would have left too few nats to be seen at the middle of their probes."""
-    forms = candidates(model.drives.robot, model.theta, taken)
+    robot, rules = model.drives.robot, model.drives.rules
+    forms = candidates(robot, model.theta, taken)
     best: dict[str, float] = {}
     plain = {form.effect for form in forms if not form.form}
     for form in (form for form in forms if not form.form or form.effect not in plain):
-        best[form.effect] = max(best.get(form.effect, 0.0), _nats_of_trace(model, form))
-    strike = RULES.struck_share * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
+        nats = 0.0
+        if form.probes:
+            direction = trace_of(model, form, form.probes[len(form.probes) // 2])
+            nats = 0.5 * float(direction @ direction)
+        best[form.effect] = max(best.get(form.effect, 0.0), nats)
+    strike = rules.struck_share * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
     best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}
-    return tuple(
-        name
-        for name in motion_effects(model.drives.robot.catalogue)
-        if name not in taken and best.get(name, 0.0) < RULES.visible_nats
-    )
-
-
-def _nats_of_trace(model: Fit, form: Candidate) -> float:
-    """Nats that the middle probe would have changed, free parameters having done what they can."""
-    if not form.probes:
-        return 0.0
-    direction = trace_of(model, form, form.probes[len(form.probes) // 2])
-    return 0.5 * float(direction @ direction)
+    seen = {name for name, nats in best.items() if not nats < rules.visible_nats}
+    return tuple(name for name in motion_effects(robot.catalogue) if name not in taken and name not in seen)
 
 
 def trace_of(model: Fit, form: Candidate, values: tuple[float, ...]) -> Floats:
-    """What a form of an effect does to the innovations that the free parameters cannot (3N,)."""
+    """The change of the innovations by a form of an effect that the free parameters cannot make (3N,)."""
     moved = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
     change = increments(model.drives, model.theta) - increments(model.drives, moved)
     column = model.whiten.whiten(change)[:, None]
@@ -221,13 +207,12 @@ def trace_of(model: Fit, form: Candidate, values: tuple[float, ...]) -> Floats:
 
 GAINS: tuple[Coordinate, ...] = (("wheel_gain.left",), ("wheel_gain.right",))
 
-
 AT_ONCE = 100_000
 """About so many increments are looked at together: what is computed of each takes a kilobyte."""
 
 
-class Unlike(NamedTuple):
-    """Drives that fall in two groups.
+class RobotClusters(NamedTuple):
+    """Two groups of drives with different wheel gains, as if of two robots.
 
     Attributes:
         wheel: "left" or "right", whichever tells them apart better.
@@ -240,23 +225,23 @@ class Unlike(NamedTuple):
     groups: tuple[tuple[int, ...], tuple[int, ...]]
 
 
-def two_robots(drives: Drives, model: Fit) -> Unlike | None:
-    """The two groups that drives fall in by a wheel's gain, None where they are all alike.
+def find_robot_clusters(drives: Drives, model: Fit) -> RobotClusters | None:
+    """Find the two groups that drives fall in by a wheel's gain, None where they are all alike.
 
     Effects of one robot that a model lacks spread the drives' gains too, but do not leave a gap between two groups.
     """
     episodes = np.unique(drives.episode)
-    if len(episodes) < 2 * RULES.robot_drives:
+    if len(episodes) < 2 * drives.rules.robot_drives:
         return None
     batches = np.array_split(episodes, math.ceil(len(drives.episode) / AT_ONCE))
     gains, deviations = np.concatenate([_own_gains(drives.some(batch), model) for batch in batches], axis=1)
-    found = [_groups(episodes, gains[:, side], deviations[:, side]) for side in range(2)]
+    found = [_groups(episodes, gains[:, side], deviations[:, side], drives.rules) for side in range(2)]
     clearest, side = max(((clear, side) for side, (clear, _) in enumerate(found)), key=lambda pair: pair[0])
     if clearest < 1.0:
         return None
     groups = found[side][1]
     means = [float(gains[np.isin(episodes, group), side].mean()) for group in groups]
-    return Unlike(("left", "right")[side], (means[0], means[1]), groups)
+    return RobotClusters(("left", "right")[side], (means[0], means[1]), groups)
 
 
 def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
@@ -266,12 +251,12 @@ def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
     columns = slopes(drives, whole.theta, GAINS, whole.whiten)
     label = np.repeat(drives.episode, 3)
     z = whole.innovations
-    pull = sum_by(label, columns * clip_outliers(z)[:, None], count)
+    gradient = sum_by(label, columns * clip_outliers(z)[:, None], count)
     inner = columns * (np.abs(z) < HUBER)[:, None]
-    curve = sum_by(label, columns[:, :, None] * inner[:, None, :], count) + KEPT_SOLVABLE * np.eye(2)
+    hessian = sum_by(label, columns[:, :, None] * inner[:, None, :], count) + KEPT_SOLVABLE * np.eye(2)
     loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, count) / np.bincount(label))
-    inverse = np.linalg.inv(curve)
-    step = -np.einsum("eij,ej->ei", inverse, pull)
+    inverse = np.linalg.inv(hessian)
+    step = -np.einsum("eij,ej->ei", inverse, gradient)
     low, high = np.array([span(coordinate, drives.robot) for coordinate in GAINS]).T
     here = np.array([whole.theta[name] for (name,) in GAINS])
     variances = np.diagonal(inverse, axis1=1, axis2=2) * loud[:, None]
@@ -279,12 +264,12 @@ def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
 
 
 def _groups(
-    episodes: Floats, gains: Floats, deviations: Floats
+    episodes: Floats, gains: Floats, deviations: Floats, rules: Rules
 ) -> tuple[float, tuple[tuple[int, ...], tuple[int, ...]]]:
-    """How clearly drives fall in two groups at the widest gap between sorted gains, 1 where just so; and the groups."""
-    sure = np.flatnonzero(deviations < RULES.robot_gain_apart)
+    """The clearness of the widest gap between sorted gains, 1 where it just makes two groups; and the groups."""
+    sure = np.flatnonzero(deviations < rules.robot_gain_apart)
     order = sure[np.argsort(gains[sure])]
-    least = max(RULES.robot_drives, math.ceil(RULES.robot_share * len(order)))
+    least = max(rules.robot_drives, math.ceil(rules.robot_share * len(order)))
     places = np.arange(least, len(order) - least + 1)
     if not len(places):
         return 0.0, ((), ())
@@ -293,6 +278,6 @@ def _groups(
     gap = float(sorted_gains[at] - sorted_gains[at - 1])
     within = max(float(sorted_gains[:at].std(ddof=1)), float(sorted_gains[at:].std(ddof=1)))
     unsure = max(within, float(np.median(deviations[order])))
-    clear = gap / max(RULES.robot_gain_apart, RULES.robot_gap * unsure)
+    clear = gap / max(rules.robot_gain_apart, rules.robot_gap * unsure)
     one, other = (tuple(sorted(int(e) for e in episodes[part])) for part in (order[:at], order[at:]))
     return clear, (one, other)

@@ -1,6 +1,12 @@
-"""The evidence in what a model leaves over: leads, the best of them fitted, random effects, curves over signals.
+"""Evidence for the effects that a model may lack, and what a search for them comes to.
 
-What a search for missing effects finds: effects tried, adopted and dropped, and the models with them.
+The evidence for an effect is its gain in held-out log-likelihood [nats],
+
+    G = Σ_b log p(z_b | model with the effect, fitted without block b) − Σ_b log p(z_b | model, fitted without block b),
+
+over blocks b of the drives. `gather_evidence` weighs four kinds of explanation on what one model leaves over: the score
+test of every candidate (`screening`), a full refit of the best of them, effects that draw (`random_effects`), and
+curves over every signal (`signals`), which stand for effects that have no name.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,14 +15,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.diagnosis.answer import Rules
 from proxytune.diagnosis.motion.fitting import Fit, fit, held_out_log_likelihood, loss_of
 from proxytune.diagnosis.motion.innovations import RANDOM_EFFECTS, Coordinate, lateness, span, theta_at
 from proxytune.diagnosis.motion.random_effects import RandomEffect, random_effects
-from proxytune.diagnosis.motion.screening import Candidate, Lead, candidates, screen
-from proxytune.diagnosis.motion.signals import Curve, fit_curves
-from proxytune.diagnosis.rules import RULES
-from proxytune.effects import Catalogue, Cue
+from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
+from proxytune.diagnosis.motion.signals import SignalCurve, fit_curves
 from proxytune.space import Theta
+
+REFITTED = 6
+"""The number of effects that are fitted in full, the most promising first."""
+
+WORTH_FITTING = 0.1
+"""Candidates that promise less than this share of the best one are not fitted."""
 
 
 class TriedEffect(NamedTuple):
@@ -24,8 +35,8 @@ class TriedEffect(NamedTuple):
 
     Attributes:
         effect: Its name.
-        form: What is special about the form.
-        gain: Evidence: log-likelihood gained on blocks it was not fitted to [nats].
+        form: The form's name; empty for the plain one.
+        gain: Held-out gain in log-likelihood [nats].
         p_value: How often chance gains as much.
     """
 
@@ -41,7 +52,7 @@ class AdoptedEffect:
 
     Attributes:
         effect: Its name.
-        form: What is special about the form.
+        form: The form's name; empty for the plain one.
         names: Its parameters in θ.
         free: Those of them that were fitted, by coordinate.
         gain: Evidence for it when it was adopted [nats].
@@ -68,7 +79,7 @@ class Variant(NamedTuple):
 
 
 def without_effect(variant: Variant, effect: AdoptedEffect, rate_hz: float) -> Variant:
-    """A model without an effect; the mean lateness of an effect that draws becomes a part of the delay again."""
+    """Take an effect out of a model; the mean lateness of an effect that draws becomes a part of the delay again."""
     theta = {name: value for name, value in variant.theta.items() if name not in effect.names}
     late = lateness(variant.theta, rate_hz) - lateness(theta, rate_hz)
     if late > 0.0:
@@ -86,62 +97,57 @@ class DroppedEffect(NamedTuple):
 
 @dataclass(frozen=True)
 class Findings:
-    """What a search for missing effects finds.
+    """The result of a search for missing effects.
 
     Attributes:
         declared: The model with declared parameters only.
         model: The model with the adopted effects.
         adopted: Those effects, in the order of adoption.
         tried: Every effect tried in the first round, best first.
-        remainder: Curves over signals that explain what no named effect does, best first.
+        unnamed_curves: Curves over signals that explain what no named effect does, best first.
         curves: Curves over every signal before anything was added, best first.
-        immaterial: Effects that were adopted and dropped again, each with the model that it was dropped from.
+        negligible: Effects that were adopted and dropped again, each with the model that it was dropped from.
     """
 
     declared: Fit
     model: Fit
     adopted: tuple[AdoptedEffect, ...]
     tried: tuple[TriedEffect, ...]
-    remainder: tuple[Curve, ...]
-    curves: tuple[Curve, ...]
-    immaterial: tuple[DroppedEffect, ...] = ()
+    unnamed_curves: tuple[SignalCurve, ...]
+    curves: tuple[SignalCurve, ...]
+    negligible: tuple[DroppedEffect, ...] = ()
 
 
-REFITTED = 6
-"""The number of effects that are fitted in full, the most promising first."""
-
-WORTH_FITTING = 0.1
-"""Leads that promise less than this share of the best one are not fitted."""
-
-
-class FittedLead(NamedTuple):
-    """A lead fitted in full.
+class FittedCandidate(NamedTuple):
+    """A model with one effect more, fitted in full; either `screened` or `random` is given.
 
     Attributes:
-        lead: The form and where it was seen.
+        gain: Evidence for the effect [nats].
         fitted: The model with it.
-        gain: Evidence for it [nats].
+        screened: The candidate that it was fitted from, None for an effect that draws.
+        random: The effect that draws, None for any other.
     """
 
-    lead: Lead
-    fitted: Fit
     gain: float
+    fitted: Fit
+    screened: ScreenedCandidate | None = None
+    random: RandomEffect | None = None
 
 
 class Evidence(NamedTuple):
-    """What speaks for each missing effect, in what one model leaves over.
+    """Everything that speaks for a missing effect in what one model leaves over.
 
     Attributes:
-        leads: One step towards every form of every effect, best first.
+        screened: Every candidate with its score test, best first.
         fits: The best of them fitted in full, by label.
         random: Effects that draw.
         curves: Curves over every signal, best first.
     """
 
-    leads: list[Lead]
-    fits: dict[str, FittedLead]
+    screened: list[ScreenedCandidate]
+    fits: dict[str, FittedCandidate]
     random: tuple[RandomEffect, ...]
-    curves: list[Curve]
+    curves: list[SignalCurve]
 
 
 def gather_evidence(model: Fit, taken: set[str], seed: int) -> Evidence:
@@ -153,80 +159,63 @@ def gather_evidence(model: Fit, taken: set[str], seed: int) -> Evidence:
         seed: Of the null distributions.
     """
     robot = model.drives.robot
-    leads = screen(model, candidates(robot, model.theta, taken), seed)
-    fits = _fit_leads(model, _choose_leads(leads), {})
-    random = () if taken & set(RANDOM_EFFECTS) else _find_random(model, seed)
-    found = fit_curves(model)
+    screened = screen(model, candidates(robot, model.theta, taken), seed)
+    fits = _refit(model, _choose_best_forms(screened), {})
+    # Random effects need a delay in the model to share their mean lateness with.
+    draws = ("delay",) in model.free and not taken & set(RANDOM_EFFECTS)
+    random = random_effects(model, seed) if draws else ()
+    curves = fit_curves(model)
     best = max((one.gain for one in fits.values()), default=0.0)
     # A leading signal is a hint: the effects that act through it may have looked poor after one step only.
-    if found and leads_over(found[0], best):
-        others = [lead for lead in leads if found[0].group.name in _cues(robot.catalogue, lead.candidate.effect)]
-        fits |= _fit_leads(model, others, fits)
-    return Evidence(leads, fits, random, found)
+    if curves and exceeds_names(curves[0], best, model.drives.rules):
+        traces = ((one, robot.catalogue.effect(one.candidate.effect).trace) for one in screened)
+        others = [one for one, trace in traces if trace and curves[0].group.name in trace.cues]
+        fits |= _refit(model, others, fits)
+    return Evidence(screened, fits, random, curves)
 
 
-def _cues(catalogue: Catalogue, effect: str) -> tuple[Cue, ...]:
-    trace = catalogue.effect(effect).trace
-    return trace.cues if trace else ()
-
-
-def _choose_leads(leads: Sequence[Lead]) -> list[Lead]:
-    """The best form of each of the best effects, and its plain form."""
-    forms: dict[str, Lead] = {}
-    for lead in leads:
-        forms.setdefault(lead.candidate.effect, lead)
+def _choose_best_forms(screened: Sequence[ScreenedCandidate]) -> list[ScreenedCandidate]:
+    """Choose the best form of each of the best effects, and its plain form."""
+    forms: dict[str, ScreenedCandidate] = {}
+    for one in screened:
+        forms.setdefault(one.candidate.effect, one)
     best = list(forms.values())[:REFITTED]
-    names = {lead.candidate.effect for lead in best if lead.candidate.form}
-    return best + [lead for lead in leads if not lead.candidate.form and lead.candidate.effect in names]
+    names = {one.candidate.effect for one in best if one.candidate.form}
+    return best + [one for one in screened if not one.candidate.form and one.candidate.effect in names]
 
 
-def _find_random(model: Fit, seed: int) -> tuple[RandomEffect, ...]:
-    """Random effects, if the model has a delay to share their mean lateness with."""
-    return random_effects(model, seed) if ("delay",) in model.free else ()
-
-
-def _fit_leads(model: Fit, leads: Sequence[Lead], done: Mapping[str, FittedLead]) -> dict[str, FittedLead]:
-    """Fit the leads that are worth it and not done yet."""
+def _refit(
+    model: Fit, chosen: Sequence[ScreenedCandidate], done: Mapping[str, FittedCandidate]
+) -> dict[str, FittedCandidate]:
+    """Fit the candidates that promise enough and are not fitted yet: from the better of the probe and the step."""
     plain = float(held_out_log_likelihood(model).sum())
-    best = max((lead.gain for lead in leads), default=0.0)
-    fits: dict[str, FittedLead] = {}
-    for lead in leads:
-        label = lead.candidate.label
-        if label not in done and lead.gain > max(RULES.least_gain_nats, WORTH_FITTING * best):
-            fitted = fit(model.drives, _start(model, lead), model.free + lead.candidate.free, model.noise)
-            fits[label] = FittedLead(lead, fitted, float(held_out_log_likelihood(fitted).sum()) - plain)
+    least = max(model.drives.rules.least_gain_nats, WORTH_FITTING * max((one.gain for one in chosen), default=0.0))
+    fits: dict[str, FittedCandidate] = {}
+    for one in chosen:
+        form = one.candidate
+        if form.label in done or not one.gain > least:
+            continue
+        theta = {**model.theta, **form.fixed}
+        low, high = np.array([span(coordinate, model.drives.robot) for coordinate in form.free]).T
+        starts = [theta_at(theta, form.free, np.clip(np.array(values), low, high)) for values in (one.start, one.probe)]
+        start = min(starts, key=lambda start: loss_of(model.drives, start, model.whiten))
+        fitted = fit(model.drives, start, model.free + form.free, model.noise)
+        fits[form.label] = FittedCandidate(float(held_out_log_likelihood(fitted).sum()) - plain, fitted, one)
     return fits
 
 
-def _start(model: Fit, lead: Lead) -> Theta:
-    """The better of the probe and where the step from it leads."""
-    theta = {**model.theta, **lead.candidate.fixed}
-    low, high = np.array([span(coordinate, model.drives.robot) for coordinate in lead.candidate.free]).T
-    starts = [
-        theta_at(theta, lead.candidate.free, np.clip(np.array(values), low, high))
-        for values in (lead.start, lead.probe)
-    ]
-    return min(starts, key=lambda start: loss_of(model.drives, start, model.whiten))
-
-
-def leads_over(curve: Curve, gain: float) -> bool:
-    """Whether a curve gains clearly more than a named effect of this gain [nats]."""
-    return curve.gain > RULES.curve_factor * gain and curve.gain > gain + RULES.curve_margin_nats
-
-
-def curves_beyond_names(evidence: Evidence, gain: float) -> list[Curve]:
-    """The curves over signals that gain clearly more than the best named effect, of this gain [nats]."""
-    return [curve for curve in evidence.curves if leads_over(curve, gain)]
+def exceeds_names(curve: SignalCurve, gain: float, rules: Rules) -> bool:
+    """Tell whether a curve gains clearly more than a named effect of this gain [nats]."""
+    return curve.gain > rules.curve_factor * gain and curve.gain > gain + rules.curve_margin_nats
 
 
 def list_tried(evidence: Evidence) -> list[TriedEffect]:
-    """Every effect that was weighed, best first."""
+    """List every effect that was weighed, best first; by its full fit where it has one."""
     fitted = {label: one.gain for label, one in evidence.fits.items()}
     named = [
-        TriedEffect(
-            lead.candidate.effect, lead.candidate.form, fitted.get(lead.candidate.label, lead.held_out), lead.p_value
-        )
-        for lead in evidence.leads
+        TriedEffect(form.effect, form.form, fitted.get(form.label, one.held_out), one.p_value)
+        for one in evidence.screened
+        for form in (one.candidate,)
     ]
     random = [TriedEffect(effect.effect, "", effect.gain, effect.p_value) for effect in evidence.random]
     return sorted(named + random, key=lambda tried: -tried.gain)

@@ -1,7 +1,14 @@
-"""Fitting a model's free parameters, drive noise and pose noise to the innovations, together.
+"""Fitting a model's free parameters, drive noise and pose noise to the whitened innovations, together.
 
-How sure the fitted parameters are.
-Whether a log can bear the question at all: is there motion, in the units and axes of the commands?
+`fit` minimises Σ huber(z(θ)) over θ by least squares with z = L⁻¹(measured − increments(θ)) and L frozen, then the
+noise by likelihood, in rounds; a coordinate that changes the motion by steps is scanned instead. With J = ∂z/∂θ
+(`slopes`), ψ Huber's clipped z and w the weight of what is no outlier, each block b has
+
+    gradient  g_b = J_bᵀψ_b,    Hessian  H_b = J_bᵀ(w·J)_b,
+
+and leaving it out moves the parameters by one Newton step, −(H − H_b)⁻¹(g − g_b): `held_out_log_likelihood`. The same
+blocks give the `intervals` (sandwich; jackknife where there is no slope). `check_motion` and `check_units` refuse logs
+that cannot bear the question: no motion, or other units and axes than the commands'.
 """
 
 from collections.abc import Mapping
@@ -38,7 +45,7 @@ STEP = 1e-3
 """Finite differences step by this fraction of a coordinate's range."""
 
 KEPT_SOLVABLE = 1e-6
-"""Added to the curvature of the loss, so that a coordinate without a slope does no harm."""
+"""Added to the Hessian of the loss, so that a coordinate without a slope does no harm."""
 
 SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(0.99, 1.01, 11))
 """Where a scan looks in each round, as multiples of the value it starts from."""
@@ -54,7 +61,7 @@ class Fit:
         free: The coordinates that were fitted.
         noise: Drive and pose noise.
         whiten: The whitener of that noise.
-        innovations: What the model leaves over, white if it is right (3N,).
+        innovations: Whitened residuals of the increments, white noise if the model is right (3N,).
         slopes: Their change per unit of each coordinate, as a fraction of its range (3N, coordinates).
     """
 
@@ -85,13 +92,8 @@ def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise
 def evaluate(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise) -> Fit:
     """Evaluate a model with its noise on these drives: innovations and slopes; nothing is fitted."""
     whiten = whitener(drives, noise)
-    left = whiten.whiten(drives.measured - increments(drives, theta))
-    return Fit(drives, theta, free, noise, whiten, left, slopes(drives, theta, free, whiten))
-
-
-def replace_noise(fitted: Fit, noise: Noise) -> Fit:
-    """Evaluate the same model with another noise."""
-    return evaluate(fitted.drives, fitted.theta, fitted.free, noise)
+    innovations = whiten.whiten(drives.measured - increments(drives, theta))
+    return Fit(drives, theta, free, noise, whiten, innovations, slopes(drives, theta, free, whiten))
 
 
 def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Theta:
@@ -99,17 +101,16 @@ def _fit_theta(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], white
         return theta
     low, high = np.array([span(coordinate, drives.robot) for coordinate in free]).T
 
-    def left(fractions: Floats) -> Floats:
+    def residuals(fractions: Floats) -> Floats:
         moved = theta_at(theta, free, low + fractions * (high - low))
         return whiten.whiten(drives.measured - increments(drives, moved))
 
-    def slope(fractions: Floats) -> Floats:
+    def jacobian(fractions: Floats) -> Floats:
         return slopes(drives, theta_at(theta, free, low + fractions * (high - low)), free, whiten)
 
     start = (np.array([theta[coordinate[0]] for coordinate in free]) - low) / (high - low)
-    found = least_squares(
-        left, np.clip(start, 1e-6, 1.0 - 1e-6), slope, (0.0, 1.0), loss="huber", f_scale=HUBER, ftol=1e-7, max_nfev=30
-    )
+    start = np.clip(start, 1e-6, 1.0 - 1e-6)
+    found = least_squares(residuals, start, jacobian, (0.0, 1.0), loss="huber", f_scale=HUBER, ftol=1e-7, max_nfev=30)
     return theta_at(theta, free, low + np.clip(found.x, 0.0, 1.0) * (high - low))
 
 
@@ -122,24 +123,20 @@ def _scan(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: W
     for coordinate in rough:
         low, high = span(coordinate, drives.robot)
         here = theta[coordinate[0]]
-        values = np.clip(np.concatenate((_round_numbers(here), [here], here * multiples)), low, high)
+        round_numbers = [float(f"{here:.{figures}g}") for figures in (1, 2, 3)]
+        values = np.clip(np.concatenate((round_numbers, [here], here * multiples)), low, high)
         losses = [loss_of(drives, theta_at(theta, (coordinate,), np.array([value])), whiten) for value in values]
         theta = theta_at(theta, (coordinate,), values[[int(np.argmin(losses))]])
     return theta
 
 
-def _round_numbers(value: float) -> list[float]:
-    """The value with one, two and three significant figures."""
-    return [float(f"{value:.{figures}g}") for figures in (1, 2, 3)]
-
-
 def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
-    """The loss of a model under frozen gains [nats]."""
+    """Sum Huber's loss of a model under frozen gains [nats]."""
     return float(huber(whiten.whiten(drives.measured - increments(drives, theta))).sum())
 
 
 def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Floats:
-    """Change of the innovations per coordinate, as a fraction of its range (3N, coordinates).
+    """Differentiate the innovations by each coordinate, as a fraction of its range (3N, coordinates).
 
     It is 0 along coordinates that change the motion by steps: the slope there says nothing of the next step.
     """
@@ -159,7 +156,7 @@ def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: W
 
 
 def sum_by_block(drives: Drives, values: Floats) -> Floats:
-    """Sums over the innovations of each block, (3N, …) to (blocks, …)."""
+    """Sum over the innovations of each block, (3N, …) to (blocks, …)."""
     return sum_by(np.repeat(drives.block, 3), values, int(drives.block.max()) + 1)
 
 
@@ -168,35 +165,35 @@ def held_out_log_likelihood(fitted: Fit) -> Floats:
 
     Leaving a block out moves the parameters by one Newton step.
     """
-    sums = slopes_by_block(fitted, fitted.slopes)
+    sums = derivatives_by_block(fitted, fitted.slopes)
     shifted = held_out_innovations(fitted, fitted.slopes, sums, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
     loss = huber(shifted).reshape(-1, 3).sum(axis=1) + fitted.whiten.log_determinant
     return sum_by(fitted.drives.block, -loss, int(fitted.drives.block.max()) + 1)
 
 
 def held_out_innovations(fitted: Fit, columns: Floats, sums: tuple[Floats, Floats], penalty: Floats) -> Floats:
-    """The innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it.
+    """Give the innovations (3N,) once each block's columns (3N, columns) are weighted as all other blocks have it.
 
     Args:
         fitted: What was fitted without the columns.
         columns: Change of the innovations per unit of each weight.
-        sums: The blocks' slopes along the columns.
-        penalty: Curvature that pulls the weights to 0.
+        sums: Gradient and Hessian of each block along the columns.
+        penalty: Added to the Hessian: it pulls the weights to 0.
     """
-    pull, curve = sums
-    rest = curve.sum(axis=0) - curve + penalty
-    moved = -np.linalg.solve(rest, (pull.sum(axis=0) - pull)[:, :, None])[:, :, 0]
+    gradient, hessian = sums
+    rest = hessian.sum(axis=0) - hessian + penalty
+    moved = -np.linalg.solve(rest, (gradient.sum(axis=0) - gradient)[:, :, None])[:, :, 0]
     own = np.repeat(moved[fitted.drives.block], 3, axis=0)
     return np.asarray(fitted.innovations + np.einsum("nc,nc->n", columns, own))
 
 
-def slopes_by_block(fitted: Fit, columns: Floats) -> tuple[Floats, Floats]:
-    """Gradient (blocks, columns) and curvature (blocks, columns, columns) of each block's loss along the columns."""
+def derivatives_by_block(fitted: Fit, columns: Floats) -> tuple[Floats, Floats]:
+    """Gradient (blocks, columns) and Hessian (blocks, columns, columns) of each block's loss along the columns."""
     z, label = fitted.innovations, np.repeat(fitted.drives.block, 3)
     inner = columns * (np.abs(z) < HUBER)[:, None]
-    pull = sum_by_block(fitted.drives, columns * clip_outliers(z)[:, None])
-    curve = [columns[own].T @ inner[own] for own in (label == block for block in range(len(pull)))]
-    return pull, np.stack(curve)
+    gradient = sum_by_block(fitted.drives, columns * clip_outliers(z)[:, None])
+    hessian = [columns[own].T @ inner[own] for own in (label == block for block in range(len(gradient)))]
+    return gradient, np.stack(hessian)
 
 
 LOOKS = (np.geomspace(0.6, 1.6, 31), np.geomspace(0.97, 1.03, 31))
@@ -207,13 +204,12 @@ LEAST = 0.003
 
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
-    """95 % intervals of the fitted parameters, from what blocks say differently."""
-    smooth = _smooth_intervals(fitted)
-    rough = (coordinate for coordinate in fitted.free if is_stepwise(coordinate, fitted.drives.robot))
-    for coordinate in rough:
-        ends = _stepwise_interval(fitted, coordinate)
-        smooth |= dict.fromkeys(coordinate, ends)
-    return smooth
+    """Give 95 % intervals of the fitted parameters, from the scatter between blocks."""
+    known = _smooth_intervals(fitted)
+    for coordinate in fitted.free:
+        if is_stepwise(coordinate, fitted.drives.robot):
+            known |= dict.fromkeys(coordinate, _stepwise_interval(fitted, coordinate))
+    return known
 
 
 def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, float]:
@@ -221,7 +217,10 @@ def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, floa
     low, high = span(coordinate, fitted.drives.robot)
     here = fitted.theta[coordinate[0]]
     values = np.unique(np.clip(here * np.concatenate(([1.0], *LOOKS)), low, high))
-    losses = np.stack([_losses(fitted, coordinate, value) for value in values], axis=1)
+    drives = fitted.drives
+    thetas = (theta_at(fitted.theta, (coordinate,), np.array([value])) for value in values)
+    left = (fitted.whiten.whiten(drives.measured - increments(drives, theta)) for theta in thetas)
+    losses = np.stack([sum_by_block(drives, huber(innovations)) for innovations in left], axis=1)
     best = values[(losses.sum(axis=0) - losses).argmin(axis=1)]
     count = len(best)
     if count < 2:
@@ -231,20 +230,12 @@ def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, floa
     return max(low, here - half), min(high, here + half)
 
 
-def _losses(fitted: Fit, coordinate: Coordinate, value: float) -> Floats:
-    """Each block's loss at a value (blocks,) [nats]."""
-    drives = fitted.drives
-    theta = theta_at(fitted.theta, (coordinate,), np.array([value]))
-    left = fitted.whiten.whiten(drives.measured - increments(drives, theta))
-    return sum_by_block(drives, huber(left))
-
-
 def _smooth_intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """From the spread between blocks (sandwich)."""
-    pull, curve = slopes_by_block(fitted, fitted.slopes)
-    blocks, count = pull.shape
-    inverse = np.linalg.inv(curve.sum(axis=0) + KEPT_SOLVABLE * np.eye(count))
-    spread = inverse @ (pull.T @ pull) @ inverse * blocks / max(1, blocks - count)
+    gradient, hessian = derivatives_by_block(fitted, fitted.slopes)
+    blocks, count = gradient.shape
+    inverse = np.linalg.inv(hessian.sum(axis=0) + KEPT_SOLVABLE * np.eye(count))
+    spread = inverse @ (gradient.T @ gradient) @ inverse * blocks / max(1, blocks - count)
     found = {}
     for coordinate, variance in zip(fitted.free, np.diag(spread), strict=True):
         if is_stepwise(coordinate, fitted.drives.robot):
@@ -285,7 +276,7 @@ def check_motion(name: str, drives: Drives) -> None:
 
 
 def _reach(drives: Drives) -> tuple[float, float]:
-    """How far the robot got from its middle pose in any episode, outliers apart: [m], [rad]."""
+    """The greatest distance from an episode's middle pose, outliers apart: [m], [rad]."""
     furthest = np.zeros(2)
     for episode in np.unique(drives.episode):
         poses = drives.poses[drives.episode == episode, 1]

@@ -1,25 +1,25 @@
-"""From increments to white innovations: the filter of the pose error, as one banded Cholesky factor.
+"""Innovations: a model's increments by replay, whitened by a Kalman filter in SE(2).
 
 Every measured pose carries noise, and every metre driven adds some. An increment's error is its own drive noise plus
 the pose noise of its two ends, which it shares with its neighbours. So the errors' covariance is block-tridiagonal, and
-the whitened innovations of the Kalman filter that re-anchors the pose are L⁻¹e, L its Cholesky factor.
+the whitened innovations of the Kalman filter that re-anchors the pose are z = L⁻¹e, with S = LLᵀ one banded Cholesky
+factor, and the log-likelihood is −Σ huber(z) − ½ log|S|, which `fit_noise` maximises over drive and pose noise.
 
-The planar plant from the origin on, as a diagnosis replays it thousands of times.
-Replaying recorded commands through a model: the planar plant over whole batches of drives.
-Coordinates of a fit: one or several parameters of θ that share a value, within their range.
+The increments e is taken from come by replay of the recorded commands: through the effects of a model to wheel speeds
+and twists, dead-reckoned by the planar plant over whole batches of drives (`increments`, `paths`, `window_paths`).
+A coordinate of a fit is one or several parameters of θ that share a value, within their range.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky_banded
 from scipy.linalg.lapack import dtbtrs
 from scipy.optimize import minimize
 
+from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative
-from proxytune.diagnosis.rules import RULES
 from proxytune.driving import Drivetrain, Robot, drivetrain
 from proxytune.effects import (
     CATALOGUE,
@@ -60,7 +60,7 @@ HUBER = 3.0
 
 @dataclass(frozen=True)
 class Noise:
-    """How far measured motion strays from a model that is right.
+    """The scatter of measured motion about a model that is right.
 
     Attributes:
         drive: Standard deviation after one metre: forward [m], sideways [m], heading [rad].
@@ -82,7 +82,7 @@ class Whitener:
 
     @property
     def log_determinant(self) -> Floats:
-        """What each increment adds to log|S|/2 (N,)."""
+        """The share of each increment in log|S|/2 (N,)."""
         return np.asarray(np.log(self.factor[0]).reshape(-1, 3).sum(axis=1))
 
     def whiten(self, errors: Floats) -> Floats:
@@ -112,11 +112,6 @@ def _factor(covariance: Floats) -> Whitener:
     band = covariance.reshape(BAND, -1)
     band.reshape(BAND, -1, 3)[0] += JITTER
     return Whitener(cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False))
-
-
-def _parts(drives: Drives) -> Floats:
-    """What a unit of each variance of a noise adds to the errors' covariance (5, 6 · 3N), in lower banded form."""
-    return np.stack([_covariance(drives, unit) for unit in np.eye(5)])
 
 
 def _covariance(drives: Drives, variances: Floats) -> Floats:
@@ -174,31 +169,26 @@ def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
     A start from a model that misses much can end where all noise is too large. Of long drives a part is taken, the same
     for every model.
     """
-    kept = _choose_part(len(errors))
+    # Multiples of the golden ratio spread runs evenly whatever their number, in step with nothing that drives repeat.
+    number = np.arange(len(errors)) // RUN
+    kept = np.asarray(number * 0.6180339887 % 1.0 < THINNED / max(len(errors), 1))
     if not kept.all():
         drives, errors = drives.only(kept), errors[kept]
     found = [_fit_noise(drives, errors, noise) for noise in dict.fromkeys((start, FIRST_GUESS))]
     return min(found, key=lambda pair: pair[0])[1]
 
 
-def _choose_part(count: int) -> NDArray[np.bool_]:
-    """Runs of increments, spread evenly but in step with nothing that drives repeat."""
-    # Multiples of the golden ratio are spread evenly whatever their number.
-    number = np.arange(count) // RUN
-    return np.asarray(number * 0.6180339887 % 1.0 < THINNED / max(count, 1))
-
-
 def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noise]:
     scale = np.concatenate((start.drive, start.pose))
     lowest, highest = np.log(SMALLEST / scale), np.log(LARGEST / scale)
-    parts = _parts(drives)
+    parts = np.stack([_covariance(drives, unit) for unit in np.eye(5)])
 
-    def surprise(logs: Floats) -> float:
+    def negative_log_likelihood(logs: Floats) -> float:
         return -log_likelihood(errors, _factor(np.square(scale * np.exp(logs)) @ parts)) / len(errors)
 
     def with_slope(logs: Floats) -> tuple[float, Floats]:
-        here, steps = surprise(logs), np.where(logs + STEP <= highest, STEP, -STEP)
-        return here, np.array([surprise(moved) - here for moved in logs + np.diag(steps)]) / steps
+        here, steps = negative_log_likelihood(logs), np.where(logs + STEP <= highest, STEP, -STEP)
+        return here, np.array([negative_log_likelihood(moved) - here for moved in logs + np.diag(steps)]) / steps
 
     bounds = list(zip(lowest, highest, strict=True))
     found = minimize(
@@ -208,8 +198,8 @@ def _fit_noise(drives: Drives, errors: Floats, start: Noise) -> tuple[float, Noi
     return float(found.fun), Noise(tuple(values[:3]), tuple(values[3:]))
 
 
-def walk(twists: Floats, tick_s: float) -> Floats:
-    """The poses before the first tick and after each, from the origin on.
+def integrate_twists(twists: Floats, tick_s: float) -> Floats:
+    """Dead-reckon planar poses from body twists: before the first tick and after each, from the origin on.
 
     They are those of the planar plant but for rounding. Episodes are driven by the plant itself: they stay what they
     were to the last bit.
@@ -247,7 +237,7 @@ RANDOM_EFFECTS: Mapping[str, Draws] = {
 
 
 def lateness(theta: Theta, rate_hz: float) -> float:
-    """How late random effects make commands on average [s], at this many commands per second."""
+    """Mean time by which random effects delay commands [s], at this many commands per second."""
     drawn = ((draws, theta.get(name, 0.0)) for name, draws in RANDOM_EFFECTS.items())
     return sum((draws.lateness(value, rate_hz).mean_s for draws, value in drawn if value > 0.0), 0.0)
 
@@ -370,7 +360,7 @@ def _window_wheels(drives: Drives, train: Drivetrain, begin: Whole, length: int)
 def window_features(
     drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
 ) -> list[tuple[Floats, Floats]]:
-    """What each weight of a learnt effect beside a model adds to its motion in such windows, curve by curve.
+    """Motion that each weight of a learnt effect beside a model adds in such windows, curve by curve.
 
     Returns:
         Features (W, length, knots) and the twist that one unit of them makes (3,).
@@ -443,7 +433,7 @@ def _setting(drives: Drives) -> Setting:
 
 
 def _walk_and_track(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
-    return _track(drives, walk(twists, 1.0 / drives.tick_hz), measurement)
+    return _track(drives, integrate_twists(twists, 1.0 / drives.tick_hz), measurement)
 
 
 def _track(drives: Drives, walked: Floats, measurement: Chain) -> Floats:
@@ -469,16 +459,16 @@ def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[s
     return {**theta, **given}
 
 
-def at_edge(name: str, value: float, robot: Robot) -> bool:
-    """Whether a value lies at an end of its parameter's range that is not neutral."""
+def at_edge(name: str, value: float, robot: Robot, rules: Rules = RULES) -> bool:
+    """Tell whether a value lies at an end of its parameter's range that is not neutral."""
     parameter = robot.catalogue.parameters[name]
-    reach = RULES.edge_share * (parameter.high - parameter.low)
+    reach = rules.edge_share * (parameter.high - parameter.low)
     ends = [end for end in (parameter.low, parameter.high) if end != parameter.neutral_value(robot.figures)]
     return any(abs(value - end) <= reach for end in ends)
 
 
 def is_stepwise(coordinate: Coordinate, robot: Robot) -> bool:
-    """Whether a coordinate changes the motion by steps: no slope leads to its best value, so that is scanned for."""
+    """Tell whether a coordinate changes the motion by steps: no slope leads to its best value, which is scanned for."""
     trace = robot.catalogue.effect(effect_of(coordinate[0])).trace
     return trace is not None and trace.stepwise
 

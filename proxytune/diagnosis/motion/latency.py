@@ -1,10 +1,10 @@
-"""How long after its command the motion comes: commands against measured speeds, motors of any slowness allowed.
+"""The latency from a command to its motion: commands against measured speeds, motors of any slowness allowed.
 
 The measured speeds are compared with the commands, shifted in time and passed through a first-order lag of any time
 constant. A lag only ever makes motion later and rounder, a shift alone moves its onset: so the two are told apart, and
 what is left of the latency is the pure one. Delay and the offset between two clocks are both pure latency: one number.
 
-Stretches of drives with one clock: where a clock jumps within a drive, and which drives have another one.
+`stretches` finds where a clock jumps within a drive, and `deviants` the drives that have another one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -169,7 +169,7 @@ class _CommandedSpeeds:
                 yield own, ends, self._gone(slice(begin, begin + count), constant_s)
 
     def _gone(self, episodes: slice, constant_s: float) -> Floats:
-        """How far the commands would have moved the robot by each tick: way [m], turn [rad], times ticks a second."""
+        """Motion that the commands ask for by each tick: way [m], turn [rad], times ticks a second."""
         given, figures = self.drives.duties[episodes], self.drives.robot.figures
         before = np.repeat(self.drives.rest[episodes, None], self.pad, axis=1)
         duties = np.concatenate((before, given, np.repeat(given[:, -1:], self.pad, axis=1)), axis=1)
@@ -198,12 +198,12 @@ def _with_best_gains(speeds: Speeds, asked: Floats, latency_s: float, constant_s
 
 
 def _misfit(found: Reaction) -> float:
-    """What a reaction leaves of the speeds, as a share of their variances."""
+    """Mean square that a reaction leaves of the speeds, as a share of their variances."""
     return float(found.squares.mean())
 
 
 def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencies: Floats, ends: Whole) -> Floats:
-    """What this reaction leaves of each span at each latency (M, latencies), in its own variances.
+    """Squares that this reaction leaves of each span at each latency (M, latencies), in its own variances.
 
     Where the commands had ended, at tick `ends` (E,), nothing speaks for or against a latency.
     """
@@ -357,7 +357,7 @@ def _jumps(squares: Floats, latencies: Floats, most: int, usual: float | None) -
 
 
 def _is_jump(one: Latency, other: Latency, share: float, usual: float | None) -> bool:
-    """Whether the two sides of a block have clearly different latencies.
+    """Tell whether the two sides of a block have clearly different latencies.
 
     Args:
         one: The latency before.

@@ -10,7 +10,6 @@ from proxytune.diagnosis.motion.effect_size import trace_of
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings
 from proxytune.diagnosis.motion.fitting import Fit, evaluate
 from proxytune.diagnosis.motion.screening import Candidate
-from proxytune.diagnosis.rules import RULES
 
 SECONDS = 60.0
 
@@ -95,21 +94,18 @@ LIBRARY: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
 
 
 def next_manoeuvre(found: Findings, *, again: bool = False) -> Manoeuvre | None:
-    """The manoeuvre that tells the adopted effect with a rival from that rival best, None where nothing would.
+    """Choose the manoeuvre that tells the adopted effect with a rival from that rival best, None where nothing would.
 
     Args:
         found: What the search came to.
         again: Whether noise is to be told from what is missing too: it is then driven REPEATS times.
     """
     best = _best_offer(found)
-    if not again:
-        return best
-    return replace(best, times=REPEATS) if best else _repeat_first(found.model.drives)
-
-
-def _repeat_first(drives: Drives) -> Manoeuvre:
-    name, text, shape = LIBRARY[0]
-    return Manoeuvre(name, text, ("noise", "what is missing"), None, _duties_of(shape, drives), REPEATS)
+    if best is None and again:
+        name, text, shape = LIBRARY[0]
+        duties = _duties_of(shape, found.model.drives)
+        return Manoeuvre(name, text, ("noise", "what is missing"), None, duties, REPEATS)
+    return replace(best, times=REPEATS) if best and again else best
 
 
 def _best_offer(found: Findings) -> Manoeuvre | None:
@@ -118,7 +114,7 @@ def _best_offer(found: Findings) -> Manoeuvre | None:
         return None
     offers = [(_nats_apart(found.model, shape, *pairs[0]), name, text, shape) for name, text, shape in LIBRARY]
     clear, name, text, shape = max(offers, key=lambda offer: offer[0])
-    if clear <= RULES.rival_nats:
+    if clear <= found.model.drives.rules.rival_nats:
         return None
     between = (pairs[0][0].effect, pairs[0][1].effect)
     return Manoeuvre(name, text, between, clear, _duties_of(shape, found.model.drives))
@@ -129,7 +125,7 @@ def _duties_of(shape: Callable[[Floats], Floats], drives: Drives) -> Floats:
 
 
 def _nats_apart(model: Fit, shape: Callable[[Floats], Floats], effect: AdoptedEffect, rival: Candidate) -> float:
-    """How clearly a minute of a manoeuvre tells an effect from its rival [nats]."""
+    """Evidence of a minute of a manoeuvre for an effect against its rival [nats]."""
     plain = {key: value for key, value in model.theta.items() if key not in effect.names}
     free = tuple(coordinate for coordinate in model.free if coordinate not in effect.free)
     driven = evaluate(imagine_drive(model.drives, _duties_of(shape, model.drives)), plain, free, model.noise)

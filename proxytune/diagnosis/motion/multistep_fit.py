@@ -1,10 +1,10 @@
-"""Parameters fitted to windows of prediction, instead of to single steps.
+"""The multistep fit: parameters refitted to the multi-step prediction error; and the least error a model could have.
 
 Single steps tell most where the model is right. Where it lacks something, parameters that are best for one step can be
-poor over seconds: fitted to windows they make up for what they can.
-
-The least error that a model could have, measured without trusting any model: noise of poses, and what repeats.
-Confirming on the bullet plant what the planar plant found.
+poor over seconds: fitted to windows of prediction they make up for what they can. `fit_multistep` keeps such values
+only if held-out windows show that they help. `noise_floor` is the error that the noise of measured poses alone makes,
+with that noise from third differences of the residual path, E|Δ³|² = 20 σ² + 6 q · lag (`pose_noise`), and
+`bullet_pose_errors` measures on the bullet plant what the planar plant found.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 from scipy.stats import chi2
 
-from proxytune.diagnosis.motion.drives import Drives, Floats, Recent, Whole
+from proxytune.diagnosis.motion.drives import Drives, Floats, Recent
 from proxytune.diagnosis.motion.fitting import STEP, Fit, evaluate
 from proxytune.diagnosis.motion.innovations import (
     Coordinate,
@@ -37,7 +37,6 @@ from proxytune.diagnosis.motion.prediction import (
     ratio,
     select_windows,
 )
-from proxytune.diagnosis.rules import RULES
 from proxytune.driving import BulletPlant
 from proxytune.space import Theta
 
@@ -58,7 +57,7 @@ MOST_TRIALS = 20
 """A fit takes no more windows, and looks no more often: it stays within seconds on long logs."""
 
 
-class Polish(NamedTuple):
+class MultistepFit(NamedTuple):
     """The result of fitting parameters to windows.
 
     Attributes:
@@ -73,8 +72,10 @@ class Polish(NamedTuple):
 
 
 def horizons(drives: Drives) -> tuple[float, ...]:
-    """The horizons of which these drives have windows in enough blocks."""
-    return tuple(h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= RULES.fewest_blocks)
+    """List the horizons of which these drives have windows in enough blocks."""
+    return tuple(
+        h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= drives.rules.fewest_blocks
+    )
 
 
 def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
@@ -89,11 +90,13 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
     fitted = smooth_coordinates(free, drives.robot)
     if not fitted or len(windows.begin) == 0:
         return dict(theta)
-    problem = _problem(drives, theta, fitted, _thin(windows))
+    every = -(-len(windows.begin) // MOST_WINDOWS)
+    thinned = select_windows(windows, np.arange(len(windows.begin)) % every == 0)
+    problem = _problem(drives, theta, fitted, thinned)
     found = least_squares(
-        problem.left,
+        problem.residuals,
         problem.start,
-        problem.slopes,
+        problem.jacobian,
         (0.0, 1.0),
         loss="soft_l1",
         f_scale=problem.scale,
@@ -112,7 +115,7 @@ class _Problem(NamedTuple):
     windows: Windows
     measured: Floats
     weights: Floats
-    misses: Recent[Floats]
+    recent: Recent[Floats]
 
     @property
     def start(self) -> Floats:
@@ -122,28 +125,28 @@ class _Problem(NamedTuple):
 
     @property
     def scale(self) -> float:
-        return max(1e-6, ROBUST * float(np.median(np.abs(self.left(self.start)))))
+        return max(1e-6, ROBUST * float(np.median(np.abs(self.residuals(self.start)))))
 
     def at(self, fractions: Floats) -> dict[str, float]:
         low, high = np.array([span(coordinate, self.drives.robot) for coordinate in self.free]).T
         return theta_at(self.theta, self.free, low + fractions * (high - low))
 
-    def left(self, fractions: Floats) -> Floats:
-        return self.misses.get(fractions.tobytes(), lambda: self._misses(self.at(fractions)))
+    def residuals(self, fractions: Floats) -> Floats:
+        def make() -> Floats:
+            apart = predicted_motion(self.drives, self.at(fractions), self.windows) - self.measured
+            misses = np.asarray((apart * self.weights).ravel())
+            misses.setflags(write=False)
+            return misses
 
-    def _misses(self, theta: Theta) -> Floats:
-        apart = predicted_motion(self.drives, theta, self.windows) - self.measured
-        misses = np.asarray((apart * self.weights).ravel())
-        misses.setflags(write=False)
-        return misses
+        return self.recent.get(fractions.tobytes(), make)
 
-    def slopes(self, fractions: Floats) -> Floats:
-        here, columns = self.left(fractions), []
+    def jacobian(self, fractions: Floats) -> Floats:
+        here, columns = self.residuals(fractions), []
         for number in range(len(fractions)):
             step = STEP if fractions[number] + STEP <= 1.0 else -STEP
             moved = fractions.copy()
             moved[number] += step
-            columns.append((self.left(moved) - here) / step)
+            columns.append((self.residuals(moved) - here) / step)
         return np.stack(columns, axis=1)
 
 
@@ -154,13 +157,8 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
     return _Problem(drives, theta, free, windows, measured, np.array((1.0, 1.0, max(chord, 1e-3))), Recent())
 
 
-def _thin(windows: Windows) -> Windows:
-    every = -(-len(windows.begin) // MOST_WINDOWS)
-    return select_windows(windows, np.arange(len(windows.begin)) % every == 0)
-
-
 def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
-    """Squared distance [m²] at every compared pose, by horizon [s].
+    """Predict every compared pose, by horizon [s]: its squared distance from the measured one [m²].
 
     No pose is predicted by what was fitted to its own fold.
 
@@ -170,7 +168,7 @@ def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], f
         free: What is fitted.
         fitted_s: Length of the windows that are fitted to [s].
     """
-    fold = _folds(drives)
+    fold = np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
     windows = cut(drives, fitted_s)
     asked = {horizon: cut(drives, horizon) for horizon in horizons(drives)}
     found = {horizon: np.zeros(len(one.increment)) for horizon, one in asked.items()}
@@ -183,17 +181,13 @@ def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], f
     return found
 
 
-def _folds(drives: Drives) -> Whole:
-    """The fold of each increment (N,)."""
-    return np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
-
-
 def compare_errors(drives: Drives, one: Mapping[float, Floats], other: Mapping[float, Floats]) -> dict[float, Ratio]:
-    """The ratio of two errors over the same windows, by horizon [s]."""
-    return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h))) for h, squares in one.items()}
+    """Divide two errors over the same windows, by horizon [s]."""
+    shown_at = drives.rules.ratio_p_value
+    return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h)), shown_at) for h, squares in one.items()}
 
 
-def polish_fit(fitted: Fit) -> tuple[Fit, Polish | None]:
+def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
     """Fit the parameters to windows, and keep that if held-out windows show that it helps and nowhere harms."""
     drives = fitted.drives
     plain = {h: pose_errors(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
@@ -201,15 +195,15 @@ def polish_fit(fitted: Fit) -> tuple[Fit, Polish | None]:
     for length in [s for s in FITTED_S if s in plain]:
         ratios = compare_errors(drives, held_out_squares(drives, fitted.theta, fitted.free, length), plain)
         values = [one.value for one in ratios.values()]
-        helps = min(values) < RULES.polish_helps and max(values) <= RULES.polish_harms
+        helps = min(values) < drives.rules.multistep_helps and max(values) <= drives.rules.multistep_harms
         if helps and (best is None or sum(values) < best[0]):
             best = (sum(values), length, ratios)
     if best is None:
         return fitted, None
     windows = cut(drives, best[1])
     theta = fit_windows(drives, fitted.theta, fitted.free, windows)
-    polish = Polish(best[1], best[2], _intervals(drives, theta, smooth_coordinates(fitted.free, drives.robot), windows))
-    return evaluate(drives, theta, fitted.free, fitted.noise), polish
+    known = _intervals(drives, theta, smooth_coordinates(fitted.free, drives.robot), windows)
+    return evaluate(drives, theta, fitted.free, fitted.noise), MultistepFit(best[1], best[2], known)
 
 
 def _intervals(
@@ -218,13 +212,13 @@ def _intervals(
     """95 % intervals from the spread between blocks (sandwich)."""
     problem = _problem(drives, theta, free, windows)
     here = problem.start
-    left, slopes, scale = problem.left(here), problem.slopes(here), problem.scale
-    pull = slopes * (left / np.sqrt(1.0 + (left / scale) ** 2))[:, None]
-    curve = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
+    left, slopes, scale = problem.residuals(here), problem.jacobian(here), problem.scale
+    gradient = slopes * (left / np.sqrt(1.0 + (left / scale) ** 2))[:, None]
+    hessian = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
     _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)
-    pulls = np.stack([np.bincount(block, column) for column in pull.T], axis=1)
-    inverse = np.linalg.pinv(curve, hermitian=True)
-    spread = inverse @ (pulls.T @ pulls) @ inverse * len(pulls) / max(1, len(pulls) - len(free))
+    sums = np.stack([np.bincount(block, column) for column in gradient.T], axis=1)
+    inverse = np.linalg.pinv(hessian, hermitian=True)
+    spread = inverse @ (sums.T @ sums) @ inverse * len(sums) / max(1, len(sums) - len(free))
     found: dict[str, tuple[float, float]] = {}
     for coordinate, variance in zip(free, np.diag(spread), strict=True):
         low, high = span(coordinate, drives.robot)
@@ -313,12 +307,12 @@ def noise_floor(drives: Drives, windows: Windows, noise: PoseNoise) -> tuple[flo
 
 
 def has_body(drives: Drives) -> bool:
-    """Whether the bullet plant has a body for this robot."""
+    """Tell whether the bullet plant has a body for this robot."""
     return drives.robot.urdf is not None
 
 
 def bullet_pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    """How far the bullet plant's pose is from the measured one (M, 2): distance [m], heading [rad].
+    """Measure the errors of the bullet plant's poses (M, 2): distance [m], heading [rad].
 
     Each episode is driven in one go from its first command; windows compare the motion since their beginning.
     """

@@ -1,8 +1,9 @@
-"""What a fitted model says of any log: poses predicted window by window.
+"""Prediction over windows, each started from a measured pose, and how far it is from what was measured.
 
-Windows of prediction: the errors of a model that starts each window from the measured pose.
-The errors of windows, and how each weight of a learnt effect would move them.
-Manoeuvres that were driven twice from the same commands: what differs between them no model can predict.
+`cut` cuts drives into windows of a horizon, `pose_errors` replays them open-loop, and `ratio` divides root mean squares
+of two models over the same windows, with a t-interval on its logarithm from leaving blocks out in turn. `predict` gives
+the poses of any log. `slopes_of` linearises windows in the weights of learnt curves. `compare_repeats` takes manoeuvres
+that were driven several times from the same commands: no model can predict what differs between them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import t as student, wilcoxon
 
+from proxytune.diagnosis.answer import RULES
 from proxytune.diagnosis.motion.drives import (
     Drives,
     Floats,
@@ -25,8 +27,13 @@ from proxytune.diagnosis.motion.drives import (
     relative,
     sum_by,
 )
-from proxytune.diagnosis.motion.innovations import tracked_paths, walk, window_features, window_paths, window_twists
-from proxytune.diagnosis.rules import RULES
+from proxytune.diagnosis.motion.innovations import (
+    integrate_twists,
+    tracked_paths,
+    window_features,
+    window_paths,
+    window_twists,
+)
 from proxytune.driving import Robot
 from proxytune.effects import Learnt, is_learnt
 from proxytune.errors import LogError
@@ -87,11 +94,12 @@ def pose_differences(drives: Drives, theta: Theta, windows: Windows) -> Floats:
 
 def predicted_motion(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """The model's motion since each window's beginning (M, 3): [m], [m], [rad]."""
-    return np.concatenate([_replayed(some, theta, own) for some, own in _batches(drives, windows)])
-
-
-def _replayed(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    return motion_in(drives, window_paths(drives, theta, windows.begin, length_of(drives, windows)), windows)
+    return np.concatenate(
+        [
+            motion_in(some, window_paths(some, theta, own.begin, length_of(some, own)), own)
+            for some, own in _batches(drives, windows)
+        ]
+    )
 
 
 def _batches(drives: Drives, windows: Windows) -> Iterator[tuple[Drives, Windows]]:
@@ -126,13 +134,13 @@ def motion_in(drives: Drives, walked: Floats, windows: Windows) -> Floats:
 
 
 def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    """How far the model's pose is from the measured one (M, 2): distance [m], heading [rad]."""
-    return _size(pose_differences(drives, theta, windows))
+    """Measure the errors of the model's poses (M, 2): distance [m], heading [rad]."""
+    return _lengths(pose_differences(drives, theta, windows))
 
 
 def pose_errors_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
     """The errors (M, 2) of paths that were driven in one go (E, T + 1, 3)."""
-    return _size(motion_along(drives, walked, windows) - measured_motion(drives, windows))
+    return _lengths(motion_along(drives, walked, windows) - measured_motion(drives, windows))
 
 
 def motion_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
@@ -149,7 +157,7 @@ def measured_motion(drives: Drives, windows: Windows) -> Floats:
     return relative(drives.poses[windows.begin[windows.window], 0], drives.poses[windows.increment, 1])
 
 
-def _size(difference: Floats) -> Floats:
+def _lengths(difference: Floats) -> Floats:
     return np.stack((np.hypot(difference[:, 0], difference[:, 1]), np.abs(difference[:, 2])), axis=1)
 
 
@@ -168,22 +176,24 @@ class Ratio(NamedTuple):
         interval: Its 95 % interval, from leaving blocks out in turn.
         p_below: How likely chance makes so many blocks' ratios so far below 1 (Wilcoxon's signed ranks, one-sided).
         p_above: The same above 1.
+        shown_at: The chance below which it is shown to be off 1.
     """
 
     value: float
     interval: tuple[float, float]
     p_below: float = 1.0
     p_above: float = 1.0
+    shown_at: float = RULES.ratio_p_value
 
     @property
     def below(self) -> bool:
-        """Whether it is shown to be below 1, by its interval or, where few blocks weigh most, by signed ranks."""
-        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < RULES.ratio_p_value)
+        """Tell whether it is shown to be below 1, by its interval or, where few blocks weigh most, by signed ranks."""
+        return self.value < 1.0 and (self.interval[1] < 1.0 or self.p_below < self.shown_at)
 
     @property
     def above(self) -> bool:
-        """Whether it is shown to be above 1."""
-        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < RULES.ratio_p_value)
+        """Tell whether it is shown to be above 1."""
+        return self.value > 1.0 and (self.interval[0] > 1.0 or self.p_above < self.shown_at)
 
 
 def rmse(squares: Floats, blocks: Whole) -> Rmse:
@@ -191,15 +201,15 @@ def rmse(squares: Floats, blocks: Whole) -> Rmse:
     return _root(float(np.log(squares.mean())), _half_width(_log_means_without_each(squares, blocks)))
 
 
-def ratio(after: Floats, before: Floats, blocks: Whole) -> Ratio:
-    """The ratio of two root mean squares over the same windows, with its interval."""
+def ratio(after: Floats, before: Floats, blocks: Whole, shown_at: float = RULES.ratio_p_value) -> Ratio:
+    """Divide two root mean squares over the same windows, with an interval and the chance of a ratio so far off 1."""
     half = _half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
     value, interval = _root(float(np.log(after.mean() / before.mean())), half)
-    return Ratio(value, interval, *_signed_ranks(after, before, blocks))
+    return Ratio(value, interval, *_signed_ranks(after, before, blocks), shown_at)
 
 
 def _signed_ranks(after: Floats, before: Floats, blocks: Whole) -> tuple[float, float]:
-    """How likely chance makes the blocks' ratios so far below 1, and so far above."""
+    """The chance of blocks' ratios so far below 1, and so far above."""
     _, label = np.unique(blocks, return_inverse=True)
     sums = np.stack([np.bincount(label, squares) for squares in (after, before)])
     logs = -np.diff(np.log(sums[:, (sums > 0.0).all(axis=0)]), axis=0)[0]
@@ -321,7 +331,7 @@ def _place_at(start: Floats, walked: Floats, origin: Floats) -> Floats:
 
 
 class Agreement(NamedTuple):
-    """How far predicted poses are from those measured, over windows of the horizon.
+    """The errors of predicted poses over windows of the horizon.
 
     Attributes:
         place: RMSE of position [m], 0 where nothing can be compared.
@@ -337,7 +347,7 @@ class Agreement(NamedTuple):
 
 
 def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:
-    """How far predicted poses are from those measured after each window's start.
+    """Compare predicted poses with those measured after each window's start.
 
     Windows in which measured poses reach no further than a stub of the horizon are left out.
 
@@ -379,12 +389,12 @@ class Slopes(NamedTuple):
     """Windows' poses as they are compared, in metres.
 
     Attributes:
-        left: Measured less predicted (M, 3): forward, left, and heading times the median way.
+        residuals: Measured less predicted (M, 3): forward, left, and heading times the median way.
         columns: Change of the prediction per weight (M, 3, weights), curve by curve.
         block: The block of each pose (M,).
     """
 
-    left: Floats
+    residuals: Floats
     columns: Floats
     block: Whole
 
@@ -416,7 +426,7 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
     twists = window_twists(drives, theta, begin, length)
     walked = tracked_paths(drives, theta, twists)
     predicted = motion_in(drives, walked, windows)
-    measured = relative(drives.poses[begin[window], 0], drives.poses[windows.increment, 1])
+    measured = measured_motion(drives, windows)
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
     features = window_features(drives, named, offered, begin, length)
     lever = _lever(twists, walked, 1.0 / drives.tick_hz)
@@ -428,7 +438,7 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt) -> Slopes:
 
 
 class _Lever(NamedTuple):
-    """What a twist added in one tick does to the places that come after, as complex numbers (W, length).
+    """The effect of a twist in one tick on the places that come after, as complex numbers (W, length).
 
     Attributes:
         along: The way of forward motion at 1 m/s within the tick [m].
@@ -445,7 +455,7 @@ class _Lever(NamedTuple):
 
 def _lever(twists: Floats, walked: Floats, tick_s: float) -> _Lever:
     """The lever of twists (W, length, 3), along which the tracked places (W, length + 1, 3) are."""
-    poses = walk(twists, tick_s)
+    poses = integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
     axle = 0.5 * (poses[:, 1:] + poses[:, :-1])
     about = (axle[..., 1] - 1j * axle[..., 0]) * tick_s
@@ -514,7 +524,11 @@ def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated 
     kept = counts[label] > 1
     if len(np.unique(windows.window[kept])) < FEWEST:
         return None
-    apart = _scatter_of_repeats(measured_motion(drives, windows)[:, :2], label, counts)
+    # Squared distance of each motion from the mean of its repeats, as if that were known without error.
+    moved = measured_motion(drives, windows)[:, :2]
+    mean = sum_by(label, moved, len(counts)) / counts[:, None]
+    known = np.maximum(1, counts - 1)[label] / counts[label]
+    apart = np.asarray(np.square(moved - mean[label]).sum(axis=1) / known)
     missed = pose_errors(drives, theta, windows)[:, 0] ** 2
     first = np.flatnonzero(np.diff(windows.window, prepend=-1))
     share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])
@@ -527,21 +541,11 @@ def _label_repeats(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
     A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero.
     """
     begin, end = drives.first[windows.begin][windows.window], drives.last[windows.increment]
-    past = _histories(drives)[drives.episode[windows.increment], end - 1]
+    # A number for all commands up to each tick: equal ones have the same, and no commands have 0.
+    rounded = np.round(drives.duties / ALIKE).astype(np.int64)
+    weights = np.random.default_rng(1).integers(1, 2**62, size=rounded.shape[1:])
+    histories = np.asarray(np.cumsum((rounded * weights).sum(axis=-1), axis=1))
+    past = histories[drives.episode[windows.increment], end - 1]
     alone = np.where(past == 0, np.arange(len(past)) + 1, 0)
     _, label, counts = np.unique(np.stack((past, begin, end, alone)), axis=1, return_inverse=True, return_counts=True)
     return label.ravel(), counts
-
-
-def _histories(drives: Drives) -> Whole:
-    """A number for all commands up to each tick (E, T): equal ones have the same, and no commands have 0."""
-    rounded = np.round(drives.duties / ALIKE).astype(np.int64)
-    weights = np.random.default_rng(1).integers(1, 2**62, size=rounded.shape[1:])
-    return np.asarray(np.cumsum((rounded * weights).sum(axis=-1), axis=1))
-
-
-def _scatter_of_repeats(moved: Floats, label: Whole, counts: Whole) -> Floats:
-    """Squared distance [m²] of each motion (M, 2) from the mean of its repeats, as if that were known without error."""
-    mean = sum_by(label, moved, len(counts)) / counts[:, None]
-    share = np.maximum(1, counts - 1)[label] / counts[label]
-    return np.asarray(np.square(moved - mean[label]).sum(axis=1) / share)

@@ -1,11 +1,13 @@
-"""Effects that strike at random: what they do to single commands, weighed as a mixture over all commands.
+"""Effects that strike at random: the response of motion to single commands, weighed as a mixture over all commands.
 
-A mean model cannot see them: a command that is lost now and then changes the motion after it, not on average.
+A mean model cannot see them: a command that is lost now and then changes the motion after it, not on average. With a_j
+the change of the innovations z had command j been lost, the log-likelihood ratio of an effect that makes a command late
+by l commands with probability π_l is Σ_j log Σ_l π_l exp(−l a_jᵀz − ½ l² a_jᵀa_j): a size is weighed by its maximum,
+against the same for innovations shifted in time.
 
-How large a random effect is: of that size, simulated drives speak for it as the measured ones do.
-
-The likelihood of single commands takes all others as they were sent. Where many are lost or late it finds too small a
-size, and much too narrow an interval; simulated drives have the same fault, and so give it back (indirect inference).
+This likelihood takes all other commands as they were sent. Where many are lost or late it finds too small a size, and
+much too narrow an interval; simulated drives have the same fault, and so give it back: `infer_size_indirectly` finds
+the size of which simulated drives speak for the effect as the measured ones do (indirect inference).
 """
 
 import math
@@ -40,15 +42,15 @@ SHIFTS = 99
 
 
 class Responses(NamedTuple):
-    """What would have happened had a command been lost: one row per command that changed anything.
+    """Responses of the innovations to the loss of single commands: one row per command that changed anything.
 
     Attributes:
-        pull: Inner product of the change of the innovations with the innovations.
+        gradient: Inner product of the change of the innovations with the innovations.
         size: Inner product of the change with itself.
-        others: The pull had the innovations been others (columns, commands).
+        others: The gradient had the innovations been others (columns, commands).
     """
 
-    pull: Floats
+    gradient: Floats
     size: Floats
     others: Floats
 
@@ -60,7 +62,7 @@ class RandomEffect(NamedTuple):
         effect: Its name in the catalogue.
         parameter: The name of its parameter in θ.
         value: Its likeliest size.
-        interval: Where the size lies; all sizes that are looked for, until `size_random_effect` narrows them.
+        interval: Where the size lies; all sizes that are looked for, until `infer_size_indirectly` narrows them.
         gain: Its gain in log-likelihood beyond what chance gives on average [nats].
         p_value: How often chance gains as much.
     """
@@ -74,9 +76,10 @@ class RandomEffect(NamedTuple):
 
 
 def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
-    """Every effect that draws, weighed on what the model leaves over."""
+    """Weigh every effect that draws on what the model leaves over."""
     z = fitted.innovations.reshape(-1, 3)
-    shifts = _shifts(len(z), seed)
+    apart = len(z) // 20
+    shifts = np.random.default_rng(seed).integers(apart + 1, len(z) - apart, size=SHIFTS)
     answered = responses(fitted, np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1))
     if len(answered.size) == 0:
         return ()
@@ -85,19 +88,19 @@ def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
 
 
 def _weigh(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
-    best, gain = likeliest_size(draws, rate_hz, answered.pull, answered.size)
+    best, gain = likeliest_size(draws, rate_hz, answered.gradient, answered.size)
     chance = np.max([_ratio(draws, rate_hz, size, answered.others, answered.size) for size in _grid(draws)], axis=0)
     p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
     return RandomEffect(effect, effect, best, draws.sizes, gain - max(0.0, float(chance.mean())), p_value)
 
 
-def likeliest_size(draws: Draws, rate_hz: float, pull: Floats, energy: Floats) -> tuple[float, float]:
-    """The size of an effect that the responses of commands (commands,) speak for most, and what it gains [nats]."""
+def likeliest_size(draws: Draws, rate_hz: float, gradient: Floats, energy: Floats) -> tuple[float, float]:
+    """Find the size of an effect that responses of commands (commands,) speak for most, and its gain [nats]."""
     grid = _grid(draws)
-    here = int(np.argmax([_ratio(draws, rate_hz, size, pull, energy) for size in grid]))
+    here = int(np.argmax([_ratio(draws, rate_hz, size, gradient, energy) for size in grid]))
     ends = np.log((grid[max(0, here - 1)], grid[min(len(grid) - 1, here + 1)]))
     found = minimize_scalar(
-        lambda log: -float(_ratio(draws, rate_hz, float(np.exp(log)), pull, energy)),
+        lambda log: -float(_ratio(draws, rate_hz, float(np.exp(log)), gradient, energy)),
         bounds=(float(ends[0]), float(ends[1])),
         method="bounded",
     )
@@ -108,22 +111,22 @@ def _grid(draws: Draws) -> Floats:
     return np.geomspace(*draws.sizes, GRID)
 
 
-def _ratio(draws: Draws, rate_hz: float, size: float, pull: Floats, energy: Floats) -> Floats:
+def _ratio(draws: Draws, rate_hz: float, size: float, gradient: Floats, energy: Floats) -> Floats:
     """The log-likelihood ratio of an effect of this size, over all commands (…,)."""
     late = draws.lateness(size, rate_hz)
-    return np.asarray(np.apply_along_axis(lambda row: _mixture(late, row, energy).sum(), -1, pull))
+    return np.asarray(np.apply_along_axis(lambda row: _mixture(late, row, energy).sum(), -1, gradient))
 
 
-def _mixture(late: Lateness, pull: Floats, energy: Floats) -> Floats:
+def _mixture(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
     """The log-likelihood ratio of each command's having been late by one of these times (commands,)."""
     steps = np.stack((-late.commands, -0.5 * late.commands**2, late.log_weights), axis=1)
-    ratios = steps @ np.stack((pull, energy, np.ones_like(pull)))
+    ratios = steps @ np.stack((gradient, energy, np.ones_like(gradient)))
     most = ratios.max(axis=0)
     return np.asarray(most + np.log(np.exp(ratios - most).sum(axis=0)))
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:
-    """What the loss of each command would have changed.
+    """Replay the drives with each command lost, and see what changes.
 
     Commands far apart are lost together, so that one replay tells of many.
 
@@ -138,9 +141,9 @@ def responses(fitted: Fit, others: Floats) -> Responses:
     found = [_respond_to_phase(fitted, changed[phase == number], heard) for number in np.unique(phase)]
     if not found:
         return Responses(np.empty(0), np.empty(0), np.empty((others.shape[1], 0)))
-    size, pulls = (np.concatenate(part) for part in zip(*found, strict=True))
+    size, gradients = (np.concatenate(part) for part in zip(*found, strict=True))
     kept = size > 1e-3
-    return Responses(pulls[kept, 0], size[kept], pulls[kept, 1:].T)
+    return Responses(gradients[kept, 0], size[kept], gradients[kept, 1:].T)
 
 
 def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
@@ -173,14 +176,18 @@ class _Innovations(NamedTuple):
 
 
 def _respond_to_phase(fitted: Fit, lost: Whole, heard: _Innovations) -> tuple[Floats, Floats]:
-    """The size of the response to each command of one phase (commands,), and its pulls (commands, columns)."""
+    """The size of the response to each command of one phase (commands,), and its gradients (commands, columns)."""
     drives = fitted.drives
     without = increments_along(drives, paths(drives, fitted.theta, _lose_commands(drives, lost)))
     change = fitted.whiten.whiten(increments(drives, fitted.theta) - without)
-    label = np.repeat(_label(drives, lost), 3)
+    # Which lost command each increment comes after, −1 where none.
+    length = drives.duties.shape[1]
+    at = np.searchsorted(lost @ (length, 1), drives.episode * length + drives.last - 1, side="right") - 1
+    after = np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
+    label = np.repeat(after, 3)
     size = sum_by(label, change**2, len(lost))
-    pulls = sum_by(label, heard.values, len(lost), change)
-    return size, pulls / _loudness(label, change, heard, pulls / (size[:, None] + 1e-12))
+    gradients = sum_by(label, heard.values, len(lost), change)
+    return size, gradients / _loudness(label, change, heard, gradients / (size[:, None] + 1e-12))
 
 
 def _loudness(label: Whole, change: Floats, heard: _Innovations, share: Floats) -> Floats:
@@ -194,17 +201,6 @@ def _loudness(label: Whole, change: Floats, heard: _Innovations, share: Floats) 
     cubes = sum_by(label, weight, count, change**2)[:, None]
     energy = sum_by(label, heard.squares, count, weight) - 2.0 * share * along + share**2 * cubes
     return np.asarray(np.sqrt(np.maximum(1.0, energy / total)))
-
-
-def _label(drives: Drives, lost: Whole) -> Whole:
-    """Which lost command each increment comes after, −1 where none (N,)."""
-    length = drives.duties.shape[1]
-    at = np.searchsorted(lost @ (length, 1), drives.episode * length + drives.last - 1, side="right") - 1
-    return np.where((at >= 0) & (lost[np.maximum(at, 0), 0] == drives.episode), at, -1)
-
-
-def _shifts(length: int, seed: int) -> Whole:
-    return np.random.default_rng(seed).integers(length // 20 + 1, length - length // 20, size=SHIFTS)
 
 
 SMALLEST, LARGEST, SIZES = 0.6, 3.0, 8
@@ -223,8 +219,8 @@ WIDE = 2.2
 """Half an interval is so many standard deviations between simulated drives: 95 % for some thirty of them."""
 
 
-def size_random_effect(model: Fit, effect: RandomEffect, seed: int) -> RandomEffect:
-    """The effect with the size at which simulated drives say what the measured ones do, and its interval.
+def infer_size_indirectly(model: Fit, effect: RandomEffect, seed: int) -> RandomEffect:
+    """Give the effect the size at which simulated drives say what the measured ones do, and its interval.
 
     Args:
         model: The model without the effect, whose delay has its mean lateness.
@@ -235,7 +231,7 @@ def size_random_effect(model: Fit, effect: RandomEffect, seed: int) -> RandomEff
     sizes = np.geomspace(SMALLEST * effect.value, min(LARGEST * effect.value, draws.sizes[1]), SIZES)
     simulated = [_simulate_innovations(model, effect, size, seed + n) for n in range(DRAWS) for size in sizes]
     answered = responses(model, np.stack(simulated, axis=1))
-    likeliest = np.log([likeliest_size(draws, rate, pull, answered.size)[0] for pull in answered.others])
+    likeliest = np.log([likeliest_size(draws, rate, one, answered.size)[0] for one in answered.others])
     value, low, high = _invert(sizes, likeliest.reshape(DRAWS, SIZES), float(np.log(effect.value)))
     return effect._replace(value=value, interval=(low, high))
 
@@ -250,7 +246,7 @@ def _invert(sizes: Floats, likeliest: Floats, measured: float) -> Sequence[float
 
 
 def _simulate_innovations(model: Fit, effect: RandomEffect, size: float, seed: int) -> Floats:
-    """What the model leaves over of drives with the effect and noise, as loud as that of the measured ones (3N,)."""
+    """Innovations of the model on drives with the effect and with noise, as loud as those measured (3N,)."""
     drives = model.drives
     late = lateness({effect.parameter: size}, drives.rate_hz)
     theta = {**model.theta, effect.parameter: size, "delay": max(0.0, model.theta["delay"] - late)}
@@ -258,12 +254,8 @@ def _simulate_innovations(model: Fit, effect: RandomEffect, size: float, seed: i
     struck = model.whiten.whiten(drawn)
     noise = np.random.default_rng(seed).standard_normal(len(struck))
     share = max(QUIETEST, 1.0 - float(np.mean(struck**2)) / float(np.mean(model.innovations**2)))
-    return _refit(model, struck + np.sqrt(share * np.mean(model.innovations**2)) * noise)
-
-
-def _refit(model: Fit, innovations: Floats) -> Floats:
-    """What is left of innovations (3N,) once the model's free parameters have been fitted to them."""
-    left = innovations
+    left: Floats = struck + np.sqrt(share * np.mean(model.innovations**2)) * noise
+    # What is left once the model's free parameters have been fitted again.
     for _ in range(STEPS):
         weighted = model.slopes * (np.abs(left) < HUBER)[:, None]
         left = left - model.slopes @ (

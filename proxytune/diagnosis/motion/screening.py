@@ -1,14 +1,21 @@
-"""Which effects could explain what is left: one step from every probe value, and what chance would make of it.
+"""The score test of every candidate effect on the whitened innovations of a model.
 
-What might be missing: every motion effect of a catalogue, in the forms it can take.
-Probes close together, for effects that no slope leads to, steps and places; tried on a part of the drives.
+Candidates are all motion effects of a catalogue in the forms they can take (`candidates`), each with a few probes;
+effects that no slope leads to, steps and places, get the best of many more (`with_dense_probes`). With z the
+innovations, ψ Huber's clipped z, w the weight of those that are no outliers, and D the change of z along a form's
+coordinates with all that the free parameters can do projected out,
+
+    gradient  g = Dᵀψ,    Hessian  H = Dᵀ(w·D),    step  m = −H⁺g,    gain = −(gᵀm + ½ mᵀHm)  [nats],
+
+one Gauss–Newton step from each probe. Its null distribution flips the signs of z in stretches of a second and takes the
+largest gain of all candidates, so that the p-value allows for having looked at many.
 """
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product, repeat
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,7 +50,7 @@ class Candidate:
 
     Attributes:
         effect: Its name in the catalogue.
-        form: What is special about this form: `left wheel`; empty where nothing is.
+        form: The name of this form, `left wheel`; empty for the plain one.
         free: Its coordinates.
         fixed: Its other parameters.
         neutral: Where the model has its coordinates.
@@ -59,40 +66,34 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """What people read: `dead_band (left wheel)`."""
+        """The name that people read: `dead_band (left wheel)`."""
         return f"{self.effect} ({self.form})" if self.form else self.effect
 
 
 def candidates(robot: Robot, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
-    """Every form of every deterministic motion effect that is not taken.
+    """List every form of every deterministic motion effect that is not taken.
 
     Args:
         robot: The robot, whose catalogue says what there is.
         theta: Values of effects that the model has: a form starts from there.
         taken: Names of effects that are declared or adopted.
     """
-    kept = set(taken)
-    found: list[Candidate] = []
-    for name in motion_effects(robot.catalogue):
-        if name not in kept and name not in RANDOM_EFFECTS:
-            found += _forms(name, robot, theta)
-    return tuple(found)
+    left_out = {*taken, *RANDOM_EFFECTS}
+    names = (name for name in motion_effects(robot.catalogue) if name not in left_out)
+    return tuple(form for name in names for form in _forms(name, robot, theta))
 
 
 def _forms(effect: str, robot: Robot, theta: Theta) -> list[Candidate]:
+    """The forms of an effect: with every parameter free, unless it says otherwise."""
     kind = robot.catalogue.effect(effect)
     known = {
         parameter.name: theta.get(name, parameter.neutral_value(robot.figures))
         for name, parameter in zip(theta_names(kind, effect), kind.parameters, strict=True)
     }
     present = known[kind.parameters[0].name] != kind.parameters[0].neutral
-    return [_candidate(effect, kind, form, known) for form in _forms_of(kind) if form.present in (None, present)]
-
-
-def _forms_of(kind: type[Effect]) -> tuple[Form, ...]:
-    """The forms that an effect may take: with every parameter free, unless it says otherwise."""
     stated = kind.trace.forms if kind.trace else ()
-    return stated or (Form(tuple((parameter.name,) for parameter in kind.parameters)),)
+    forms = stated or (Form(tuple((parameter.name,) for parameter in kind.parameters)),)
+    return [_candidate(effect, kind, form, known) for form in forms if form.present in (None, present)]
 
 
 def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, float]) -> Candidate:
@@ -100,7 +101,7 @@ def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, 
     parameters = {parameter.name: parameter for parameter in kind.parameters}
     held = {name for coordinate in form.free for name in coordinate}
     tried = [
-        _other_probes(parameters[first], known[first])
+        [value for value in parameters[first].probes if not math.isclose(value, known[first], abs_tol=1e-9)]
         if first in form.moved or not form.moved
         else repeat(known[first])
         for first, *_ in form.free
@@ -113,11 +114,6 @@ def _candidate(effect: str, kind: type[Effect], form: Form, known: Mapping[str, 
         neutral=tuple(known[first] for first, *_ in form.free),
         probes=tuple(zip(*tried, strict=False)),
     )
-
-
-def _other_probes(parameter: Parameter, here: float) -> tuple[float, ...]:
-    """The probes that differ from where the model is."""
-    return tuple(value for value in parameter.probes if not math.isclose(value, here, abs_tol=1e-9))
 
 
 SIZES = 240
@@ -138,79 +134,51 @@ MOST_PLACES = 40
 LARGEST_STEP = 1.5
 """A step may go so many times as far as its probe."""
 
-Values = tuple[float, ...]
-
 
 def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     """The forms, those of stepwise effects and of effects of a place with the best of many more probes."""
-    dense = [form for form in forms if not form.form and _dense_along(form, base.drives.robot) is not None]
+    robot, traces = base.drives.robot, base.drives.robot.catalogue
+    kinds = {form.effect: traces.effect(form.effect).trace for form in forms if not form.form}
+    dense = [
+        form
+        for form in forms
+        if not form.form and (trace := kinds[form.effect]) is not None and (trace.stepwise or trace.placed)
+    ]
     if not dense:
         return list(forms)
-    part = cut_part(base.drives)
-    left = _residual_of(evaluate(part, base.theta, base.free, base.noise))
-    best = {form.effect: _best_probe(left, form) for form in dense}
+    part = evaluate(cut_part(base.drives), base.theta, base.free, base.noise)
+    predicted, best = increments(part.drives, part.theta), dict[str, tuple[tuple[float, ...], ...]]()
+    weight = (np.abs(part.innovations) < HUBER).astype(float)
+    weighted = part.slopes * weight[:, None]
+    answer = np.linalg.pinv(part.slopes.T @ weighted, hermitian=True) @ weighted.T
+    for form in dense:
+        trace = kinds[form.effect]
+        offers = _sizes(form, robot) if trace is not None and trace.stepwise else _places(part.drives, form)
+        gains = []
+        for values in offers:
+            theta = theta_at({**part.theta, **form.fixed}, form.free, np.array(values))
+            column = part.whiten.whiten(predicted - increments(part.drives, theta))
+            column = column - part.slopes @ (answer @ column)
+            gradient, hessian = float(column @ clip_outliers(part.innovations)), float(column**2 @ weight)
+            step = min(max(-gradient / hessian, 0.0), LARGEST_STEP) if hessian > 1e-9 else 0.0
+            gains.append(-step * gradient - 0.5 * step**2 * hessian)
+        best[form.effect] = (offers[int(np.argmax(gains))],) if gains and max(gains) > 0.0 else ()
     return [replace(form, probes=(*form.probes, *best.get(form.effect, ()))) for form in forms]
 
 
-def _dense_along(form: Candidate, robot: Robot) -> str | None:
-    """What further probes of an effect lie along: its `steps`, or its `place`; None where it needs none."""
-    trace = robot.catalogue.effect(form.effect).trace
-    if trace is None:
-        return None
-    return "steps" if trace.stepwise else "place" if trace.placed else None
-
-
-class _Residual(NamedTuple):
-    """A model, its increments, which of its innovations count, and how its free parameters answer columns."""
-
-    model: Fit
-    predicted: Floats
-    weight: Floats
-    answer: Floats
-
-
-def _residual_of(model: Fit) -> _Residual:
-    weight = (np.abs(model.innovations) < HUBER).astype(float)
-    weighted = model.slopes * weight[:, None]
-    answer = np.linalg.pinv(model.slopes.T @ weighted, hermitian=True) @ weighted.T
-    return _Residual(model, increments(model.drives, model.theta), weight, answer)
-
-
-def _best_probe(left: _Residual, form: Candidate) -> tuple[Values, ...]:
-    """The probe that gains most, none where none gains anything."""
-    robot = left.model.drives.robot
-    steps = _dense_along(form, robot) == "steps"
-    offers = list(_sizes(form, robot) if steps else _places(left.model.drives, form))
-    gains = [_gain(left, form, values) for values in offers]
-    return (offers[int(np.argmax(gains))],) if gains and max(gains) > 0.0 else ()
-
-
-def _sizes(form: Candidate, robot: Robot) -> Iterable[Values]:
+def _sizes(form: Candidate, robot: Robot) -> list[tuple[float, ...]]:
     """Sizes of a step, its other coordinates where the model has them."""
     high = span(form.free[0], robot)[1]
-    for size in np.geomspace(SMALLEST_SHARE * high, high, SIZES).tolist():
-        yield (size, *form.neutral[1:])
+    return [(size, *form.neutral[1:]) for size in np.geomspace(SMALLEST_SHARE * high, high, SIZES).tolist()]
 
 
-def _places(drives: Drives, form: Candidate) -> Iterable[Values]:
+def _places(drives: Drives, form: Candidate) -> list[tuple[float, ...]]:
     """Patches round places that were driven through, their first coordinate at its middle probe."""
     cells = np.round(drives.poses[:, 0, :2] / CELL_M)
     found, often = np.unique(cells, axis=0, return_counts=True)
     places = found[np.argsort(-often, kind="stable")[:MOST_PLACES]] * CELL_M
     size = form.probes[len(form.probes) // 2][0]
-    for (x, y), radius in product(places.tolist(), RADII_M):
-        yield (size, x, y, radius)
-
-
-def _gain(left: _Residual, form: Candidate, values: Values) -> float:
-    """What one step towards a probe gains, the free parameters having done what they can [nats]."""
-    model = left.model
-    theta = theta_at({**model.theta, **form.fixed}, form.free, np.array(values))
-    column = model.whiten.whiten(left.predicted - increments(model.drives, theta))
-    column = column - model.slopes @ (left.answer @ column)
-    pull, size = float(column @ clip_outliers(model.innovations)), float(column**2 @ left.weight)
-    step = min(max(-pull / size, 0.0), LARGEST_STEP) if size > 1e-9 else 0.0
-    return -step * pull - 0.5 * step**2 * size
+    return [(size, x, y, radius) for (x, y), radius in product(places.tolist(), RADII_M)]
 
 
 def cut_part(drives: Drives) -> Drives:
@@ -250,17 +218,17 @@ FURTHEST = 2.0
 """A step may go so many times as far as its probe."""
 
 
-class Lead(NamedTuple):
-    """A form of an effect worth fitting.
+class ScreenedCandidate(NamedTuple):
+    """A candidate with its score-test gain.
 
     Attributes:
         candidate: The form.
-        start: Values of its coordinates to start from.
+        start: Values of its coordinates after the step.
         probe: The probe that the step set out for.
-        gain: What one step gains in log-likelihood [nats].
-        held_out: What it gains on blocks that it was not fitted to [nats].
+        gain: Gain of the step in log-likelihood [nats].
+        held_out: The same on blocks that it was not fitted to [nats].
         p_value: How often chance gains as much with any form of any effect.
-        column: The direction in the innovations that it explains, declared parameters projected out (3N,).
+        column: The direction in the innovations that it explains, free parameters projected out (3N,).
     """
 
     candidate: Candidate
@@ -282,40 +250,37 @@ class _Probe:
     columns: Floats
 
 
-def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[Lead]:
-    """The leads, best first, one for every form that changes anything in these drives."""
+def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[ScreenedCandidate]:
+    """Screen candidates: one for every form that changes anything in these drives, by its best probe, best first."""
     probes = [probe for form in with_dense_probes(base, forms) for probe in _probes(base, form)]
     if not probes:
         return []
-    weight = np.abs(base.innovations) < HUBER
+    weight, clipped = np.abs(base.innovations) < HUBER, clip_outliers(base.innovations)[:, None]
     projected = [project_out(base.slopes, probe.columns, weight) for probe in probes]
-    number = number_stretches(base.drives)
-    flips = _signs(int(number.max()) + 1, seed)
+    stretch = number_stretches(base.drives)
+    count = int(stretch.max()) + 1
+    flips = np.random.default_rng(seed).choice((-1.0, 1.0), size=(FLIPS, count))
     best: dict[str, tuple[float, Floats, _Probe, Floats]] = {}
     chance = np.zeros(FLIPS)
     for probe, columns in zip(probes, projected, strict=True):
-        pulls = _by_stretch(number, columns * clip_outliers(base.innovations)[:, None])
-        curve = columns.T @ (columns * weight[:, None])
-        gain, step = _step(pulls.sum(axis=0), curve)
-        chance = np.maximum(chance, _gains(flips @ pulls, curve))
+        gradients = sum_by(stretch, (columns * clipped).reshape(len(stretch), 3, -1).sum(axis=1), count)
+        hessian = columns.T @ (columns * weight[:, None])
+        gain, step = _step(gradients.sum(axis=0), hessian)
+        chance = np.maximum(chance, _gains(flips @ gradients, hessian))
         old = best.get(probe.candidate.label)
         if old is None or gain > old[0]:
             best[probe.candidate.label] = (gain, step, probe, columns)
     plain = float(held_out_log_likelihood(base).sum())
-    leads = [_lead(base, *found, chance, plain) for found in best.values()]
-    return sorted(leads, key=lambda lead: -lead.gain)
-
-
-def _lead(base: Fit, gain: float, step: Floats, probe: _Probe, columns: Floats, *null: Any) -> Lead:
-    chance, plain = null
-    stepped = replace(
-        base,
-        innovations=base.innovations + columns @ step,
-        slopes=np.concatenate((base.slopes, columns), axis=1) if step.any() else base.slopes,
-    )
-    p_value = float((1 + (chance >= gain).sum()) / (1 + FLIPS))
-    held_out = float(held_out_log_likelihood(stepped).sum()) - plain
-    return Lead(probe.candidate, _values_after(probe, step), probe.values, gain, held_out, p_value, columns @ step)
+    found = []
+    for gain, step, probe, columns in best.values():
+        slopes = np.concatenate((base.slopes, columns), axis=1) if step.any() else base.slopes
+        stepped = replace(base, innovations=base.innovations + columns @ step, slopes=slopes)
+        p_value = float((1 + (chance >= gain).sum()) / (1 + FLIPS))
+        held_out = float(held_out_log_likelihood(stepped).sum()) - plain
+        way = zip(probe.begin, probe.values, step, strict=True)
+        start = tuple(float(begin + m * (value - begin)) for begin, value, m in way)
+        found.append(ScreenedCandidate(probe.candidate, start, probe.values, gain, held_out, p_value, columns @ step))
+    return sorted(found, key=lambda one: -one.gain)
 
 
 def _probes(base: Fit, form: Candidate) -> list[_Probe]:
@@ -332,7 +297,7 @@ def _probes(base: Fit, form: Candidate) -> list[_Probe]:
 
 
 def _begin(form: Candidate, values: tuple[float, ...], parameters: Mapping[str, Parameter]) -> tuple[float, ...]:
-    """Where the model has a form's coordinates; what shapes an effect that is still to come may be at its probe."""
+    """The model's values of a form's coordinates; what shapes an effect that is still to come may be at its probe."""
     if values[0] == form.neutral[0]:
         return form.neutral
     pairs = zip(form.free, values, form.neutral, strict=True)
@@ -355,31 +320,17 @@ def number_stretches(drives: Drives) -> Whole:
     return number
 
 
-def _by_stretch(number: Whole, values: Floats) -> Floats:
-    return sum_by(number, values.reshape(len(number), 3, -1).sum(axis=1), int(number.max()) + 1)
-
-
-def _signs(count: int, seed: int) -> Floats:
-    return np.random.default_rng(seed).choice((-1.0, 1.0), size=(FLIPS, count))
-
-
-def _step(pull: Floats, curve: Floats) -> tuple[float, Floats]:
+def _step(gradient: Floats, hessian: Floats) -> tuple[float, Floats]:
     """The gain of the best step along the columns, and the step: forwards only where one column moves anything."""
-    best = -np.linalg.pinv(curve, hermitian=True) @ pull
-    if np.count_nonzero(curve.diagonal()) == 1:
+    best = -np.linalg.pinv(hessian, hermitian=True) @ gradient
+    if np.count_nonzero(hessian.diagonal()) == 1:
         best = np.clip(best, 0.0, FURTHEST)
-    return float(-(pull @ best + 0.5 * best @ curve @ best)), best
+    return float(-(gradient @ best + 0.5 * best @ hessian @ best)), best
 
 
-def _gains(pulls: Floats, curve: Floats) -> Floats:
-    """The same gain for many pulls (draws, columns)."""
-    best = -pulls @ np.linalg.pinv(curve, hermitian=True)
-    if np.count_nonzero(curve.diagonal()) == 1:
+def _gains(gradients: Floats, hessian: Floats) -> Floats:
+    """Gains of many gradients (draws, columns)."""
+    best = -gradients @ np.linalg.pinv(hessian, hermitian=True)
+    if np.count_nonzero(hessian.diagonal()) == 1:
         best = np.clip(best, 0.0, FURTHEST)
-    return np.asarray(-((pulls * best).sum(axis=1) + 0.5 * np.einsum("ni,ij,nj->n", best, curve, best)))
-
-
-def _values_after(probe: _Probe, step: Floats) -> tuple[float, ...]:
-    """The values at which a step ends; to a probe is one step."""
-    pairs = zip(probe.begin, probe.values, step, strict=True)
-    return tuple(float(begin + m * (value - begin)) for begin, value, m in pairs)
+    return np.asarray(-((gradients * best).sum(axis=1) + 0.5 * np.einsum("ni,ij,nj->n", best, hessian, best)))

@@ -1,6 +1,9 @@
-"""What a residual may depend on: signals of the drives, and flexible motion as curves over each of them.
+"""Curves over signals: the most that any dependence on one signal of the drives can explain of a residual.
 
-The flexible judge: how much of what is left any curve over one signal can explain.
+`signal_groups` offers motion as basis functions of each signal: the command level, time, heading, place and so on.
+`fit_curves` fits their weights by ridge regression on the innovations, beside the model's free parameters, with the
+ridge that gains most on blocks that are left out. These curves have no name and no physics: they judge the named
+effects (`evidence.exceeds_names`) and say what a residual depends on.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,10 +18,10 @@ from scipy.signal import lfilter
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.fitting import (
     Fit,
+    derivatives_by_block,
+    evaluate,
     held_out_innovations,
     held_out_log_likelihood,
-    replace_noise,
-    slopes_by_block,
 )
 from proxytune.diagnosis.motion.innovations import (
     arrived_commands,
@@ -77,7 +80,7 @@ class SignalGroup:
 
 @dataclass(frozen=True)
 class _Motion:
-    """What the basis functions are made of, all (E, T)."""
+    """The motion that basis functions are made of, all (E, T)."""
 
     drives: Drives
     left: Floats
@@ -267,8 +270,8 @@ REFITTED = 3
 """How many groups are fitted again."""
 
 
-class Curve(NamedTuple):
-    """What a signal group explains.
+class SignalCurve(NamedTuple):
+    """Curves over one signal, fitted to what a model leaves over.
 
     Attributes:
         group: The group.
@@ -281,8 +284,8 @@ class Curve(NamedTuple):
     weights: Floats
 
 
-def fit_curves(fitted: Fit) -> list[Curve]:
-    """Every signal group fitted to what the model leaves over, best first.
+def fit_curves(fitted: Fit) -> list[SignalCurve]:
+    """Fit every signal group to what the model leaves over, best first.
 
     The best few are fitted again with the noise that they leave: a candidate's noise is fitted too.
     """
@@ -294,24 +297,25 @@ def fit_curves(fitted: Fit) -> list[Curve]:
     return sorted(again + found[len(promising) :], key=lambda curve: -curve.gain)
 
 
-def _fit_with_own_noise(fitted: Fit, curve: Curve, plain: float) -> Curve:
+def _fit_with_own_noise(fitted: Fit, curve: SignalCurve, plain: float) -> SignalCurve:
     changes = _columns(fitted, curve.group)
-    left = fitted.drives.measured - increments(fitted.drives, fitted.theta) + changes @ curve.weights
-    quieter = replace_noise(fitted, fit_noise(fitted.drives, left, fitted.noise))
+    errors = fitted.drives.measured - increments(fitted.drives, fitted.theta) + changes @ curve.weights
+    noise = fit_noise(fitted.drives, errors, fitted.noise)
+    quieter = evaluate(fitted.drives, fitted.theta, fitted.free, noise)
     better = _fit_curve(quieter, curve.group, changes, plain)
     return better if better.gain > curve.gain else curve
 
 
-def _fit_curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -> Curve:
+def _fit_curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -> SignalCurve:
     columns = fitted.whiten.whiten(changes)
     both = np.concatenate((fitted.slopes, columns), axis=1)
     size = np.sqrt((both**2).sum(axis=0)) + 1e-12
     unit = both / size
-    sums = slopes_by_block(fitted, unit)
+    sums = derivatives_by_block(fitted, unit)
     flexible = np.arange(both.shape[1]) >= fitted.slopes.shape[1]
     fits = [_ridge(fitted, unit, sums, flexible * ridge) for ridge in RIDGES]
     gain, weights = max(fits, key=lambda found: found[0])
-    return Curve(group, gain - plain, (weights / size)[flexible])
+    return SignalCurve(group, gain - plain, (weights / size)[flexible])
 
 
 def _columns(fitted: Fit, group: SignalGroup) -> Floats:
@@ -327,7 +331,7 @@ def _columns(fitted: Fit, group: SignalGroup) -> Floats:
 def _ridge(fitted: Fit, unit: Floats, sums: tuple[Floats, Floats], ridge: Floats) -> tuple[float, Floats]:
     """The predictive log-likelihood with a ridge on each weight, and the weights."""
     penalty = np.diag(ridge + 1e-9)
-    pull, curve = sums
-    weights = -np.linalg.solve(curve.sum(axis=0) + penalty, pull.sum(axis=0))
+    gradient, hessian = sums
+    weights = -np.linalg.solve(hessian.sum(axis=0) + penalty, gradient.sum(axis=0))
     loss = huber(held_out_innovations(fitted, unit, sums, penalty)).sum() + fitted.whiten.log_determinant.sum()
     return -float(loss), weights

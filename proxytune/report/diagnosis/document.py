@@ -7,7 +7,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.diagnosis import AdoptedEffect, Diagnosis, Estimate, HorizonError, Ratio, Worth, main_error
+from proxytune.diagnosis import AdoptedEffect, Diagnosis, EffectSize, Estimate, HorizonError, Ratio, main_error
 from proxytune.effects import Catalogue
 from proxytune.report.diagnosis.clocks import clocks_document
 from proxytune.report.diagnosis.learnt import learnt_document, ratio_document, ratios_document
@@ -24,7 +24,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "declared": {name: _estimate(estimate) for name, estimate in diagnosis.declared.items()},
         "effects": [_added_document(effect, diagnosis) for effect in diagnosis.effects],
-        "immaterial": [_immaterial_document(effect, diagnosis) for effect in diagnosis.immaterial],
+        "immaterial": [_immaterial_document(effect, diagnosis) for effect in diagnosis.negligible],
         "extended": {name: _estimate(estimate) for name, estimate in diagnosis.theta.items()},
         "candidates": [
             {"name": tried.effect, "form": tried.form, "held_out_gain": tried.gain, "p_value": tried.p_value}
@@ -43,7 +43,7 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
         "fitted_s": diagnosis.parts.fitted.seconds,
         "tested_s": diagnosis.parts.tested.seconds,
         "clocks": clocks_document(diagnosis.clocks),
-        "unlike_drives": unlike_document(diagnosis.unlike, diagnosis.drive_names),
+        "unlike_drives": unlike_document(diagnosis.robot_clusters, diagnosis.drive_names),
     }
 
 
@@ -65,7 +65,7 @@ def _effect(effect: AdoptedEffect, theta: Mapping[str, Estimate], catalogue: Cat
 
 
 def _added_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
-    worth = _worth(diagnosis.worth.get(effect.effect, {}))
+    worth = _worth(diagnosis.effect_sizes.get(effect.effect, {}))
     return _effect(effect, diagnosis.theta, diagnosis.robot.catalogue) | {
         "worth": worth,
         "at_edge": list(diagnosis.at_edge(effect)),
@@ -74,7 +74,7 @@ def _added_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, An
 
 def _immaterial_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
     """An effect that was dropped; `changes_error_by` is for the horizon where it matters most."""
-    worth = diagnosis.worth.get(effect.effect, {})
+    worth = diagnosis.effect_sizes.get(effect.effect, {})
     horizon = decisive(worth) if worth else None
     change = _percent(worth[horizon]) if horizon is not None else {"value": None, "interval": None, "unit": "%"}
     evidence = {"nats": effect.gain, "changes_error_by": change["value"], "interval": change["interval"], "unit": "%"}
@@ -82,7 +82,7 @@ def _immaterial_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[st
     return _effect(effect, diagnosis.dropped_values, diagnosis.robot.catalogue) | evidence | open_
 
 
-def _worth(worth: Worth) -> dict[str, Any]:
+def _worth(worth: EffectSize) -> dict[str, Any]:
     return {f"{horizon:g}": _percent(one) for horizon, one in worth.items()}
 
 
@@ -92,7 +92,7 @@ def _percent(one: Ratio) -> dict[str, Any]:
 
 
 def _polish(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    polish = diagnosis.polish
+    polish = diagnosis.multistep
     if polish is None:
         return None
     return {

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from proxytune.diagnosis import (
     RANDOM_EFFECTS,
     AdoptedEffect,
-    Curve,
     Diagnosis,
     Drives,
     Floats,
+    SignalCurve,
     drawn_wheel_speeds,
     wheel_speeds,
 )
@@ -43,7 +43,7 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
     """
     found = diagnosis.found
     if not found.adopted:
-        best = next(iter(found.remainder), None)
+        best = next(iter(found.unnamed_curves), None)
         return None if best is None else means_figure(diagnosis, best, GROUPS[best.group.name])
     first = found.adopted[0]
     kind = _curve_kind(first, diagnosis.robot.catalogue)
@@ -57,7 +57,7 @@ def _curve_kind(effect: AdoptedEffect, catalogue: Catalogue) -> WheelCurve | Mea
     return trace.shown_in(effect.form) if trace else WheelCurve.STEP
 
 
-def _curve(curves: Sequence[Curve], name: str) -> Curve | None:
+def _curve(curves: Sequence[SignalCurve], name: str) -> SignalCurve | None:
     return next((curve for curve in curves if curve.group.name == name), None)
 
 
@@ -114,7 +114,7 @@ def _driven(drives: Drives, duties: Floats) -> Drives:
     return replace(unmeasured, duties=duties, rest=still, headings=np.zeros(duties.shape[:2]), wheels=None)
 
 
-def _flexible(diagnosis: Diagnosis, curve: Curve, column: int) -> tuple[Floats, Floats]:
+def _flexible(diagnosis: Diagnosis, curve: SignalCurve, column: int) -> tuple[Floats, Floats]:
     """The flexible wheel curve: speeds of the declared model in order and what is added to them, both [m/s]."""
     drives, figures = diagnosis.found.declared.drives, diagnosis.robot.figures
     speeds = wheel_speeds(drives, diagnosis.found.declared.theta)[..., column].ravel() * figures["full_speed"]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from proxytune.diagnosis import Learning, Lookalike, Ratio
+from proxytune.diagnosis import Learning, MatchedEffect, Ratio
 
 
 def learnt_document(learning: Learning) -> dict[str, Any]:
@@ -11,7 +11,7 @@ def learnt_document(learning: Learning) -> dict[str, Any]:
 
     Keys of `ratio` and `guard` are horizons in seconds. `groups` and `share` are empty where nothing is used.
     """
-    beside = learning.remainder
+    beside = learning.discrepancy
     share = beside.share if beside.used else {}
     return {
         "used": beside.used,
@@ -33,7 +33,7 @@ def learnt_document(learning: Learning) -> dict[str, Any]:
     }
 
 
-def _lookalike(like: Lookalike | None) -> dict[str, Any] | None:
+def _lookalike(like: MatchedEffect | None) -> dict[str, Any] | None:
     if like is None:
         return None
     return {"name": like.effect, "form": like.form, "values": dict(like.theta), "share": like.share}
@@ -51,7 +51,7 @@ def ratios_document(ratios: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
 
 def learnt_notes(learning: Learning) -> list[str]:
     """What was learnt, in sentences; nothing where nothing was."""
-    beside = learning.remainder
+    beside = learning.discrepancy
     notes = []
     curves = ", ".join(f"{title} ({100.0 * beside.share[title]:.0f} %)" for title in beside.share)
     if beside.used:

@@ -42,7 +42,7 @@ def learnt_figure(learning: Learning) -> Figure | None:
     effect = learnt_effect(learning.theta)
     if effect is None:
         return None
-    order = list(learning.remainder.share)
+    order = list(learning.discrepancy.share)
     members = {curve.group for curve in effect.curves} - {LEVEL}
     groups = sorted(members, key=lambda group: order.index(GROUPS[group].title))
     by_group = [[curve for curve in effect.curves if curve.group == group] for group in groups]

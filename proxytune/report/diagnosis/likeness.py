@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from proxytune.diagnosis import Unlike
+from proxytune.diagnosis import RobotClusters
 
 
-def unlike_document(unlike: Unlike | None, names: Sequence[str]) -> dict[str, Any] | None:
+def unlike_document(unlike: RobotClusters | None, names: Sequence[str]) -> dict[str, Any] | None:
     """The wheel that differs, and its gain in each of two groups of drives; None where all drives are alike."""
     if unlike is None:
         return None
@@ -17,7 +17,7 @@ def unlike_document(unlike: Unlike | None, names: Sequence[str]) -> dict[str, An
     return {"wheel": unlike.wheel, "groups": groups}
 
 
-def unlike_notes(unlike: Unlike | None, names: Sequence[str]) -> list[str]:
+def unlike_notes(unlike: RobotClusters | None, names: Sequence[str]) -> list[str]:
     """One sentence that names the groups and says what to do."""
     if unlike is None:
         return []

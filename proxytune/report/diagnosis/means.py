@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from proxytune.diagnosis import (
     HUBER,
-    Curve,
     Diagnosis,
     Drives,
     Fit,
     Floats,
+    SignalCurve,
     disturbed_increments,
     increments,
     span,
@@ -78,7 +78,7 @@ class Rates(NamedTuple):
     added: Mapping[str, Mapping[str, Floats]]
 
 
-def rates_of(diagnosis: Diagnosis, curve: Curve | None) -> Rates:
+def rates_of(diagnosis: Diagnosis, curve: SignalCurve | None) -> Rates:
     """What the declared model says, and what is added to it by measurement, by effects, by the flexible curve."""
     found, drives = diagnosis.found, diagnosis.found.declared.drives
     declared = increments(drives, found.declared.theta)
@@ -91,7 +91,7 @@ def rates_of(diagnosis: Diagnosis, curve: Curve | None) -> Rates:
     return Rates(_channels(drives, declared), {name: _channels(drives, moved) for name, moved in added.items()})
 
 
-def retuned(declared: Fit, curve: Curve) -> Theta:
+def retuned(declared: Fit, curve: SignalCurve) -> Theta:
     """The declared parameters as they are fitted together with a flexible curve: one step of least squares."""
     drives, theta = declared.drives, declared.theta
     if not declared.free:
@@ -111,7 +111,7 @@ def _channels(drives: Drives, moved: Floats) -> dict[str, Floats]:
     return {"forward": forward, "sideways": sideways, "turn": turn, "left": forward - side, "right": forward + side}
 
 
-def _signal(drives: Drives, rates: Rates, curve: Curve | None, panel: Panel) -> Floats:
+def _signal(drives: Drives, rates: Rates, curve: SignalCurve | None, panel: Panel) -> Floats:
     """The signal of a panel at each increment (N,)."""
     declared = rates.declared
     direct = {
@@ -140,7 +140,7 @@ def _means(signal: Floats, added: Floats, share_of: Floats | None) -> tuple[Floa
     return np.bincount(place, signal)[kept] / count[kept], value
 
 
-def means_figure(diagnosis: Diagnosis, curve: Curve | None, panels: tuple[Panel, ...]) -> Figure:
+def means_figure(diagnosis: Diagnosis, curve: SignalCurve | None, panels: tuple[Panel, ...]) -> Figure:
     """Draw panels, two in a row; the curve is the flexible one, where there is one."""
     rows = ceil(len(panels) / COLUMNS)
     figure = Figure(figsize=(COLUMN, 1.7 * rows + 0.6), layout="constrained")

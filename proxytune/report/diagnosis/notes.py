@@ -1,6 +1,6 @@
 """What a diagnosis says in sentences: each effect and its worth, what does not matter, what is left, what to drive."""
 
-from proxytune.diagnosis import RULES, AdoptedEffect, Diagnosis, Ratio, Worth
+from proxytune.diagnosis import RULES, AdoptedEffect, Diagnosis, EffectSize, Ratio
 from proxytune.report.diagnosis.clocks import clocks_notes
 from proxytune.report.diagnosis.learnt import learnt_notes
 from proxytune.report.diagnosis.likeness import unlike_notes
@@ -28,9 +28,9 @@ def headline(diagnosis: Diagnosis) -> str:
 def notes(diagnosis: Diagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
     lines = clocks_notes(diagnosis.log, diagnosis.clocks, diagnosis.theta)
-    lines += unlike_notes(diagnosis.unlike, diagnosis.drive_names)
+    lines += unlike_notes(diagnosis.robot_clusters, diagnosis.drive_names)
     lines += [_say_added(diagnosis, effect) for effect in diagnosis.effects]
-    lines += [_say_immaterial(effect, diagnosis) for effect in diagnosis.immaterial]
+    lines += [_say_immaterial(effect, diagnosis) for effect in diagnosis.negligible]
     lines += _cautions(diagnosis)
     if diagnosis.residual_depends_on:
         lines.append(f"no named effect explains the rest, which depends on: {', '.join(diagnosis.residual_depends_on)}")
@@ -46,12 +46,12 @@ def per_cent(one: Ratio) -> tuple[float, tuple[float, float]]:
     return value, (low, high)
 
 
-def decisive(worth: Worth) -> float:
+def decisive(worth: EffectSize) -> float:
     """The horizon [s] at which an effect matters most."""
     return max(worth, key=lambda horizon: worth[horizon].value)
 
 
-def may_matter(worth: Worth) -> bool:
+def may_matter(worth: EffectSize) -> bool:
     """Whether these drives leave it open that an effect matters."""
     return any(one.interval[1] >= RULES.material_factor for one in worth.values())
 
@@ -59,14 +59,14 @@ def may_matter(worth: Worth) -> bool:
 def _say_added(diagnosis: Diagnosis, effect: AdoptedEffect) -> str:
     rivals = ", ".join(rival.label for rival in effect.rivals)
     beside = f"; these drives fit {rivals} as well" if rivals else ""
-    worth = diagnosis.worth.get(effect.effect, {})
+    worth = diagnosis.effect_sizes.get(effect.effect, {})
     growth = [f"{fixed(per_cent(one)[0], 0)} % ({_ends(one, 0)}) at {h:g} s" for h, one in worth.items()]
     larger = f"; without it the error grows by {listed(growth)}" if growth else ""
     return f"added {_label(effect)}: {_gain(effect)}, p = {effect.p_value:.3f}{larger}{beside}"
 
 
 def _say_immaterial(effect: AdoptedEffect, diagnosis: Diagnosis) -> str:
-    worth = diagnosis.worth.get(effect.effect, {})
+    worth = diagnosis.effect_sizes.get(effect.effect, {})
     if not worth:
         return f"not shown to matter: {_label(effect)}, {_gain(effect)}"
     horizon = decisive(worth)
@@ -103,11 +103,11 @@ def _cautions(diagnosis: Diagnosis) -> list[str]:
     worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
     if worse:
         lines.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; check the heading")
-    if diagnosis.polish is not None:
-        ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.polish.ratios.items())
+    if diagnosis.multistep is not None:
+        ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.multistep.ratios.items())
         lines.append(
-            f"parameters were fitted to windows of {diagnosis.polish.horizon_s:g} s instead of single steps; ratio of "
-            f"the errors on blocks left out: {ratios}"
+            f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps; ratio "
+            f"of the errors on blocks left out: {ratios}"
         )
     return lines
 

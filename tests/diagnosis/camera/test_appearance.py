@@ -10,7 +10,7 @@ import pytest
 from photographs import drawn, floor, logged, measured, needs_measured, on_the_road, photographed, predicted, scene
 from scipy.ndimage import gaussian_filter
 
-from proxytune.diagnosis.camera.appearance import Edges, fit_grain, fit_sharpness
+from proxytune.diagnosis.camera.appearance import MovingEdges, fit_grain, fit_sharpness
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def edges(still=False):
     place = np.stack((np.where(side, 55.0, 25.0), row), axis=-1)
     normal = np.stack((np.where(side, -1.0, 1.0), np.zeros(len(frame))), axis=-1)
     speed = np.zeros(len(frame)) if still else SPEEDS[frame] * normal[:, 0]
-    return Edges(frame, place, normal, speed)
+    return MovingEdges(frame, place, normal, speed)
 
 
 def seen(*figures, seed=0, **more):
@@ -142,7 +142,7 @@ def test_intervals_hold_the_truth():
 
 
 def test_no_edges_tell_nothing():
-    none = Edges(np.zeros(0, dtype=int), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
+    none = MovingEdges(np.zeros(0, dtype=int), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
     fitted = fit_sharpness(seen(), none, bars)
     assert not fitted.blur.identified
     assert not fitted.defocus.identified

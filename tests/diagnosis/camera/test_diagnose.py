@@ -20,7 +20,8 @@ from scipy.ndimage import map_coordinates
 from viewed import NEUTRAL, at_truth, driven, everything, stood, tracked
 
 from proxytune.diagnosis import camera_effects, project
-from proxytune.diagnosis.camera.diagnose import _verdict, declared_camera_effects, describe_map, diagnose_camera
+from proxytune.diagnosis.answer import verdict
+from proxytune.diagnosis.camera.diagnose import declared_camera_effects, describe_map, diagnose_camera, is_explained
 from proxytune.diagnosis.camera.fitting import fit_camera
 from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
 from proxytune.diagnosis.camera.selection import NEAR
@@ -96,7 +97,7 @@ def shown(theta=()):
 
 
 @functools.cache
-def diagnosed_of_diagnose_camera(name):
+def diagnosed_frames(name):
     return diagnose_camera(LOGS[name](), ROBOT, DECLARED, report=lambda line: STEPS[name].append(line))
 
 
@@ -123,7 +124,7 @@ LOGS = {
 
 
 def test_nothing_is_missing_of_a_nominal_camera():
-    found = diagnosed_of_diagnose_camera("nominal")
+    found = diagnosed_frames("nominal")
     assert (found.verdict, found.effects) == ("nothing missing", ())
     low, high = found.declared["camera_pitch"].interval
     assert low < 19.15 < high
@@ -133,27 +134,27 @@ def test_nothing_is_missing_of_a_nominal_camera():
 
 
 def test_a_rolled_camera_is_explained_by_its_roll():
-    found = diagnosed_of_diagnose_camera("rolled")
+    found = diagnosed_frames("rolled")
     (effect,) = found.effects
     assert (found.verdict, effect.effect, effect.names) == ("explained", "camera_roll", ("camera_roll",))
     assert found.theta["camera_roll"].interval[0] < 4.0 < found.theta["camera_roll"].interval[1]
     assert effect.nats > 6.0
     assert effect.error_without > 1.5
     assert found.pixels.after.value < 0.6 * found.pixels.before.value
-    assert [gate.open for gate in found.gates] == [True, False]
+    assert [gate.significant for gate in found.residual_fields] == [True, False]
     assert found.candidates[0].effects == ("camera_roll",)
 
 
 @pytest.mark.slow
 def test_a_lens_that_the_catalogue_does_not_have_is_not_explained():
-    found = diagnosed_of_diagnose_camera("waved")
+    found = diagnosed_frames("waved")
     assert found.verdict in ("partly explained", "unexplained")
-    assert found.gates[1].open
+    assert found.residual_fields[1].significant
     assert (found.verdict == "partly explained") == bool(found.effects)
 
 
 @pytest.mark.parametrize(
-    ("left_over", "blemishes", "named", "verdict"),
+    ("left_over", "blemishes", "named", "said"),
     [
         (False, (), False, "nothing missing"),
         (False, (), True, "explained"),
@@ -163,13 +164,14 @@ def test_a_lens_that_the_catalogue_does_not_have_is_not_explained():
         (False, ("dirt",), True, "partly explained"),
     ],
 )
-def test_what_is_left_over_and_what_covers_the_picture_make_the_verdict(left_over, blemishes, named, verdict):
-    assert _verdict(SimpleNamespace(open=left_over), SimpleNamespace(blemishes=blemishes), named=named) == verdict
+def test_what_is_left_over_and_what_covers_the_picture_make_the_verdict(left_over, blemishes, named, said):
+    field, look = SimpleNamespace(significant=left_over), SimpleNamespace(blemishes=blemishes)
+    assert verdict(is_explained(field, look), named=named) == said
 
 
 @pytest.mark.slow
 def test_frames_whose_distortion_was_taken_out_never_name_it():
-    bent, rectified = diagnosed_of_diagnose_camera("bent"), diagnosed_of_diagnose_camera("rectified")
+    bent, rectified = diagnosed_frames("bent"), diagnosed_frames("rectified")
     assert [effect.effect for effect in bent.effects] == ["lens_distortion"]
     assert "lens_distortion" not in rectified.named.full.names
     assert "lens_distortion" not in {effect.effect for effect in rectified.effects}
@@ -177,7 +179,7 @@ def test_frames_whose_distortion_was_taken_out_never_name_it():
 
 
 def test_frames_standing_still_say_what_they_hide_and_what_to_take():
-    found = diagnosed_of_diagnose_camera("nominal")
+    found = diagnosed_frames("nominal")
     assert {"camera_latency", "rolling_shutter"} <= set(found.could_not_be_seen)
     assert any("driving bends" in view for view in found.next_views)
 
@@ -216,7 +218,7 @@ def test_a_stated_readout_is_used_and_not_named(tmp_path):
 
 
 def test_steps_are_reported_as_they_begin():
-    diagnosed_of_diagnose_camera("nominal")
+    diagnosed_frames("nominal")
     assert STEPS["nominal"] == [
         "reading frames",
         "fitting the camera",

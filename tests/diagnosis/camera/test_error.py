@@ -24,7 +24,7 @@ from proxytune.diagnosis.camera.error import (
     pixel_errors,
     unseen_residuals,
 )
-from proxytune.diagnosis.camera.selection import fit_set, name_camera_effects
+from proxytune.diagnosis.camera.selection import fit_set, select_camera_effects
 
 ROLLED = {"camera_roll": 4.0}
 COUNT = 30
@@ -32,7 +32,7 @@ COUNT = 30
 
 @functools.cache
 def named():
-    return name_camera_effects(everything(ROLLED, count=COUNT), ("camera_pitch",))
+    return select_camera_effects(everything(ROLLED, count=COUNT), ("camera_pitch",))
 
 
 def gathered(shown, fixed=True):

@@ -16,7 +16,7 @@ from hypothesis import given, settings, strategies as st
 from pictured import ROBOT, lane_poses, pictures
 from viewed import OPTICS, at_truth, driven, everything, still, stood, tracked, views_of
 
-from proxytune.diagnosis import Edges, Leftover, project, rank_subsets
+from proxytune.diagnosis import Edges, ResidualField, project, rank_subsets
 from proxytune.diagnosis.camera.fitting import fit_camera
 from proxytune.diagnosis.camera.selection import (
     ALWAYS,
@@ -25,13 +25,13 @@ from proxytune.diagnosis.camera.selection import (
     USUAL_MATCHED,
     check_match,
     cost_of,
-    find_leftover,
     fit_everything,
+    fit_residual_field,
     fit_set,
     hidden_effects,
     matched_share,
-    name_camera_effects,
     next_views,
+    select_camera_effects,
 )
 from proxytune.driving import GroundPlaneCamera, Markings, draw_floor, lane_length, lane_point, shipped_map
 from proxytune.errors import LogError
@@ -216,20 +216,20 @@ def bent():
 @pytest.mark.parametrize("theta", [{}, {"camera_roll": 4.0}, {"lens_distortion": -0.25}], ids=str)
 def test_nothing_is_left_over_of_the_right_camera(theta):
     full = everything(theta, count=GATE_COUNT)
-    leftover = find_leftover(fit_set(full, ("camera_pitch", *theta)))
-    assert not leftover.open
+    leftover = fit_residual_field(fit_set(full, ("camera_pitch", *theta)))
+    assert not leftover.significant
     assert leftover.share < 0.035
 
 
 def test_a_missing_effect_is_left_over():
-    leftover = find_leftover(fit_set(everything({"camera_roll": 4.0}, count=GATE_COUNT), ("camera_pitch",)))
-    assert leftover.open
+    leftover = fit_residual_field(fit_set(everything({"camera_roll": 4.0}, count=GATE_COUNT), ("camera_pitch",)))
+    assert leftover.significant
     assert leftover.share > 0.1
 
 
 def test_a_bend_that_the_catalogue_does_not_have_is_left_over_with_everything_free():
-    leftover = find_leftover(bent())
-    assert leftover.open
+    leftover = fit_residual_field(bent())
+    assert leftover.significant
     assert leftover.nats > 5.0
     assert leftover.share > 0.1
 
@@ -241,8 +241,8 @@ def test_the_field_says_how_far_markings_lie_from_where_the_model_has_them(axis)
     by = 0.8 * places(views)[0]
     moved = displaced(views, np.eye(2)[axis][:, None] * by)
     fit = fit_camera(moved, at_truth(moved), [], NEAR)
-    leftover = find_leftover(fit)
-    assert leftover.open
+    leftover = fit_residual_field(fit)
+    assert leftover.significant
     valid = project(moved, fit.state).valid
     found = leftover.displacement(*places(moved))[valid, axis]
     assert np.corrcoef(found, by[valid])[0, 1] > 0.9
@@ -257,19 +257,19 @@ def test_tape_beside_its_place_is_nothing_of_the_camera_s():
     by = shift[there.marks.line, there.marks.stretch] * there.marks.side / there.metres
     moved = displaced(views, (views.edges.normal * by[:, None]).T)
     fit = fit_everything(moved, OPTICS.mounting, {}, learn_scatter=False)
-    assert not find_leftover(fit_set(fit, ("camera_pitch",))).open
+    assert not fit_residual_field(fit_set(fit, ("camera_pitch",))).significant
 
 
 def test_the_gate_opens_for_evidence_share_and_size_together():
     field = np.zeros((10, 2))
-    assert Leftover(10.0, 0.1, 0.3, field).open
-    assert not Leftover(2.0, 0.1, 0.3, field).open
-    assert not Leftover(10.0, 0.02, 0.3, field).open
-    assert not Leftover(10.0, 0.1, 0.05, field).open
+    assert ResidualField(10.0, 0.1, 0.3, field).significant
+    assert not ResidualField(2.0, 0.1, 0.3, field).significant
+    assert not ResidualField(10.0, 0.02, 0.3, field).significant
+    assert not ResidualField(10.0, 0.1, 0.05, field).significant
 
 
 def test_a_field_of_nought_displaces_nothing():
-    leftover = Leftover(0.0, 0.0, 0.0, np.zeros((10, 2)))
+    leftover = ResidualField(0.0, 0.0, 0.0, np.zeros((10, 2)))
     np.testing.assert_array_equal(leftover.displacement(np.array([0.3]), np.array([-0.2])), np.zeros((1, 2)))
 
 
@@ -304,7 +304,7 @@ SEARCH_OFTEN = ("camera_roll", "lens_distortion")
     "effect", [name if name in SEARCH_OFTEN else pytest.param(name, marks=pytest.mark.slow) for name in PLANTED]
 )
 def test_a_planted_effect_is_named(effect):
-    named = name_camera_effects(everything(PLANTED[effect]), DECLARED)
+    named = select_camera_effects(everything(PLANTED[effect]), DECLARED)
     assert named.effects == (effect,)
     for name, value in PLANTED[effect].items():
         place = named.model.names.index(name)
@@ -313,7 +313,7 @@ def test_a_planted_effect_is_named(effect):
 
 @pytest.mark.slow
 def test_a_pair_is_named():
-    named = name_camera_effects(everything({"camera_roll": -4.0, "lens_distortion": -0.25}), DECLARED)
+    named = select_camera_effects(everything({"camera_roll": -4.0, "lens_distortion": -0.25}), DECLARED)
     assert set(named.effects) == {"camera_roll", "lens_distortion"}
     assert [len(one.effects) for one in named.losses] == [0, 1, 2]
     assert named.losses[0].loss > named.losses[1].loss > named.losses[2].loss
@@ -322,7 +322,7 @@ def test_a_pair_is_named():
 @pytest.mark.parametrize("name", ["small_loop", pytest.param("horseshoe", marks=pytest.mark.slow)])
 def test_nothing_is_named_of_a_nominal_camera(name):
     full = fit_everything(on(name, {}), OPTICS.mounting, {}, learn_scatter=False)
-    named = name_camera_effects(full, DECLARED)
+    named = select_camera_effects(full, DECLARED)
     assert named.effects == ()
     assert named.model.theta["camera_pitch"] == pytest.approx(19.15, abs=0.3)
     assert named.model.names == DECLARED
@@ -330,17 +330,17 @@ def test_nothing_is_named_of_a_nominal_camera(name):
 
 def test_an_effect_is_named_on_another_map():
     full = fit_everything(on("horseshoe", {"camera_roll": 4.0}), OPTICS.mounting, {}, learn_scatter=False)
-    assert name_camera_effects(full, DECLARED).effects == ("camera_roll",)
+    assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
 
 
 def test_a_declared_effect_is_tuned_and_not_named():
-    named = name_camera_effects(everything({"camera_roll": 4.0}), ("camera_pitch", "camera_roll"))
+    named = select_camera_effects(everything({"camera_roll": 4.0}), ("camera_pitch", "camera_roll"))
     assert named.effects == ()
     assert named.declared.theta["camera_roll"] == pytest.approx(4.0, abs=0.3)
 
 
 def test_an_effect_that_needs_motion_is_named_from_a_drive():
-    named = name_camera_effects(everything({"camera_latency": 0.12}, count=40, moving=True), DECLARED)
+    named = select_camera_effects(everything({"camera_latency": 0.12}, count=40, moving=True), DECLARED)
     assert named.effects == ("camera_latency",)
     assert named.model.theta["camera_latency"] == pytest.approx(0.12, abs=0.01)
 
@@ -350,7 +350,7 @@ def test_an_effect_is_named_by_a_tracker_that_states_no_scatter():
     full = fit_everything(views, OPTICS.mounting, {}, learn_scatter=True)
     assert full.views.position_m < 0.0045
     assert full.views.heading_rad < np.radians(0.8)
-    assert name_camera_effects(full, DECLARED).effects == ("camera_roll",)
+    assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
 
 
 def test_what_is_known_is_held():

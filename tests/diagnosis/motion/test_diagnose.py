@@ -11,9 +11,14 @@ import pytest
 import rates
 from planted import CALM, ROBOT, TRUTH, driven_log, drives_of, fitted, planted_log, with_poses
 
-from proxytune.diagnosis import RULES, AdoptedEffect, Estimate, Findings
-from proxytune.diagnosis.answer import KeptAside, horizon_error
-from proxytune.diagnosis.motion.diagnose import declared_effects, declared_parameters, diagnose
+from proxytune.diagnosis import RULES, AdoptedEffect, Estimate, Findings, diagnose_log
+from proxytune.diagnosis.motion.diagnose import (
+    KeptAside,
+    declared_effects,
+    declared_parameters,
+    diagnose,
+    horizon_error,
+)
 from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S, PoseNoise
 from proxytune.driving import read_robot
 from proxytune.effects import PARAMETERS
@@ -43,6 +48,14 @@ def test_the_planted_effect_is_found_with_its_value(diagnosis):
     assert abs(estimate.value - 0.12) < np.ptp(estimate.interval)
     assert estimate.unit == "m"
     assert np.ptp(estimate.interval) < 0.02
+
+
+def test_what_another_rule_would_have_said_is_an_argument(diagnosis):
+    strict = replace(RULES, p_value=1e-3)  # less than the draws of chance can show
+    asked = diagnose_log(scrubbing_log(), ROBOT, ("trim", "delay"), rules=strict).motion
+    assert [effect.effect for effect in diagnosis.effects] == ["yaw_scrub"]
+    assert asked.effects == ()
+    assert (asked.rules, diagnosis.rules) == (strict, RULES)
 
 
 def test_declared_values_are_those_before_the_effect_and_all_values_those_after(diagnosis):
@@ -121,14 +134,14 @@ def test_the_same_seed_gives_the_same_diagnosis(diagnosis):
     assert again.theta == diagnosis.theta
     assert again.found.tried == diagnosis.found.tried
     assert again.errors == diagnosis.errors
-    assert again.worth == diagnosis.worth
+    assert again.effect_sizes == diagnosis.effect_sizes
 
 
 def test_every_effect_says_what_it_is_worth_on_drives_that_were_not_fitted(diagnosis):
-    assert set(diagnosis.worth) == {"yaw_scrub"}
-    assert set(diagnosis.worth["yaw_scrub"]) == set(HORIZONS_S)
-    assert diagnosis.worth["yaw_scrub"][2.0].interval[0] > 1.5
-    assert (diagnosis.immaterial, diagnosis.dropped_values) == ((), {})
+    assert set(diagnosis.effect_sizes) == {"yaw_scrub"}
+    assert set(diagnosis.effect_sizes["yaw_scrub"]) == set(HORIZONS_S)
+    assert diagnosis.effect_sizes["yaw_scrub"][2.0].interval[0] > 1.5
+    assert (diagnosis.negligible, diagnosis.dropped_values) == ((), {})
 
 
 @pytest.mark.parametrize("level", [1e-6, 0.002])
@@ -156,7 +169,7 @@ def test_an_error_from_a_single_block_of_drives_can_be_written_as_json():
 def test_one_drive_is_enough_if_it_is_long():
     found = diagnose(planted_log(SCRUBBING, episodes=1, seconds=70.0), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
-    assert found.unlike is None
+    assert found.robot_clusters is None
 
 
 @pytest.mark.slow

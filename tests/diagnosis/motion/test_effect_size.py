@@ -16,10 +16,10 @@ from proxytune.diagnosis.motion import effect_size as likeness
 from proxytune.diagnosis.motion.effect_size import (
     WeighedEffect,
     _drawn_squares,
-    drop_immaterial,
+    drop_negligible,
+    find_robot_clusters,
     invisible_effects,
-    two_robots,
-    worth,
+    measure_effect_size,
 )
 from proxytune.diagnosis.motion.evidence import Variant, without_effect
 from proxytune.diagnosis.motion.fitting import evaluate
@@ -40,7 +40,7 @@ CASES = {case.name: case for case in (*hidden.IN_FORM, *hidden.OTHER_FORM, *hidd
 
 def unlike(log):
     drives = drives_of(log)
-    return two_robots(drives, fitted(drives))
+    return find_robot_clusters(drives, fitted(drives))
 
 
 @pytest.mark.parametrize(("theta", "wheel"), [({"trim": -0.06}, None), ({"wheel_gain.left": 0.88}, "left")])
@@ -81,9 +81,9 @@ def test_three_drives_are_too_few_to_tell():
 def test_many_drives_are_looked_at_a_few_at_a_time_with_the_same_result(monkeypatch):
     drives = drives_of(mixed({"wheel_gain.left": 0.88}))
     model = fitted(drives)
-    together = two_robots(drives, model)
+    together = find_robot_clusters(drives, model)
     monkeypatch.setattr(likeness, "AT_ONCE", len(drives.episode) // 3)
-    apart = two_robots(drives, model)
+    apart = find_robot_clusters(drives, model)
     assert apart.groups == together.groups
     assert apart.gains == pytest.approx(together.gains, rel=1e-9)
 
@@ -109,42 +109,44 @@ def drives():
 
 @pytest.fixture(scope="module")
 def weighed(drives):
-    return drop_immaterial(found(drives, MIXED, adopted("yaw_scrub", SCRUB), adopted("lateral_slip", SLIP)), 1)
+    return drop_negligible(found(drives, MIXED, adopted("yaw_scrub", SCRUB), adopted("lateral_slip", SLIP)), 1)
 
 
 def test_what_matters_is_kept_and_what_does_not_is_dropped(weighed):
     assert [effect.effect for effect in weighed.adopted] == ["yaw_scrub"]
-    assert [dropped.effect.effect for dropped in weighed.immaterial] == ["lateral_slip"]
+    assert [dropped.effect.effect for dropped in weighed.negligible] == ["lateral_slip"]
 
 
 def test_the_model_is_fitted_again_without_what_was_dropped(weighed):
     assert "lateral_slip" not in weighed.model.theta
     assert SLIP[0] not in weighed.model.free
     assert weighed.model.theta["yaw_scrub"] == pytest.approx(0.13, abs=0.005)
-    assert weighed.immaterial[0].beside.theta["lateral_slip"] == 0.002
+    assert weighed.negligible[0].beside.theta["lateral_slip"] == 0.002
 
 
 def test_where_everything_matters_nothing_changes(drives):
     whole = found(drives, MIXED, adopted("yaw_scrub", SCRUB))
-    assert drop_immaterial(whole, 1) is whole
+    assert drop_negligible(whole, 1) is whole
 
 
 def test_of_two_effects_that_stand_for_one_another_one_is_kept(drives):
     twins = (adopted("yaw_scrub", SCRUB), adopted("wheel_gain", (("wheel_gain.left", "wheel_gain.right"),)))
     theta = {**TRUTH, "yaw_scrub": 0.13, "wheel_gain.left": 1.0, "wheel_gain.right": 1.0}
-    assert [one.effect for one in drop_immaterial(found(drives, theta, *twins), 1).adopted] == ["yaw_scrub"]
+    assert [one.effect for one in drop_negligible(found(drives, theta, *twins), 1).adopted] == ["yaw_scrub"]
 
 
 def test_drives_too_short_for_windows_drop_nothing():
     few = planted_drives(MIXED, episodes=2, seconds=4.0)
     short = found(few, MIXED, adopted("lateral_slip", SLIP))
-    assert drop_immaterial(short, 1) is short
+    assert drop_negligible(short, 1) is short
 
 
 def test_worth_is_told_on_drives_that_were_not_fitted(drives):
     tested = planted_drives(MIXED, seed=2, episodes=4, seconds=20.0)
     variant = Variant(MIXED, (*DECLARED, *SCRUB, *SLIP))
-    much, little = (worth(drives, tested, variant, adopted(*one), 1) for one in (("yaw_scrub", SCRUB), ("s", SLIP)))
+    much, little = (
+        measure_effect_size(drives, tested, variant, adopted(*one), 1) for one in (("yaw_scrub", SCRUB), ("s", SLIP))
+    )
     assert set(much) == set(little) == {1.0, 2.0, 5.0}
     assert max(one.interval[0] for one in much.values()) > 1.2
     assert max(one.value for one in much.values()) > 1.5
@@ -155,7 +157,7 @@ def test_worth_is_told_on_drives_that_were_not_fitted(drives):
 def test_a_random_effect_matters_if_its_draws_make_up_the_error(size, matters):
     calm = planted_drives(TRUTH, episodes=6, seconds=20.0)
     lossy = adopted("dropped_commands", names=("dropped_commands",))
-    kept = drop_immaterial(found(calm, {**TRUTH, "dropped_commands": size}, lossy), 1)
+    kept = drop_negligible(found(calm, {**TRUTH, "dropped_commands": size}, lossy), 1)
     assert bool(kept.adopted) == matters
     if not matters:
         assert kept.model.theta["delay"] == pytest.approx(TRUTH["delay"], abs=0.01)
@@ -202,7 +204,7 @@ def test_draws_do_not_matter_where_the_noise_of_poses_leaves_no_room_for_them(si
     errors = pose_errors(calm, jittery.theta, windows)[:, 0]
     drawn = np.sqrt(_drawn_squares(calm, jittery, windows, 1).mean())
     assert drawn > 0.4 * np.sqrt(np.mean(errors**2)), "by their size alone they would matter"
-    kept = drop_immaterial(found(calm, jittery.theta, adopted("delay_jitter", names=("delay_jitter",))), 1)
+    kept = drop_negligible(found(calm, jittery.theta, adopted("delay_jitter", names=("delay_jitter",))), 1)
     assert kept.adopted == ()
 
 

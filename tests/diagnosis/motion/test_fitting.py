@@ -19,7 +19,6 @@ from proxytune.diagnosis.motion.fitting import (
     held_out_log_likelihood,
     intervals,
     loss_of,
-    replace_noise,
     slopes,
     sum_by_block,
 )
@@ -138,7 +137,7 @@ def test_the_fitted_model_loses_least(found):
 
 
 def test_the_same_model_with_other_noise_keeps_its_parameters(found):
-    louder = replace_noise(found, NOISE)
+    louder = evaluate(found.drives, found.theta, found.free, NOISE)
     assert (louder.theta, louder.free, louder.noise) == (found.theta, found.free, NOISE)
     assert evaluate(found.drives, found.theta, found.free, NOISE).innovations == pytest.approx(louder.innovations)
 

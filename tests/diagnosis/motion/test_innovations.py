@@ -24,10 +24,10 @@ from proxytune.diagnosis.motion.innovations import (
     fit_noise,
     huber,
     increments_along,
+    integrate_twists,
     lateness,
     log_likelihood,
     paths,
-    walk,
     whitener,
     window_paths,
 )
@@ -159,76 +159,70 @@ RICH = {
 
 
 @pytest.fixture(scope="module")
-def drives_of_replay():
+def replayed():
     return planted_drives(TRUTH, episodes=3, seconds=8.0, noise=None)
 
 
 @pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
-def test_increments_are_the_differences_of_paths(drives_of_replay, theta):
-    walked = paths(drives_of_replay, theta)
-    assert walked.shape == (3, drives_of_replay.duties.shape[1] + 1, 3)
-    for index in (0, 7, 40, len(drives_of_replay.episode) - 1):
-        episode, first, last = (
-            int(row[index]) for row in (drives_of_replay.episode, drives_of_replay.first, drives_of_replay.last)
-        )
+def test_increments_are_the_differences_of_paths(replayed, theta):
+    walked = paths(replayed, theta)
+    assert walked.shape == (3, replayed.duties.shape[1] + 1, 3)
+    for index in (0, 7, 40, len(replayed.episode) - 1):
+        episode, first, last = (int(row[index]) for row in (replayed.episode, replayed.first, replayed.last))
         np.testing.assert_array_equal(
-            increments(drives_of_replay, theta)[index], relative(walked[episode, first], walked[episode, last])
+            increments(replayed, theta)[index], relative(walked[episode, first], walked[episode, last])
         )
-    np.testing.assert_array_equal(increments(drives_of_replay, theta), increments_along(drives_of_replay, walked))
+    np.testing.assert_array_equal(increments(replayed, theta), increments_along(replayed, walked))
 
 
-def test_the_model_that_drove_says_what_was_measured(drives_of_replay):
-    np.testing.assert_allclose(increments(drives_of_replay, TRUTH), drives_of_replay.measured, atol=1e-9)
+def test_the_model_that_drove_says_what_was_measured(replayed):
+    np.testing.assert_allclose(increments(replayed, TRUTH), replayed.measured, atol=1e-9)
 
 
 @pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
-def test_windows_from_an_episodes_start_are_its_path(drives_of_replay, theta):
+def test_windows_from_an_episodes_start_are_its_path(replayed, theta):
     begins = np.flatnonzero(
-        np.isin(np.arange(len(drives_of_replay.episode)), np.unique(drives_of_replay.episode, return_index=True)[1])
+        np.isin(np.arange(len(replayed.episode)), np.unique(replayed.episode, return_index=True)[1])
     )
-    begins = begins[drives_of_replay.first[begins] == 0]
+    begins = begins[replayed.first[begins] == 0]
     assert len(begins) == 3
-    walked = window_paths(drives_of_replay, theta, begins, 300)
-    np.testing.assert_allclose(
-        walked, paths(drives_of_replay, theta)[drives_of_replay.episode[begins], :301], atol=1e-9
-    )
+    walked = window_paths(replayed, theta, begins, 300)
+    np.testing.assert_allclose(walked, paths(replayed, theta)[replayed.episode[begins], :301], atol=1e-9)
 
 
 @pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
-def test_a_window_in_the_middle_knows_the_commands_before_it(drives_of_replay, theta):
+def test_a_window_in_the_middle_knows_the_commands_before_it(replayed, theta):
     begin = np.array([50])
-    walked = window_paths(drives_of_replay, theta, begin, 60)[0]
-    whole = paths(drives_of_replay, theta)[
-        drives_of_replay.episode[50], drives_of_replay.first[50] : drives_of_replay.first[50] + 61
-    ]
+    walked = window_paths(replayed, theta, begin, 60)[0]
+    whole = paths(replayed, theta)[replayed.episode[50], replayed.first[50] : replayed.first[50] + 61]
     np.testing.assert_allclose(relative(walked[0], walked), relative(whole[0], whole), atol=1e-9)
 
 
-def test_a_window_starts_from_the_measured_wheel_speeds_where_there_are_any(drives_of_replay):
-    full = np.ones_like(drives_of_replay.duties)
-    turning = replace(drives_of_replay, wheels=full)
+def test_a_window_starts_from_the_measured_wheel_speeds_where_there_are_any(replayed):
+    full = np.ones_like(replayed.duties)
+    turning = replace(replayed, wheels=full)
     begin = np.array([50])
-    moved = [window_paths(one, TRUTH, begin, 1)[0, 1, 0] for one in (drives_of_replay, turning)]
+    moved = [window_paths(one, TRUTH, begin, 1)[0, 1, 0] for one in (replayed, turning)]
     assert moved[1] > moved[0]
     assert moved[1] == pytest.approx(0.6 / 60.0, rel=0.1)
 
 
-def test_a_window_past_the_end_goes_on_with_the_last_command(drives_of_replay):
-    last = np.array([np.flatnonzero(drives_of_replay.episode == 0)[-1]])
-    walked = window_paths(drives_of_replay, TRUTH, last, 200)
+def test_a_window_past_the_end_goes_on_with_the_last_command(replayed):
+    last = np.array([np.flatnonzero(replayed.episode == 0)[-1]])
+    walked = window_paths(replayed, TRUTH, last, 200)
     steps = np.diff(walked[0], axis=0)
     np.testing.assert_allclose(np.hypot(*steps[-1, :2]), np.hypot(*steps[-50, :2]), rtol=0.2)
     assert np.isfinite(walked).all()
 
 
-def test_nothing_measured_after_a_windows_start_changes_it(drives_of_replay):
-    poses = drives_of_replay.poses.copy()
+def test_nothing_measured_after_a_windows_start_changes_it(replayed):
+    poses = replayed.poses.copy()
     poses[60:] += 5.0
-    later = replace(drives_of_replay, poses=poses)
+    later = replace(replayed, poses=poses)
     begin = np.array([50])
     np.testing.assert_array_equal(
         window_paths(later, {**TRUTH, "floor_slope.x": 0.05}, begin, 90),
-        window_paths(drives_of_replay, {**TRUTH, "floor_slope.x": 0.05}, begin, 90),
+        window_paths(replayed, {**TRUTH, "floor_slope.x": 0.05}, begin, 90),
     )
 
 
@@ -261,37 +255,31 @@ def test_a_random_effect_without_a_declared_delay_is_late_from_nothing():
     assert expected_theta({"delay_jitter": 0.1}, 20.0) == {"delay": 0.05}
 
 
-def test_what_is_added_to_the_twists_moves_the_robot(drives_of_replay):
-    extra = np.zeros((*drives_of_replay.duties.shape[:2], 3))
-    np.testing.assert_allclose(
-        disturbed_increments(drives_of_replay, TRUTH, extra), increments(drives_of_replay, TRUTH), atol=1e-12
-    )
+def test_what_is_added_to_the_twists_moves_the_robot(replayed):
+    extra = np.zeros((*replayed.duties.shape[:2], 3))
+    np.testing.assert_allclose(disturbed_increments(replayed, TRUTH, extra), increments(replayed, TRUTH), atol=1e-12)
     extra[..., 2] = 0.6
-    turned = disturbed_increments(drives_of_replay, TRUTH, extra)[:, 2] - increments(drives_of_replay, TRUTH)[:, 2]
-    np.testing.assert_allclose(turned, 0.6 * (drives_of_replay.last - drives_of_replay.first) / 60.0, atol=1e-9)
+    turned = disturbed_increments(replayed, TRUTH, extra)[:, 2] - increments(replayed, TRUTH)[:, 2]
+    np.testing.assert_allclose(turned, 0.6 * (replayed.last - replayed.first) / 60.0, atol=1e-9)
 
 
-def test_wheels_and_arrived_commands_have_the_shape_of_duties(drives_of_replay):
-    assert (
-        wheel_speeds(drives_of_replay, RICH).shape
-        == arrived_commands(drives_of_replay, RICH).shape
-        == drives_of_replay.duties.shape
-    )
-    late = arrived_commands(drives_of_replay, {"delay": 0.2})
-    np.testing.assert_allclose(late[:, 12:], drives_of_replay.duties[:, :-12], atol=1e-9)
+def test_wheels_and_arrived_commands_have_the_shape_of_duties(replayed):
+    assert wheel_speeds(replayed, RICH).shape == arrived_commands(replayed, RICH).shape == replayed.duties.shape
+    late = arrived_commands(replayed, {"delay": 0.2})
+    np.testing.assert_allclose(late[:, 12:], replayed.duties[:, :-12], atol=1e-9)
 
 
-def test_a_value_out_of_bounds_is_refused(drives_of_replay):
+def test_a_value_out_of_bounds_is_refused(replayed):
     with pytest.raises(SettingsError, match="delay: must be between"):
-        increments(drives_of_replay, {"delay": PARAMETERS["delay"].high + 0.1})
+        increments(replayed, {"delay": PARAMETERS["delay"].high + 0.1})
 
 
-def test_windows_with_measured_wheels_are_told_where_they_point(drives_of_replay):
+def test_windows_with_measured_wheels_are_told_where_they_point(replayed):
     theta = {**TRUTH, "floor_slope.x": 0.05, "floor_slope.y": 0.02}
-    begin = np.flatnonzero(drives_of_replay.first % 60 == 0)[2:9]
-    assert len(begin) != len(drives_of_replay.duties)
-    measured = replace(drives_of_replay, wheels=wheel_speeds(drives_of_replay, theta))
-    plain, known = (window_paths(one, theta, begin, 60) for one in (drives_of_replay, measured))
+    begin = np.flatnonzero(replayed.first % 60 == 0)[2:9]
+    assert len(begin) != len(replayed.duties)
+    measured = replace(replayed, wheels=wheel_speeds(replayed, theta))
+    plain, known = (window_paths(one, theta, begin, 60) for one in (replayed, measured))
     np.testing.assert_allclose(known, plain, atol=0.02)
     level = window_paths(measured, TRUTH, begin, 60)
     assert np.abs(level - known).max() > 0.02
@@ -311,12 +299,12 @@ def twists(turn, sideways=0.3):
 @pytest.mark.parametrize("sideways", [0.0, 0.3])
 def test_the_poses_are_those_of_the_planar_plant(turn, sideways):
     asked = twists(turn, sideways)
-    walked = walk(asked, TICK_S)
+    walked = integrate_twists(asked, TICK_S)
     np.testing.assert_allclose(walked[:, 1:], integrate(np.zeros((3, 3)), asked, TICK_S), rtol=0.0, atol=1e-12)
 
 
 def test_it_begins_at_the_origin_and_changes_no_twist():
     asked = twists(3.0)
     before = asked.copy()
-    np.testing.assert_array_equal(walk(asked, TICK_S)[:, 0], 0.0)
+    np.testing.assert_array_equal(integrate_twists(asked, TICK_S)[:, 0], 0.0)
     np.testing.assert_array_equal(asked, before)

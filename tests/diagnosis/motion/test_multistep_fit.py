@@ -14,11 +14,11 @@ from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import Noise
 from proxytune.diagnosis.motion.multistep_fit import (
     PoseNoise,
+    fit_multistep,
     fit_windows,
     held_out_squares,
     horizons,
     noise_floor,
-    polish_fit,
     pose_noise,
 )
 
@@ -88,16 +88,16 @@ def test_a_noisy_heading_counts_by_the_way_that_it_leads_astray(drives):
 
 
 @pytest.fixture(scope="module")
-def drives_of_polish():
+def driven():
     return planted_drives(TRUTH, episodes=6, seconds=20.0)
 
 
-def model(drives_of_polish, **values):
-    return evaluate(drives_of_polish, {**TRUTH, **values}, DECLARED, NOISE)
+def model(driven, **values):
+    return evaluate(driven, {**TRUTH, **values}, DECLARED, NOISE)
 
 
-def squares(drives_of_polish, theta, horizon_s=2.0):
-    return pose_errors(drives_of_polish, theta, cut(drives_of_polish, horizon_s))[:, 0] ** 2
+def squares(driven, theta, horizon_s=2.0):
+    return pose_errors(driven, theta, cut(driven, horizon_s))[:, 0] ** 2
 
 
 def test_windows_lead_back_to_the_values_that_drove():
@@ -107,68 +107,68 @@ def test_windows_lead_back_to_the_values_that_drove():
     assert found["delay"] == pytest.approx(TRUTH["delay"], abs=2e-3)
 
 
-def test_without_a_free_parameter_or_a_window_nothing_is_fitted(drives_of_polish):
-    assert fit_windows(drives_of_polish, TRUTH, (), cut(drives_of_polish, 2.0)) == TRUTH
-    assert fit_windows(drives_of_polish, {"trim": 0.0, "delay": 0.1}, DECLARED, cut(drives_of_polish, 100.0)) == {
+def test_without_a_free_parameter_or_a_window_nothing_is_fitted(driven):
+    assert fit_windows(driven, TRUTH, (), cut(driven, 2.0)) == TRUTH
+    assert fit_windows(driven, {"trim": 0.0, "delay": 0.1}, DECLARED, cut(driven, 100.0)) == {
         "trim": 0.0,
         "delay": 0.1,
     }
 
 
-def test_a_few_wild_poses_do_not_bend_the_parameters(drives_of_polish):
-    poses = drives_of_polish.poses.copy()
+def test_a_few_wild_poses_do_not_bend_the_parameters(driven):
+    poses = driven.poses.copy()
     poses[300:306] += (3.0, -2.0, 1.0)
-    found = fit_windows(replace(drives_of_polish, poses=poses), TRUTH, DECLARED, cut(drives_of_polish, 2.0))
+    found = fit_windows(replace(driven, poses=poses), TRUTH, DECLARED, cut(driven, 2.0))
     assert found["trim"] == pytest.approx(TRUTH["trim"], abs=0.01)
 
 
-def test_long_logs_are_thinned(drives_of_polish, monkeypatch):
+def test_long_logs_are_thinned(driven, monkeypatch):
     asked = []
     monkeypatch.setattr("proxytune.diagnosis.motion.multistep_fit.MOST_WINDOWS", 5)
     monkeypatch.setattr(
         "proxytune.diagnosis.motion.multistep_fit.predicted_motion",
         lambda d, t, w: asked.append(len(w.begin)) or np.zeros((len(w.window), 3)),
     )
-    fit_windows(drives_of_polish, TRUTH, DECLARED, cut(drives_of_polish, 2.0))
+    fit_windows(driven, TRUTH, DECLARED, cut(driven, 2.0))
     assert 3 <= max(asked) <= 5
 
 
-def test_no_pose_is_predicted_by_what_was_fitted_to_it(drives_of_polish):
-    poses = drives_of_polish.poses.copy()
-    own = drives_of_polish.block % 4 == 0
+def test_no_pose_is_predicted_by_what_was_fitted_to_it(driven):
+    poses = driven.poses.copy()
+    own = driven.block % 4 == 0
     poses[own, :, 2] += np.linspace(0.0, 2.0, own.sum())[:, None]
-    fitted = fit_windows(replace(drives_of_polish, poses=poses), TRUTH, DECLARED, cut(drives_of_polish, 2.0))
-    apart = held_out_squares(replace(drives_of_polish, poses=poses), TRUTH, DECLARED, 2.0)
-    others = drives_of_polish.block[cut(drives_of_polish, 2.0).increment] % 4 == 0
-    together = squares(replace(drives_of_polish, poses=poses), fitted)
+    fitted = fit_windows(replace(driven, poses=poses), TRUTH, DECLARED, cut(driven, 2.0))
+    apart = held_out_squares(replace(driven, poses=poses), TRUTH, DECLARED, 2.0)
+    others = driven.block[cut(driven, 2.0).increment] % 4 == 0
+    together = squares(replace(driven, poses=poses), fitted)
     assert apart[2.0][others].mean() > together[others].mean()
-    assert set(apart) == set(horizons(drives_of_polish)) == {1.0, 2.0, 5.0}
+    assert set(apart) == set(horizons(driven)) == {1.0, 2.0, 5.0}
 
 
-def test_values_that_predict_poorly_are_fitted_again(drives_of_polish):
-    poor = model(drives_of_polish, trim=0.08, delay=0.2)
-    better, polish = polish_fit(poor)
-    assert squares(drives_of_polish, better.theta).mean() < 0.5 * squares(drives_of_polish, poor.theta).mean()
-    assert min(one.value for one in polish.ratios.values()) < RULES.polish_helps
-    assert max(one.value for one in polish.ratios.values()) <= RULES.polish_harms
+def test_values_that_predict_poorly_are_fitted_again(driven):
+    poor = model(driven, trim=0.08, delay=0.2)
+    better, polish = fit_multistep(poor)
+    assert squares(driven, better.theta).mean() < 0.5 * squares(driven, poor.theta).mean()
+    assert min(one.value for one in polish.ratios.values()) < RULES.multistep_helps
+    assert max(one.value for one in polish.ratios.values()) <= RULES.multistep_harms
     for name, true in TRUTH.items():
         low, high = polish.intervals[name]
         assert low < better.theta[name] < high
         assert low - 0.5 * (high - low) < true < high + 0.5 * (high - low)
 
 
-def test_values_that_windows_do_not_mend_are_kept(drives_of_polish):
-    right = model(drives_of_polish)
-    assert polish_fit(right) == (right, None)
+def test_values_that_windows_do_not_mend_are_kept(driven):
+    right = model(driven)
+    assert fit_multistep(right) == (right, None)
 
 
-def test_values_that_would_do_harm_at_some_horizon_are_not_taken(drives_of_polish, monkeypatch):
-    poor = model(drives_of_polish, trim=0.08, delay=0.2)
-    monkeypatch.setattr("proxytune.diagnosis.motion.multistep_fit.RULES", replace(RULES, polish_harms=0.01))
-    assert polish_fit(poor) == (poor, None)
+def test_values_that_would_do_harm_at_some_horizon_are_not_taken(driven):
+    strict = replace(driven, rules=replace(RULES, multistep_harms=0.01))
+    poor = model(strict, trim=0.08, delay=0.2)
+    assert fit_multistep(poor) == (poor, None)
 
 
 def test_drives_too_short_for_windows_in_three_blocks_are_not_fitted_to():
     few = model(planted_drives(TRUTH, episodes=2, seconds=4.0), trim=0.08)
     assert horizons(few.drives) == ()
-    assert polish_fit(few) == (few, None)
+    assert fit_multistep(few) == (few, None)

@@ -182,14 +182,14 @@ def test_poses_at_times_of_their_own_are_predicted_at_those_times(own_times):
     assert found.poses > 1500
 
 
-def drives_of_of_repeats(log):
+def repeated_drives(log):
     return gather(log, ROBOT, log.episodes)
 
 
 def again(times, *, theta=TRUTH, seconds=30.0):
     """Drives of which each manoeuvre is driven so many times."""
     duties, starts = make_drives(3, 2, round(20 * seconds))
-    return drives_of_of_repeats(driven_log(theta, np.repeat(duties, times, axis=0), np.repeat(starts, times, axis=0)))
+    return repeated_drives(driven_log(theta, np.repeat(duties, times, axis=0), np.repeat(starts, times, axis=0)))
 
 
 @pytest.mark.parametrize("times", [2, 5])
@@ -213,15 +213,15 @@ def test_drives_that_end_earlier_are_repeats_as_far_as_they_go():
     log = driven_log(TRUTH, np.repeat(duties, 2, axis=0), np.repeat(starts, 2, axis=0))
     one, other = log.episodes
     short = replace(other, times=other.times[:500], commands=other.commands[:500], poses=other.poses[:500])
-    assert compare_repeats(drives_of_of_repeats(replace(log, episodes=(one, short))), TRUTH, 1.0) is not None
+    assert compare_repeats(repeated_drives(replace(log, episodes=(one, short))), TRUTH, 1.0) is not None
     stub = replace(other, times=other.times[:150], commands=other.commands[:150], poses=other.poses[:150])
-    assert compare_repeats(drives_of_of_repeats(replace(log, episodes=(one, stub))), TRUTH, 1.0) is None
+    assert compare_repeats(repeated_drives(replace(log, episodes=(one, stub))), TRUTH, 1.0) is None
 
 
 def test_standing_before_the_first_command_is_no_repeat():
     duties, starts = make_drives(4, 6, 400)
     duties[:, :200] = 0.0
-    assert compare_repeats(drives_of_of_repeats(driven_log(TRUTH, duties[:5], starts[:5])), TRUTH, 2.0) is None
+    assert compare_repeats(repeated_drives(driven_log(TRUTH, duties[:5], starts[:5])), TRUTH, 2.0) is None
 
 
 @pytest.mark.parametrize(("times", "seconds"), [(1, 30.0), (2, 6.0)])
@@ -236,7 +236,7 @@ def test_of_a_horizon_without_windows_nothing_is_said():
 def test_drives_without_repeats_leave_windows_without_repeats():
     duties, starts = make_drives(3, 2, 600)
     duties, starts = np.concatenate((duties, duties[:1])), np.concatenate((starts, starts[:1]))
-    assert 0.3 < compare_repeats(drives_of_of_repeats(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9
+    assert 0.3 < compare_repeats(repeated_drives(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9
 
 
 SIZE = 1e-4
@@ -259,12 +259,12 @@ def test_the_change_per_weight_is_that_of_replays(drives, extra, named):
     none = dict.fromkeys(weights, 0.0)
     for column, name in enumerate(order):
         moved = slopes_of(drives, {**theta, **extra, **none, name: SIZE}, offered)
-        seen = (still.left - moved.left) / SIZE
+        seen = (still.residuals - moved.residuals) / SIZE
         np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=2e-3 * np.abs(seen).max() + 1e-6)
 
 
 def test_a_model_that_is_right_leaves_nothing(drives):
-    assert np.abs(slopes_of(drives, TRUTH, learnt_effect(TURNING)).left).max() < 1e-9
+    assert np.abs(slopes_of(drives, TRUTH, learnt_effect(TURNING)).residuals).max() < 1e-9
 
 
 def test_windows_are_thinned_to_a_few_poses_that_reach_their_end(drives):

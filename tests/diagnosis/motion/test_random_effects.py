@@ -16,9 +16,9 @@ from proxytune.diagnosis.motion.random_effects import (
     _invert,
     _lose_commands,
     _mixture,
+    infer_size_indirectly,
     random_effects,
     responses,
-    size_random_effect,
 )
 
 SHORT = {"episodes": 4, "seconds": 25.0}
@@ -81,7 +81,7 @@ def answered():
 
 def test_every_command_that_changes_something_has_a_response(answered):
     assert 20 < len(answered.size) < 2 * 200
-    assert answered.pull.shape == answered.size.shape
+    assert answered.gradient.shape == answered.size.shape
     assert answered.others.shape == (7, len(answered.size))
     assert answered.size.min() > 0.0
 
@@ -89,7 +89,7 @@ def test_every_command_that_changes_something_has_a_response(answered):
 def test_a_model_that_explains_everything_is_pulled_nowhere():
     base = fitted(planted_drives(TRUTH, episodes=2, seconds=10.0, noise=None))
     found = answers(base)
-    assert np.median(np.abs(found.pull) / found.size) < 0.1
+    assert np.median(np.abs(found.gradient) / found.size) < 0.1
 
 
 def test_a_robot_whose_command_never_changes_has_no_responses():
@@ -158,7 +158,7 @@ def told(effect, size, seed):
     """What is told of an effect at first, and in the end."""
     base = fitted(planted_drives({**TRUTH, effect: size}, seed=seed, episodes=6, seconds=30.0))
     (first,) = [one for one in random_effects(base, 1) if one.effect == effect]
-    return first, size_random_effect(base, first, 1)
+    return first, infer_size_indirectly(base, first, 1)
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 Of what was looked at, what has most evidence is chosen, unless it stands for something else.
 What was chosen beside an effect that does harm is searched for again without it.
+Named effects and curves are weighed against each other by one measure of evidence.
 The search adds effects one at a time, as long as each has evidence enough and no signal says far more.
 """
 
@@ -12,18 +13,17 @@ import numpy as np
 import pytest
 from planted import DECLARED, NOISE, ROBOT, TRUTH, planted_drives
 
-from proxytune.diagnosis import AdoptedEffect, Curve, Findings
-from proxytune.diagnosis.motion import selection as naming, selection as searching
-from proxytune.diagnosis.motion.evidence import Evidence, FittedLead
+from proxytune.diagnosis import RULES, AdoptedEffect, Findings, SignalCurve
+from proxytune.diagnosis.motion import selection
+from proxytune.diagnosis.motion.evidence import Evidence, FittedCandidate, exceeds_names, list_tried
 from proxytune.diagnosis.motion.fitting import evaluate, fit
 from proxytune.diagnosis.motion.innovations import at_edge
 from proxytune.diagnosis.motion.random_effects import RandomEffect
-from proxytune.diagnosis.motion.screening import Lead, candidates
-from proxytune.diagnosis.motion.selection import Choice, adopt, choose_best, drop_idle
-from proxytune.driving import read_robot
+from proxytune.diagnosis.motion.screening import ScreenedCandidate, candidates
+from proxytune.diagnosis.motion.selection import adopt, choose_best, drop_idle
 from proxytune.effects import CATALOGUE
 
-FORMS = {form.effect: form for form in candidates(ROBOT, TRUTH, ()) if not form.form}
+FORMS = {form.label: form for form in candidates(ROBOT, TRUTH, ())}
 AS_GOOD, WORSE = {"lateral_slip": 1e-4}, {"lateral_slip": 0.2}
 ACROSS, ALONG = (0.0, 1.0, 0.0), (0.99, 0.1, 0.0)
 
@@ -33,19 +33,26 @@ def drives():
     return planted_drives(TRUTH, episodes=4, seconds=12.0)
 
 
-def lead(effect, column):
-    form = FORMS[effect]
-    return Lead(form, form.probes[0], form.probes[0], 100.0, 100.0, 0.002, np.array(column))
+def screened_with(label, gain, p_value=0.002, column=(1.0, 1.0, 1.0)):
+    form = FORMS[label]
+    return ScreenedCandidate(form, form.probes[0], form.probes[0], gain, gain, p_value, np.array(column))
+
+
+def curve_over_time(gain):
+    return SignalCurve(SimpleNamespace(name="time", effects=()), gain, np.zeros(1))
 
 
 def rivals(drives, gain, theta, column=ACROSS):
     """The rivals of an effect of 100 nats beside a second one: its gain, its values and what it does."""
-    best, second = lead("yaw_scrub", (1.0, 0.0, 0.0)), lead("lateral_slip", column)
+    best, second = (
+        screened_with(effect, 100.0, column=way)
+        for effect, way in (("yaw_scrub", (1.0, 0.0, 0.0)), ("lateral_slip", column))
+    )
     model = evaluate(drives, {**TRUTH, "yaw_scrub": 0.16}, DECLARED, NOISE)
-    fits = {"yaw_scrub": FittedLead(best, model, 100.0)}
+    fits = {"yaw_scrub": FittedCandidate(100.0, model, best)}
     if gain is not None:
-        fits["lateral_slip"] = FittedLead(second, evaluate(drives, {**TRUTH, **theta}, DECLARED, NOISE), gain)
-    (adopted,) = adopt([], Choice(100.0, model, best), Evidence([best, second], fits, (), []))
+        fits["lateral_slip"] = FittedCandidate(gain, evaluate(drives, {**TRUTH, **theta}, DECLARED, NOISE), second)
+    (adopted,) = adopt([], FittedCandidate(100.0, model, best), Evidence([best, second], fits, (), []))
     return [rival.effect for rival in adopted.rivals]
 
 
@@ -68,7 +75,7 @@ def test_an_effect_that_does_the_same_to_the_motion_is_a_rival_whatever_its_evid
 def test_a_random_effect_has_the_other_as_rival_by_most_of_the_evidence(drives, gain, expected):
     lost, late = (RandomEffect(name, name, 0.1, (0.05, 0.2), nats, 0.01) for name, nats in
                   (("dropped_commands", 100.0), ("delay_jitter", gain)))  # fmt: skip
-    choice = Choice(100.0, evaluate(drives, TRUTH, DECLARED, NOISE), random=lost)
+    choice = FittedCandidate(100.0, evaluate(drives, TRUTH, DECLARED, NOISE), random=lost)
     (adopted,) = adopt([], choice, Evidence([], {}, (lost, late), []))
     assert [rival.effect for rival in adopted.rivals] == expected
     assert (adopted.names, adopted.interval) == (("dropped_commands",), (0.05, 0.2))
@@ -88,20 +95,15 @@ def test_an_effect_that_does_nothing_beside_the_last_one_is_dropped_and_one_that
     assert model.theta["yaw_scrub"] == pytest.approx(0.13, abs=0.005)
 
 
-CHOICE_ROBOT = read_robot("duckiebot")
-CHOICE_FORMS = {one.label: one for one in reversed(candidates(CHOICE_ROBOT, TRUTH, ()))}
-
-
 def chosen(drives, *tried, p_value=0.002, random=()):
     """What is chosen of effects, each with its values and its gain."""
     model = evaluate(drives, TRUTH, DECLARED, NOISE)
     fits = {}
     for label, values, gain in tried:
-        form = CHOICE_FORMS[label]
-        lead = Lead(form, form.probes[0], form.probes[0], gain, gain, p_value, np.ones(3))
-        fits[label] = FittedLead(lead, evaluate(drives, {**TRUTH, **values}, DECLARED + form.free, NOISE), gain)
+        model_with = evaluate(drives, {**TRUTH, **values}, DECLARED + FORMS[label].free, NOISE)
+        fits[label] = FittedCandidate(gain, model_with, screened_with(label, gain, p_value))
     best = choose_best(model, Evidence([], fits, random, []), 15.0)
-    return best and best.lead.candidate.label
+    return best and best.screened.candidate.label
 
 
 def patch(radius):
@@ -151,15 +153,15 @@ def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little
 
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "yaw_scrub"), (40.0, "motor_lag")])
 def test_an_effect_within_its_range_is_preferred_to_one_at_its_end(drives, gain, wanted, monkeypatch):
-    monkeypatch.setattr("proxytune.diagnosis.motion.selection.predicts_no_worse", lambda one, other: True)
+    monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: True)
     lag = ("motor_lag", {"motor_lag.time_constant": 1.0, "motor_lag.imbalance": 0.0}, 90.0)
     assert chosen(drives, lag, ("yaw_scrub", {"yaw_scrub": 0.1601}, gain)) == wanted
 
 
 def test_only_an_end_that_is_not_neutral_is_an_edge():
-    assert at_edge("motor_lag.time_constant", 1.0, CHOICE_ROBOT)
-    assert not at_edge("dead_band.width", 0.0, CHOICE_ROBOT)
-    assert not at_edge("motor_lag.time_constant", 0.5, CHOICE_ROBOT)
+    assert at_edge("motor_lag.time_constant", 1.0, ROBOT)
+    assert not at_edge("dead_band.width", 0.0, ROBOT)
+    assert not at_edge("motor_lag.time_constant", 0.5, ROBOT)
 
 
 MIXED = {**TRUTH, "yaw_scrub": 0.13, "lateral_slip": 0.002}
@@ -185,16 +187,16 @@ def searching_of_names(answers, asked):
 
 
 def named(base, monkeypatch, *answers, harmful=True):
-    whole = naming.drop_immaterial
+    whole = selection.drop_negligible
 
     def weighed(found, seed):
         kept = whole(found, seed)
-        return replace(kept, immaterial=tuple(one._replace(harmful=harmful) for one in kept.immaterial))
+        return replace(kept, negligible=tuple(one._replace(harmful=harmful) for one in kept.negligible))
 
-    monkeypatch.setattr(naming, "drop_immaterial", weighed)
+    monkeypatch.setattr(selection, "drop_negligible", weighed)
     asked, told = [], []
-    monkeypatch.setattr(naming, "search", searching_of_names(answers, asked))
-    return naming.name_effects(base, 1, told.append), asked, told
+    monkeypatch.setattr(selection, "search", searching_of_names(answers, asked))
+    return selection.select_effects(base, 1, told.append), asked, told
 
 
 @pytest.mark.slow
@@ -203,7 +205,7 @@ def test_an_effect_that_misled_is_left_out_of_a_second_search_and_still_told(bas
     assert asked == [(), ("lateral_slip",)]
     assert "searching again without lateral_slip" in told
     assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
-    assert [dropped.effect.effect for dropped in found.immaterial] == ["lateral_slip"]
+    assert [dropped.effect.effect for dropped in found.negligible] == ["lateral_slip"]
 
 
 def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
@@ -216,16 +218,16 @@ def test_an_effect_that_does_no_harm_misled_nobody(base, monkeypatch):
 def test_an_effect_that_was_found_last_and_does_not_matter_misled_nobody(base, monkeypatch):
     found, asked, _ = named(base, monkeypatch, SCRUB, SLIP)
     assert asked == [()]
-    assert [dropped.effect.effect for dropped in found.immaterial] == ["lateral_slip"]
+    assert [dropped.effect.effect for dropped in found.negligible] == ["lateral_slip"]
 
 
 @pytest.mark.slow
 def test_the_second_search_is_not_taken_where_it_predicts_worse(base, monkeypatch):
-    monkeypatch.setattr(naming, "predicts_no_worse", lambda one, other: False)
+    monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: False)
     found, asked, _ = named(base, monkeypatch, SLIP, SCRUB)
     assert len(asked) == 2
     assert [effect.effect for effect in found.adopted] == ["yaw_scrub"]
-    assert len(found.immaterial) == 1
+    assert len(found.negligible) == 1
 
 
 SEARCH_FORMS = [
@@ -236,11 +238,11 @@ SEARCH_FORMS = [
 
 
 @pytest.fixture(scope="module")
-def base_of_search():
-    return evaluate(planted_drives(TRUTH, episodes=4, seconds=12.0), TRUTH, DECLARED, NOISE)
+def clean(drives):
+    return evaluate(drives, TRUTH, DECLARED, NOISE)
 
 
-def adopted(base_of_search, monkeypatch, *rounds):
+def adopted(clean, monkeypatch, *rounds):
     """The gains of the effects adopted in rounds, each with an effect's gain and a curve's; and the remainder's."""
     left = iter(rounds)
 
@@ -248,37 +250,52 @@ def adopted(base_of_search, monkeypatch, *rounds):
         gain, curve = next(left, (0.0, 0.0))
         form = next(form for form in SEARCH_FORMS if form.effect not in taken)
         neutral = {name: value for names, value in zip(form.free, form.neutral, strict=True) for name in names}
-        lead = Lead(form, form.probes[0], form.probes[0], gain, gain, 0.002, np.ones(3))
-        signal = Curve(SimpleNamespace(name="time", effects=()), curve, np.zeros(1))
-        fitted = replace(base_of_search, theta={**base_of_search.theta, **neutral})
-        return Evidence([lead], {form.label: FittedLead(lead, fitted, gain)}, (), [signal])
+        screened, signal = screened_with(form.label, gain), curve_over_time(curve)
+        fitted = replace(clean, theta={**clean.theta, **neutral})
+        return Evidence([screened], {form.label: FittedCandidate(gain, fitted, screened)}, (), [signal])
 
-    monkeypatch.setattr(searching, "gather_evidence", gather_evidence)
-    monkeypatch.setattr(searching, "drop_idle", lambda model, effects: (model, effects))
-    found = searching.search(base_of_search, 1, lambda line: None)
-    return [effect.gain for effect in found.adopted], [curve.gain for curve in found.remainder]
+    monkeypatch.setattr(selection, "gather_evidence", gather_evidence)
+    monkeypatch.setattr(selection, "drop_idle", lambda model, effects: (model, effects))
+    found = selection.search(clean, 1, lambda line: None)
+    return [effect.gain for effect in found.adopted], [curve.gain for curve in found.unnamed_curves]
 
 
 @pytest.mark.parametrize(("gain", "expected"), [(10.0, []), (14.9, []), (15.1, [15.1])])
-def test_an_effect_needs_fifteen_nats(base_of_search, monkeypatch, gain, expected):
-    assert adopted(base_of_search, monkeypatch, (gain, 0.0)) == (expected, [])
+def test_an_effect_needs_fifteen_nats(clean, monkeypatch, gain, expected):
+    assert adopted(clean, monkeypatch, (gain, 0.0)) == (expected, [])
 
 
 @pytest.mark.parametrize(("gain", "expected"), [(40.0, [5000.0]), (60.0, [5000.0, 60.0])])
-def test_after_much_evidence_a_hundredth_of_it_is_needed(base_of_search, monkeypatch, gain, expected):
-    assert adopted(base_of_search, monkeypatch, (5000.0, 0.0), (gain, 0.0)) == (expected, [])
+def test_after_much_evidence_a_hundredth_of_it_is_needed(clean, monkeypatch, gain, expected):
+    assert adopted(clean, monkeypatch, (5000.0, 0.0), (gain, 0.0)) == (expected, [])
 
 
-def test_no_more_than_five_effects_are_added(base_of_search, monkeypatch):
-    assert adopted(base_of_search, monkeypatch, *[(100.0, 0.0)] * 9)[0] == [100.0] * 5
+def test_no_more_than_five_effects_are_added(clean, monkeypatch):
+    assert adopted(clean, monkeypatch, *[(100.0, 0.0)] * 9)[0] == [100.0] * 5
 
 
-def test_no_first_effect_is_added_where_a_signal_says_far_more(base_of_search, monkeypatch):
-    assert adopted(base_of_search, monkeypatch, (100.0, 140.0)) == ([], [140.0])
-    assert adopted(base_of_search, monkeypatch, (100.0, 125.0))[0] == [100.0]
-    assert adopted(base_of_search, monkeypatch, (200.0, 238.0))[0] == [200.0]
+def test_no_first_effect_is_added_where_a_signal_says_far_more(clean, monkeypatch):
+    assert adopted(clean, monkeypatch, (100.0, 140.0)) == ([], [140.0])
+    assert adopted(clean, monkeypatch, (100.0, 125.0))[0] == [100.0]
+    assert adopted(clean, monkeypatch, (200.0, 238.0))[0] == [200.0]
 
 
 @pytest.mark.parametrize(("curve", "expected"), [(300.0, [500.0, 100.0]), (400.0, [500.0])])
-def test_a_later_effect_is_added_if_it_says_a_third_of_what_a_signal_does(base_of_search, monkeypatch, curve, expected):
-    assert adopted(base_of_search, monkeypatch, (500.0, 0.0), (100.0, curve))[0] == expected
+def test_a_later_effect_is_added_if_it_says_a_third_of_what_a_signal_does(clean, monkeypatch, curve, expected):
+    assert adopted(clean, monkeypatch, (500.0, 0.0), (100.0, curve))[0] == expected
+
+
+@pytest.mark.parametrize(
+    ("gain", "best", "beyond"),
+    [(31.0, 0.0, True), (29.0, 0.0, False), (110.0, 90.0, False), (131.0, 100.0, True), (590.0, 500.0, False)],
+)
+def test_a_curve_goes_beyond_names_by_a_fifth_and_thirty_nats(gain, best, beyond):
+    assert exceeds_names(curve_over_time(gain), best, RULES) == beyond
+
+
+def test_an_effect_is_listed_by_its_full_fit_where_it_has_one_and_random_effects_among_them():
+    fitted, other = screened_with("yaw_scrub", 20.0), screened_with("turn_slip", 50.0, 0.3)
+    lost = RandomEffect("dropped_commands", "dropped_commands", 0.1, (0.0, 1.0), 60.0, 0.01)
+    evidence = Evidence([other, fitted], {"yaw_scrub": FittedCandidate(80.0, None, fitted)}, (lost,), [])
+    listed = [(one.effect, one.gain, one.p_value) for one in list_tried(evidence)]
+    assert listed == [("yaw_scrub", 80.0, 0.002), ("dropped_commands", 60.0, 0.01), ("turn_slip", 50.0, 0.3)]

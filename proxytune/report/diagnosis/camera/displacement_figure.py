@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
-from proxytune.diagnosis import CameraDiagnosis, CameraFit, Leftover, project
+from proxytune.diagnosis import CameraDiagnosis, CameraFit, ResidualField, project
 from proxytune.report.diagnosis.camera.models import COLOURS, camera_models, label_places
 from proxytune.report.style import COLUMN
 
@@ -44,7 +44,7 @@ def displacement_figure(diagnosis: CameraDiagnosis) -> Figure:
     """Mean displacements of the edges above, beneath them what of it is fixed to the camera, all on one scale."""
     models = camera_models(diagnosis)
     measured = [measured_displacements(fit) for fit in models.values()]
-    gates = diagnosis.gates if len(models) > 1 else diagnosis.gates[1:]
+    gates = diagnosis.residual_fields if len(models) > 1 else diagnosis.residual_fields[1:]
     arrows = [*measured, *(_field(diagnosis, gate, own.places) for gate, own in zip(gates, measured, strict=True))]
     names = [*(fill(f"markings, {name}", TITLE) for name in models), *(_say(gate) for gate in gates)]
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
@@ -86,13 +86,13 @@ def _sums(cell: NDArray[np.intp], values: Floats) -> Floats:
     return np.stack([np.bincount(cell, column) for column in values.T], axis=-1)
 
 
-def _field(diagnosis: CameraDiagnosis, gate: Leftover, places: Floats) -> Arrows:
+def _field(diagnosis: CameraDiagnosis, gate: ResidualField, places: Floats) -> Arrows:
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
     right, down = (2.0 * places / (columns, rows) - 1.0).T
     return Arrows(places, gate.displacement(right, down))
 
 
-def _say(gate: Leftover) -> str:
+def _say(gate: ResidualField) -> str:
     share = max(0.0, 100.0 * gate.share)
     return f"fixed to the camera:\n{gate.rms_px:.2f} px, {share:.0f} % of cost"
 

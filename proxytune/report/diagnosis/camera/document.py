@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from proxytune.diagnosis import Blemish, CameraDiagnosis, CameraEffect, Comparison, Estimate, LaidMap, Leftover
+from proxytune.diagnosis import Blemish, CameraDiagnosis, CameraEffect, Comparison, Estimate, LaidMap, ResidualField
 
 
 def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
@@ -15,12 +15,12 @@ def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "declared": estimates_document(diagnosis.declared),
         "effects": [_effect(effect, diagnosis, diagnosis.theta) for effect in diagnosis.effects],
-        "immaterial": [_effect(effect, diagnosis, diagnosis.dropped) for effect in diagnosis.immaterial],
+        "immaterial": [_effect(effect, diagnosis, diagnosis.dropped) for effect in diagnosis.negligible],
         "extended": estimates_document(diagnosis.theta),
         "candidates": [{"name": "+".join(one.effects), "loss": _number(one.loss)} for one in diagnosis.candidates],
         "error": _comparison(diagnosis.pixels),
         "grey_error": _comparison(diagnosis.grey),
-        "fixed_to_camera": dict(zip(("before", "after"), map(_leftover, diagnosis.gates), strict=True)),
+        "fixed_to_camera": dict(zip(("before", "after"), map(_leftover, diagnosis.residual_fields), strict=True)),
         "blemishes": [_blemish(blemish) for blemish in diagnosis.blemishes],
         "could_not_be_seen": list(diagnosis.could_not_be_seen),
         "next_views": list(diagnosis.next_views),
@@ -79,9 +79,9 @@ def _comparison(error: Comparison) -> dict[str, Any]:
     }
 
 
-def _leftover(gate: Leftover) -> dict[str, Any]:
+def _leftover(gate: ResidualField) -> dict[str, Any]:
     numbers = {"nats": _number(gate.nats), "share": _number(gate.share), "rms_px": _number(gate.rms_px)}
-    return {**numbers, "open": bool(gate.open)}
+    return {**numbers, "open": bool(gate.significant)}
 
 
 def _blemish(blemish: Blemish) -> dict[str, Any]:

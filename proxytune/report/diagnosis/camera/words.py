@@ -32,7 +32,7 @@ def camera_headline(log: str, diagnosis: CameraDiagnosis) -> str:
 def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
     lines = _say_added(diagnosis.effects)
-    lines += [_say_immaterial(effect, diagnosis.dropped) for effect in diagnosis.immaterial]
+    lines += [_say_immaterial(effect, diagnosis.dropped) for effect in diagnosis.negligible]
     lines += _say_left_over(diagnosis)
     rows, columns = diagnosis.gathered.pictures.shape[1:3]
     lines += [_say_blemish(blemish, rows, columns) for blemish in diagnosis.blemishes]
@@ -76,8 +76,8 @@ def _growth(effect: CameraEffect) -> str:
 
 
 def _say_left_over(diagnosis: CameraDiagnosis) -> list[str]:
-    _, after = diagnosis.gates
-    if not after.open:
+    _, after = diagnosis.residual_fields
+    if not after.significant:
         return []
     field = f"markings lie {after.rms_px:.2f} px (RMS) from their places in the picture, wherever the robot stands"
     beware = "; values of added effects are no physics yet" if diagnosis.effects else ""

@@ -20,10 +20,11 @@ from proxytune.comparison.summary import EngineSummary, summarise
 from proxytune.errors import InputError, StoreError
 from proxytune.report.compare.document import compare_document, compare_lines, compare_tables
 from proxytune.report.compare.figure import compare_figure
-from proxytune.report.compare.page import compare_page
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
-from proxytune.report.writing import save, write_text
+from proxytune.report.compare.page import compare_view
+from proxytune.report.html import write_page
+from proxytune.report.text import table_text
+from proxytune.report.view import foot_of
+from proxytune.report.writing import save_figure, write_text
 from proxytune.running import working
 from proxytune.search import NAMES, STUDY_ENGINES, Engine, engine_code, engine_of, why_not
 from proxytune.storage import locked
@@ -90,13 +91,13 @@ def _answer(
     command: str,
 ) -> Answer:
     budget, figure = grouped[0][0].key.budget, output / "compare.png"
-    save(compare_figure(grouped, objective.tolerance), figure)
+    save_figure(compare_figure(grouped, objective.tolerance), figure)
     document = compare_document(objective.name, summaries, budget, objective.tolerance)
     write_text(output / "compare.json", json.dumps(document, indent=2, allow_nan=False) + "\n")
     page, foot = output / "report.html", foot_of(command, [("budget", str(budget))])
-    write_text(page, html_of(compare_page(objective.name, summaries, budget, figure.read_bytes(), foot)))
+    write_page(page, compare_view(objective.name, summaries, budget, figure.read_bytes()), foot)
     lines = [*compare_lines(summaries), f"figure: {figure}", f"report: {page}"]
-    tables = compare_tables(objective.name, summaries, budget)
+    tables = map(table_text, compare_tables(objective.name, summaries, budget))
     return Answer(
         {**document, "figures": [str(figure)], "report": str(page)}, Group(*tables, *(Text(line) for line in lines))
     )

@@ -24,15 +24,11 @@ from .motion.discrepancy_match import Learning as Learning, Lookalike as Lookali
 from .motion.drives import Drives as Drives, Floats as Floats, Whole as Whole, robot_of as robot_of
 from .motion.effect_size import Unlike as Unlike, Worth as Worth
 from .motion.evidence import AdoptedEffect as AdoptedEffect, Findings as Findings, TriedEffect as TriedEffect
-from .motion.fitting import Fit as Fit
 from .motion.innovations import (
-    HUBER as HUBER,
     RANDOM_EFFECTS as RANDOM_EFFECTS,
     disturbed_increments as disturbed_increments,
     drawn_wheel_speeds as drawn_wheel_speeds,
     increments as increments,
-    span as span,
-    theta_at as theta_at,
     wheel_speeds as wheel_speeds,
 )
 from .motion.prediction import (
@@ -44,7 +40,7 @@ from .motion.prediction import (
     predict as predict,
 )
 from .motion.screening import MOTION_EFFECTS as MOTION_EFFECTS, motion_effects as motion_effects
-from .motion.signals import Curve as Curve
+from .motion.signals import Curve as Curve, refit_beside_curve as refit_beside_curve
 from .recording import (
     PICTURES as PICTURES,
     FilmedDrive as FilmedDrive,

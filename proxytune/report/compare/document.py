@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from rich.table import Table
-
 from proxytune.comparison.summary import EngineSummary, Estimate, Region
+from proxytune.report.view import Table, columns_of
 
 
 def compare_document(name: str, summaries: Sequence[EngineSummary], budget: int, tolerance: float) -> dict[str, Any]:
@@ -21,7 +20,7 @@ def compare_document(name: str, summaries: Sequence[EngineSummary], budget: int,
 
 
 def compare_tables(name: str, summaries: Sequence[EngineSummary], budget: int) -> list[Table]:
-    """The comparison for the terminal, the first engine first: how good, how soon, and what is known of θ."""
+    """The comparison as tables, the first engine first: how good, how soon, and what is known of θ."""
     first = summaries[0]
     good = _table(
         f"{name}: the answer after {budget} evaluations, {first.seeds} seeds",
@@ -71,13 +70,7 @@ def _region(region: Region | None, seeds: int) -> tuple[str, ...]:
 
 
 def _table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
-    table = Table(box=None, pad_edge=False, title=title, title_justify="left")
-    table.add_column("engine", overflow="fold")
-    for column in columns:
-        table.add_column(column, justify="right", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    return table
+    return Table(title, columns_of(("engine",), columns), tuple(rows))
 
 
 def compare_lines(summaries: Sequence[EngineSummary]) -> list[str]:

@@ -11,8 +11,18 @@ from matplotlib.figure import Figure
 from proxytune.comparison.runs import Run
 from proxytune.comparison.summary import median_curve
 from proxytune.errors import InputError
-from proxytune.report.line_names import LineName, name_lines
-from proxytune.report.style import BLUE, COLUMN, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
+from proxytune.report.figure_style import (
+    BLUE,
+    COLUMN,
+    GREEN,
+    LIGHT_BLUE,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    LineName,
+    dress,
+    name_lines,
+)
 from proxytune.search import ENGINES, Look, engine_of
 
 LINES = {"solid": "-", "dashed": (0, (4, 1.5)), "dotted": (0, (1, 1)), "dashdot": (0, (5, 1, 1, 1))}

@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 
-from rich.console import Group
-
 from proxytune.comparison.summary import EngineSummary
 from proxytune.report.compare.document import compare_lines, compare_tables
-from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
-from proxytune.report.page.tables import terminal_tables
+from proxytune.report.view import Paragraphs, Picture, Table, View
 
 CAPTION = (
     "The lower, the nearer the best so far is to the optimum; medians over the seeds, with the 95 % band of the first "
@@ -16,7 +13,7 @@ CAPTION = (
 )
 
 
-def compare_page(name: str, summaries: Sequence[EngineSummary], budget: int, figure: bytes, foot: Foot) -> Page:
+def compare_view(name: str, summaries: Sequence[EngineSummary], budget: int, figure: bytes) -> View:
     """A comparison as a page: what the terminal shows, and the figure.
 
     Args:
@@ -24,14 +21,13 @@ def compare_page(name: str, summaries: Sequence[EngineSummary], budget: int, fig
         summaries: One per engine; the others are compared with the first.
         budget: Evaluations per run.
         figure: The PNG.
-        foot: The page's.
     """
     *verdicts, how = compare_lines(summaries)
     picture = Picture("How fast each engine comes near the optimum", figure, CAPTION)
-    tables = terminal_tables(Group(*compare_tables(name, summaries, budget)))
-    parts: list[Picture | Table | Words] = [picture, *tables, Words("How to read the tables", (f"{how}.",))]
+    tables = compare_tables(name, summaries, budget)
+    parts: list[Picture | Table | Paragraphs] = [picture, *tables, Paragraphs("How to read the tables", (f"{how}.",))]
     answer = _answer(summaries, verdicts, budget)
-    return Page(f"Search engines on {name}", answer, _next_step(summaries), tuple(parts), foot)
+    return View(f"Search engines on {name}", answer, _next_step(summaries), tuple(parts))
 
 
 def _answer(summaries: Sequence[EngineSummary], verdicts: Sequence[str], budget: int) -> str:

@@ -1,15 +1,16 @@
-"""A domain instance in the figures that other simulators take: wheels, motors, camera and the tracked point."""
+"""Domain instance in the figures that other simulators take, and where each effect goes in each format."""
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from proxytune.driving import CAMERA, CameraFigures, Robot, mounted_camera
 from proxytune.effects import SMALLEST_LIMIT, Effect, effect_of, effects_from
 from proxytune.errors import InputError
-from proxytune.report.export.places import place_of
 from proxytune.space import Theta
 
 Pair = tuple[float, float]
@@ -94,7 +95,7 @@ class Instance:
 
 
 @dataclass(frozen=True)
-class Line:
+class ExportLine:
     """What becomes of one value.
 
     Attributes:
@@ -117,7 +118,7 @@ class Line:
         return f"{self.name} {self.value:.4g}{unit}{interval}: {self.place or 'NO PLACE, not in this file'}"
 
 
-def lines_of(instance: Instance, form: str) -> list[Line]:
+def export_lines(instance: Instance, form: str) -> list[ExportLine]:
     """What becomes of every value in a format; those that are neutral need no place."""
     parameters = instance.robot.catalogue.parameters
     lines = []
@@ -125,13 +126,13 @@ def lines_of(instance: Instance, form: str) -> list[Line]:
         parameter, place = parameters.get(name), place_of(effect_of(name), form)
         if place or parameter is None or isinstance(parameter.neutral, str) or value != parameter.neutral:
             unit = parameter.unit if parameter else ""
-            lines.append(Line(name, value, unit, instance.intervals.get(name), place))
+            lines.append(ExportLine(name, value, unit, instance.intervals.get(name), place))
     return lines
 
 
 def header(instance: Instance, form: str) -> list[str]:
     """What the head of a file says: whose values they are, where each went, and what is not in it."""
-    found = lines_of(instance, form)
+    found = export_lines(instance, form)
     placed, left_out = [line for line in found if line.place], [line for line in found if not line.place]
     return [
         f"{instance.robot.name} as proxytune found it: {instance.source}",
@@ -151,3 +152,79 @@ def xml_comment(instance: Instance, form: str, columns: int) -> str:
         columns: By how many its lines are indented.
     """
     return re.sub("-(?=-)", "- ", ("\n" + columns * " ").join(header(instance, form)))
+
+
+FORMATS = ("urdf", "mjcf", "ros")
+"""What can be written, as `export --to` calls it."""
+
+
+class Places(NamedTuple):
+    """Where an effect goes, by format; empty where it has no place.
+
+    Attributes:
+        urdf: In a URDF.
+        mjcf: In a MuJoCo model.
+        ros: In ROS parameters.
+    """
+
+    urdf: str = ""
+    mjcf: str = ""
+    ros: str = ""
+
+
+_MOUNT = Places("joint camera_mount", "camera pos and xyaxes", "static_transform base_link to camera")
+_MARKER = Places("link tracked_point", "site tracked_point", "static_transform base_link to tracked_point")
+_NOWHERE = Places()
+PLACES: Mapping[str, Places] = MappingProxyType(
+    {
+        "delay_jitter": _NOWHERE,
+        "dropped_commands": _NOWHERE,
+        "command_quantisation": _NOWHERE,
+        "delay": Places(mjcf="actuator delay"),
+        "slew_rate": Places(ros="max_acceleration"),
+        "driver_map": _NOWHERE,
+        "dead_band": _NOWHERE,
+        "stiction": _NOWHERE,
+        "saturation": Places("joint limit velocity", "actuator ctrlrange", "max_velocity"),
+        "trim": Places("wheel radii", "actuator gainprm", "wheel_radius_multiplier, max_velocity"),
+        "wheel_gain": Places("wheel radii", "actuator gainprm", "wheel_radius_multiplier, max_velocity"),
+        "battery_sag": _NOWHERE,
+        "thermal_fade": _NOWHERE,
+        "motor_lag": Places(mjcf="actuator dynprm"),
+        "backlash": _NOWHERE,
+        "wheel_ripple": _NOWHERE,
+        "yaw_scrub": Places("wheel distance", "wheel distance", "wheel_separation_multiplier, max_velocity"),
+        "understeer": _NOWHERE,
+        "yaw_lag": _NOWHERE,
+        "turn_slip": _NOWHERE,
+        "lateral_slip": _NOWHERE,
+        "cross_coupling": _NOWHERE,
+        "floor_slope": _NOWHERE,
+        "slippery_patch": _NOWHERE,
+        "marker_offset": _MARKER,
+        "heading_offset": _MARKER,
+        "camera_pitch": _MOUNT,
+        "camera_roll": _MOUNT,
+        "camera_yaw": _MOUNT,
+        "camera_height": _MOUNT,
+        "camera_forward": _MOUNT,
+        "field_of_view": Places(mjcf="camera fovy", ros="camera_info k, p"),
+        "lens_distortion": Places(ros="camera_info d"),
+        "lens_centre": Places(ros="camera_info k, p"),
+        "pixel_aspect": Places(ros="camera_info k, p"),
+        "blur": _NOWHERE,
+        "rolling_shutter": _NOWHERE,
+        "camera_latency": _NOWHERE,
+        "defocus": _NOWHERE,
+        "vignetting": _NOWHERE,
+        "exposure": _NOWHERE,
+        "image_noise": _NOWHERE,
+    }
+)
+"""By effect of the catalogue; a user's own effect and what was learnt have no place anywhere."""
+
+
+def place_of(effect: str, form: str) -> str:
+    """Where an effect goes in a format; empty where it has no place."""
+    place: str = getattr(PLACES.get(effect, _NOWHERE), form)
+    return place

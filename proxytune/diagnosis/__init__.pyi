@@ -24,11 +24,15 @@ from .motion.discrepancy_match import Learning as Learning, Lookalike as Lookali
 from .motion.drives import Drives as Drives, Floats as Floats, Whole as Whole, robot_of as robot_of
 from .motion.effect_size import Unlike as Unlike, Worth as Worth
 from .motion.evidence import AdoptedEffect as AdoptedEffect, Findings as Findings, TriedEffect as TriedEffect
+from .motion.fitting import Fit as Fit
 from .motion.innovations import (
+    HUBER as HUBER,
     RANDOM_EFFECTS as RANDOM_EFFECTS,
     disturbed_increments as disturbed_increments,
     drawn_wheel_speeds as drawn_wheel_speeds,
     increments as increments,
+    span as span,
+    theta_at as theta_at,
     wheel_speeds as wheel_speeds,
 )
 from .motion.prediction import (

@@ -43,12 +43,12 @@ LONGEST = 16
 
 
 def families_sentence(compared: ComparedFamilies) -> str:
-    """What to use to predict, to teach and where time is short, and what to do next."""
+    """Say what to use to predict, to teach and where time is short, and what to do next."""
     return f"{families_answer(compared)} Next: {families_next_step(compared)}"
 
 
 def families_answer(compared: ComparedFamilies) -> str:
-    """What to use to predict, to teach and where time is short."""
+    """Say what to use to predict, to teach and where time is short."""
     teach = [f"To teach: {_say_teaching(compared)}."] if compared.settings.teaching else []
     return " ".join([f"To predict: {_say_predicting(compared)}.", *teach, f"Cheapest: {_say_cost(compared)}."])
 
@@ -77,7 +77,7 @@ def prpv_text(fresh: Assessment) -> str:
 
 
 def difference_text(one: Difference) -> str:
-    """How much higher one PRPV is than another, with its interval."""
+    """Difference of one PRPV above another, with its interval."""
     ends = "" if one.low is None or one.high is None else f" ({fixed(one.low, 0)} to {fixed(one.high, 0)})"
     return f"+{one.value}{ends}"
 
@@ -93,14 +93,14 @@ def _rounded(value: float) -> str:
 
 
 def more_text(lesson: Lesson) -> str:
-    """How many more target samples it takes, with the interval; why that is not known."""
+    """Target samples that it takes more, with the interval; why that is not known."""
     if lesson.failure:
         return "cannot teach"
     return "" if lesson.more is None else count(lesson.more, UNKNOWN)
 
 
 def differences(compared: ComparedFamilies) -> dict[str, Difference]:
-    """How much higher the PRPV of each family is than the lowest, by name."""
+    """Differences of the PRPV of each family above the lowest, by name."""
     found = compared.selection.differences if compared.selection else ()
     return {one.worse: one for one in found if one.better == compared.predicts.best}
 
@@ -161,7 +161,7 @@ def _join_clauses(best: str, how: str, worse: list[str], alike: list[str]) -> st
 
 
 def _cheaper(compared: ComparedFamilies) -> str:
-    """Of those that predict alike the one whose episodes are shown to take the shortest; empty if none is."""
+    """Name of the one of those that predict alike whose episodes are shown to take the shortest; empty if none is."""
     choice = compared.predicts
     names = [choice.best or "", *choice.alike]
     means = {name: one[0] for name, one in compared.seconds_per_episode().items() if name in names}
@@ -192,7 +192,7 @@ def families_tables(compared: ComparedFamilies) -> tuple[Table, Table]:
 
 
 def _use_rows(compared: ComparedFamilies) -> list[Row]:
-    """What each family predicts, teaches (where that was asked for) and costs, a fact a row."""
+    """Rows of what each family predicts, teaches (where that was asked for) and costs, a fact a row."""
     more, families = differences(compared), compared.families
     lessons, costs = [compared.lessons.get(one.name) for one in families], compared.seconds_per_episode()
     taught: list[Row] = []
@@ -223,7 +223,7 @@ def _theta_cell(parameter: KnownParameter | None) -> str:
 
 
 def use_notes(compared: ComparedFamilies) -> list[str]:
-    """What the numbers are, and what a family's own study had to say of it."""
+    """Notes on what the numbers are, and what a family's own study had to say of it."""
     lines = ["PRPV is of fresh episodes at the best θ, from the same starts and under the same seeds in every family"]
     lines += [f"{one.name}: {line}" for one in compared.families for line in _say_family(one)]
     lines += [f"{name}: {one.failure}" for name, one in compared.lessons.items() if one.failure]
@@ -231,7 +231,7 @@ def use_notes(compared: ComparedFamilies) -> list[str]:
 
 
 def _say_family(one: TunedFamily) -> list[str]:
-    """What a family's own study has to say: a misfit, a perfect one, too few trials, and a time that was not spent."""
+    """Notes of a family's own study: a misfit, a perfect one, too few trials, and a time that was not spent."""
     result, settings = one.result, one.result.study.settings
     time, trials = settings.stop.wall_time_s or 0.0, len(result.trials)
     lines = ["no θ explains the target's scores: it lacks something"] if result.knowledge.misfit.fits is False else []
@@ -436,5 +436,5 @@ def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
 
 
 def _standing(panel: Panel, name: str) -> str:
-    """How a family stands in a panel."""
+    """Standing of a family in a panel."""
     return BEST if name == panel.choice.best else ALIKE if name in panel.choice.alike else WORSE

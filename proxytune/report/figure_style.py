@@ -21,7 +21,7 @@ CHARACTERS_PER_INCH, HANDLE = 19, 8
 
 
 def floor_name(floor: NoiseFloor) -> str:
-    """What a legend calls the noise floor; halves of the target are no noise floor, and are not called so."""
+    """Name of the noise floor in a legend; halves of the target are no noise floor, and are not called so."""
     return "target's halves" if floor.kind == "halves" else floor.title
 
 
@@ -71,7 +71,7 @@ def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -
 
 
 ONE_LINE = 0.05
-"""How far apart names of one line are at least, as a share of the panel's height; two lines take more."""
+"""Least distance between names of one line, as a share of the panel's height; two lines take more."""
 
 
 class LineName(NamedTuple):

@@ -31,7 +31,7 @@ FLIPPED = (
 
 
 def score_sentence(assessments: Assessments, selection: Selection | None, *, target: str) -> str:
-    """How low PRPV is and what that is worth; of several proxies which is best, and of which others beyond noise."""
+    """Say how low PRPV is and what that is worth; of several proxies which is best, and than which beyond noise."""
     if selection is None:
         ((proxy, assessment),) = assessments.items()
         return _say_prpv(assessment, proxy, target)
@@ -42,7 +42,7 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
 
 
 def _say_prpv(assessment: Assessment, proxy: str, target: str) -> str:
-    """How low PRPV is, and what that is worth."""
+    """Say how low PRPV is, and what that is worth."""
     prpv, inner, random = assessment.prpv, assessment.prpv_interval, assessment.chance
     floor, chance = (
         assessment.noise_floor,

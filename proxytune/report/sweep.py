@@ -67,7 +67,7 @@ def held_mark(base: Theta) -> str:
 
 
 def held_texts(curve: Curve) -> list[str]:
-    """What the curve's other parameters are held at, as texts; those nominal are not named."""
+    """Values that the curve's other parameters are held at, as texts; those nominal are not named."""
     return [f"{name}={value:g}" for name, value in sorted(curve.base.items()) if name != curve.parameter]
 
 
@@ -144,13 +144,13 @@ def curve_tables(curve: Curve) -> tuple[Table, Table]:
 
 
 def curve_lines(curve: Curve) -> list[str]:
-    """What the curve shows, a line per measure: where it is best, and whether it worsens on both sides."""
+    """Say what the curve shows, a line per measure: where it is best, and whether it worsens on both sides."""
     held_at = curve.base.get(curve.parameter)
     return [f"{curve.parameter}: {describe(series, held_at)}" for series in series_of(curve)]
 
 
 def say_failures(curves: Sequence[Curve]) -> list[str]:
-    """Why points have no score, in one line each."""
+    """Say why points have no score, in one line each."""
     return [
         f"{curve.parameter} {point.value:g}: {point.evaluation.failure}"
         for curve in curves
@@ -223,7 +223,7 @@ def sweep_view(study: str, curves: Sequence[Curve], figures: Mapping[str, bytes]
 
 
 def _lowest(curve: Curve) -> str:
-    """Where PRPV is lowest, and which other values these episodes leave open."""
+    """Say where PRPV is lowest, and which other values these episodes leave open."""
     prpv = series_of(curve)[0]
     shape = shape_of(prpv, curve.base.get(curve.parameter))
     if shape.score is None:
@@ -290,7 +290,7 @@ def held_alike(curves: Sequence[Curve]) -> list[list[Curve]]:
 
 
 def held_values(base: Theta, whose: str = "") -> str:
-    """What the others are held at, in words, and whose values these are."""
+    """Say what the others are held at, and whose values these are."""
     values = ", ".join(f"{name}={value:g}" for name, value in sorted(base.items()))
     return f"the others are held at {whose}{values}" if values else "the others are nominal"
 
@@ -303,7 +303,7 @@ def _figures_together(alike: Sequence[Curve], truth: Theta | None) -> dict[str, 
 
 
 def _names_together(alike: Sequence[Curve]) -> list[str]:
-    """What the figures of several parameters are called; none where there is one parameter."""
+    """Names of the figures of several parameters; none where there is one parameter."""
     if len({curve.parameter for curve in alike}) < 2:
         return []
     mark = f"_{held_mark(dict(alike[0].base))}" if alike[0].base else ""

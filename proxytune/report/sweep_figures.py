@@ -32,7 +32,7 @@ COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 MARKERS = "osD^v"
 POD_NAMES = {POD_POSE: "POD, pose [m]", POD_IMAGE: "POD, image [full scale]"}
 HEIGHT, BELOW = 1.2, 0.4
-"""Of a row of panels, and of what is below them [inch]."""
+"""Heights of a row of panels, and of all below them [inch]."""
 
 
 def sweep_figure(curves: Sequence[Curve], truth: Theta | None = None) -> Figure:
@@ -131,7 +131,7 @@ def bars_figure(curves: Sequence[Curve]) -> Figure:
 
 
 def bar_points(curve: Curve) -> tuple[list[int], int]:
-    """Which points of a curve stand for low, held and high, fewer where the held value is at an end; and the held one.
+    """Points of a curve that stand for low, held and high, fewer where the held value is at an end; and the held one.
 
     The held value is the middle of the range where none was given.
     """
@@ -232,10 +232,10 @@ def explain(axes: Axes, *panels: Axes) -> None:
 
 
 def axis_of(measure: Measure) -> str:
-    """What an axis calls a measure."""
+    """Name of a measure on an axis."""
     return with_unit(measure.name, measure.unit)
 
 
 def label_of(curve: Curve) -> str:
-    """What an axis calls the parameter of a curve."""
+    """Name of a curve's parameter on an axis."""
     return curve.label.replace("_", " ")

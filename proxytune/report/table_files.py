@@ -45,7 +45,7 @@ IN_LATEX = {
     "∞": r"$\infty$",
     **{letter: f"$\\{name}$" for letter, name in GREEK.items()},
 }
-"""What pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
+"""Characters that pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
 Cell = str | float | None
 
 

@@ -57,7 +57,7 @@ SEARCH = '`study` with objective = "plv" looks for'
 
 
 def teach_answer(experiment: Experiment) -> str:
-    """Which proxies save target samples, which save none, and of which that is open."""
+    """Say which proxies save target samples, which save none, and of which that is open."""
     unknown = why_unknown(experiment.needs)
     if unknown and not experiment.settled:
         return f"PLV (proxy learning value) is unknown: {unknown.reason}."
@@ -95,7 +95,7 @@ def teach_next_step(experiment: Experiment) -> str:
 
 
 def say_more_of_it(experiment: Experiment) -> str:
-    """What to raise: the examinations that are chosen or, of a whole grid, its repetitions."""
+    """Say what to raise: the examinations that are chosen or, of a whole grid, its repetitions."""
     taught = experiment.settings.teaching
     if taught is not None and taught.examinations is not None:
         return f"raise teaching.examinations from {taught.examinations} to {2 * taught.examinations}"
@@ -144,7 +144,7 @@ def _row(lesson: TeacherResult, prpv: Predictivity | None) -> tuple[str, ...]:
 
 
 def _convergence_notes(experiment: Experiment) -> list[str]:
-    """What counts as converged, whether the learner without a proxy has, and by what each divides the samples."""
+    """Notes on what counts as converged, and by what each proxy divides the samples."""
     notes = [CONVERGED.format(f"{experiment.when.threshold:.1f} of {experiment.best_score:g}")]
     if unknown := why_unknown(experiment.needs):
         notes.append(f"{unknown.reason}, so PLV is not known; {unknown.remedy}")
@@ -246,7 +246,7 @@ def teach_view(experiment: Experiment, prpv: Predictivities, figure: bytes) -> V
 
 
 def _published(experiment: Experiment, rows: Sequence[tuple[str, ...]]) -> tuple[Table, ...]:
-    """What others published of these proxies, beside what is found here; nothing where nothing is given."""
+    """Published figures of these proxies, beside what is found here; nothing where nothing is given."""
     taught = experiment.settings.teaching
     if taught is None or not taught.published:
         return ()
@@ -284,7 +284,7 @@ def teach_document(experiment: Experiment, prpv: Predictivities) -> dict[str, An
 
 
 def _agreement_document(found: Agreement | None) -> dict[str, Any] | None:
-    """How far a ranking agrees with that by PLV."""
+    """Agreement of a ranking with that by PLV."""
     if found is None:
         return None
     pairs = [list(pair) for pair in found.reversed]
@@ -388,7 +388,7 @@ def _draw_panel(axes: Axes, experiment: Experiment, lesson: TeacherResult) -> No
 
 
 def _places(experiment: Experiment, counts: Floats) -> Floats:
-    """Where counts stand on the axis: as doublings, none at 0."""
+    """Places of counts on the axis: as doublings, none at 0."""
     return places(counts, experiment.needs.draws.first)
 
 

@@ -11,7 +11,7 @@ from datetime import datetime
 from proxytune.identity import versions_of
 
 PACKAGES = ("proxytune", "numpy", "scipy", "pybullet")
-"""What results may depend on."""
+"""Packages that results may depend on."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ Part = Picture | Table | Paragraphs
 
 @dataclass(frozen=True)
 class View:
-    """What was found, for people.
+    """Result of anything, for people.
 
     Attributes:
         title: What it is about.
@@ -94,7 +94,7 @@ class View:
 
 @dataclass(frozen=True)
 class Foot:
-    """What it takes to come by a page again.
+    """Facts that it takes to come by a page again.
 
     Attributes:
         command: The command that makes it, as typed in a shell.

@@ -21,7 +21,7 @@ from proxytune.errors import RunError
 from proxytune.files import draft_of
 
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-"""What is left out of files, so that the same figure gives the same bytes."""
+"""Metadata left out of files, so that the same figure gives the same bytes."""
 _beside: ContextVar[tuple[str, ...]] = ContextVar("beside", default=())
 
 
@@ -79,7 +79,7 @@ def _save_as(figure: Figure, where: Path | BytesIO, **how: Any) -> None:
 
 
 def file_names(names: Iterable[str]) -> dict[str, str]:
-    """What names are called in file names; of those that would be alike, the later ones are numbered."""
+    """Names as file names have them; of those that would be alike, the later ones are numbered."""
     called: dict[str, str] = {}
     for name in names:
         plain = re.sub(r"[^\w.-]+", "_", name)

@@ -30,7 +30,7 @@ NEXT_STEPS = {
     "unexplained": "log more varied drives, or try effects of your own with --effects.",
     "cannot be told": "drive the same commands several times, and diagnose the log with these drives in it.",
 }
-"""What to do after each verdict, where no manoeuvre would tell more."""
+"""Steps to do after each verdict, where no manoeuvre would tell more."""
 CAPTIONS = {
     "error": (
         "Error of predictions before and after",
@@ -156,7 +156,7 @@ def diagnosis_notes(found: LogDiagnosis) -> list[str]:
 
 
 def _say_refusals(found: LogDiagnosis) -> list[str]:
-    """Why a part is missing, a line each."""
+    """Say why a part is missing, a line each."""
     parts = (("motion", found.motion_refused), ("camera", found.camera_refused))
     return [f"{part}: {why}" for part, why in parts if why]
 

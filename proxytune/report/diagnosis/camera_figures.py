@@ -43,7 +43,7 @@ def camera_figures(diagnosis: CameraDiagnosis) -> Mapping[str, Figure]:
 
 
 def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
-    """What is lost with each effect alone, against all effects together; None where all are declared."""
+    """Draw what is lost with each effect alone, against all effects together; None where all are declared."""
     tried = diagnosis.candidates
     if not tried:
         return None
@@ -69,7 +69,7 @@ def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
 
 
 def loss_of_nothing(diagnosis: CameraDiagnosis) -> float:
-    """What is lost with the declared effects alone, in the measure that the candidates are ranked by [nats]."""
+    """Loss with the declared effects alone, in the measure that the candidates are ranked by [nats]."""
     named = diagnosis.named
     return rank_subsets(named.full, effects_of(named.declared.names), 0)[0].loss
 
@@ -228,7 +228,7 @@ def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
 
 
 def telling_frames(diagnosis: CameraDiagnosis) -> list[int]:
-    """Of each half of the log the frame with many markings on which the error changes most."""
+    """Frames with many markings, one of each half of the log, on which the error changes most."""
     before, after, views = diagnosis.pixels.before, diagnosis.pixels.after, diagnosis.named.full.views
     points = np.bincount(views.edges.frame, minlength=views.count)
     change = np.nan_to_num(np.abs(before.frames - after.frames)) + 1e-9
@@ -261,7 +261,7 @@ def outline_field(fit: CameraFit, frame: int, white: bool) -> tuple[Floats, Floa
 
 
 COLOURS = (VERMILLION, BLUE)
-"""Of the declared model, and of the one with effects added."""
+"""Colours of the declared model, and of the one with effects added."""
 
 
 def camera_models(diagnosis: CameraDiagnosis) -> Mapping[str, CameraFit]:

@@ -30,7 +30,7 @@ from proxytune.logs import GEOMETRY
 from proxytune.report.diagnosis.notes import decisive, may_matter, per_cent
 
 TOP = ("verdict", "declared", "effects", "extended", "could_not_be_seen")
-"""What the document says of the camera above all, where there is nothing to say of motion."""
+"""Keys of the camera that the document has above all, where there is nothing to say of motion."""
 
 
 def diagnosis_document(found: LogDiagnosis) -> dict[str, Any]:

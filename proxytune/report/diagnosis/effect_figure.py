@@ -196,7 +196,7 @@ CUE_PANELS: Mapping[str, tuple[Panel, ...]] = {
     "right wheel angle": (Panel("", "angle of the right wheel [rad]", "right", True),),
     "direction of travel": tuple(Panel("", "direction of travel", m, True) for m in ("forward", "turn")),
 }
-"""What is drawn for a signal group."""
+"""Panels drawn for a signal group."""
 NAMES = {
     "forward": "forward speed",
     "sideways": "speed to the left",
@@ -214,7 +214,7 @@ class Rates(NamedTuple):
 
 
 def rates_of(diagnosis: Diagnosis, curve: Curve | None) -> Rates:
-    """What the declared model says, and what is added to it by measurement, by effects, by the flexible curve."""
+    """Motion as the declared model has it, and what is added to it by measurement, by effects, by a flexible curve."""
     found, drives = diagnosis.found, diagnosis.found.declared.drives
     declared = increments(drives, found.declared.theta)
     added = {MEASURED: drives.measured - declared}

@@ -99,7 +99,7 @@ SQUARES = 60
 
 
 class Strayed(NamedTuple):
-    """How far predictions strayed in windows (W,) and at the poses (M,) in them.
+    """Distances of predictions in windows (W,) and at the poses (M,) in them.
 
     Attributes:
         horizon_s: How long the windows are [s].
@@ -117,7 +117,7 @@ class Strayed(NamedTuple):
 
 
 def strayed(diagnosis: Diagnosis) -> dict[str, Strayed]:
-    """How far the models stray on the tested drives, by what a legend calls them: one model if nothing was added."""
+    """Distances of the models' predictions on the tested drives, by name in a legend: one model if nothing was added."""
     tested, found = diagnosis.parts.tested, diagnosis.found
     models = {DECLARED_MODEL: found.declared.theta}
     if diagnosis.effects:

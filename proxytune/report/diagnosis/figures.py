@@ -48,7 +48,7 @@ ROW, ELSE = 0.145, 0.95
 
 
 class _Role(NamedTuple):
-    """What a dot stands for."""
+    """Meaning of a dot."""
 
     name: str
     edge: str
@@ -135,7 +135,7 @@ SHOWN_AS = {
     "rad/s": (180.0 / np.pi, "deg/s"),
     "rad/m": (180.0 / np.pi, "deg/m"),
 }
-"""How weights are told, by their unit: a factor and its unit; shares in per cent."""
+"""Units in which weights are told, by their own: a factor and its unit; shares in per cent."""
 FADING = {
     "transients": "time constant",
     "load": "time constant",

@@ -50,7 +50,7 @@ def decisive(worth: Worth) -> float:
 
 
 def may_matter(worth: Worth) -> bool:
-    """Whether these drives leave it open that an effect matters."""
+    """Tell whether these drives leave it open that an effect matters."""
     return any(one.interval[1] >= RULES.material_factor for one in worth.values())
 
 
@@ -111,7 +111,7 @@ def _cautions(diagnosis: Diagnosis) -> list[str]:
 
 
 def next_drives(diagnosis: Diagnosis) -> list[str]:
-    """What to drive next, a line each; nothing where there is nothing to tell apart."""
+    """Say what to drive next, a line each; nothing where there is nothing to tell apart."""
     next_drive = diagnosis.manoeuvre
     if next_drive is None:
         return []
@@ -128,7 +128,7 @@ def next_drives(diagnosis: Diagnosis) -> list[str]:
 
 
 def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -> list[str]:
-    """What is wrong with the clocks and what to do; where a delay was fitted, that an offset looks the same."""
+    """Say what is wrong with the clocks and what to do; where a delay was fitted, that an offset looks the same."""
     notes = [note for own in clocks for note in (*_say_offset(own), *_say_drives(own), *_say_jumps(own))]
     notes = [f"clocks of {log}: {note}" for note in notes]
     declared = next((own.declared_s for own in clocks), None)
@@ -196,7 +196,7 @@ def unlike_notes(unlike: Unlike | None, names: Sequence[str]) -> list[str]:
 
 
 def learnt_notes(learning: Learning) -> list[str]:
-    """What was learnt, in sentences; nothing where nothing was."""
+    """Say what was learnt; nothing where nothing was."""
     beside = learning.remainder
     notes = []
     curves = ", ".join(f"{title} ({100.0 * beside.share[title]:.0f} %)" for title in beside.share)

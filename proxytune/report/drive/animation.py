@@ -51,7 +51,7 @@ class Animation:
         return [self.frame(self.times[place]) for place in (0, len(self.times) // 2, -1)]
 
     def frame(self, time: float) -> NDArray[np.uint8]:
-        """What is seen at a time [s], (rows, columns, 3)."""
+        """Frame of a time [s], (rows, columns, 3)."""
         self._canvas.restore_region(self._still)
         for view in self._views:
             view.show(time)
@@ -139,7 +139,7 @@ def _row(times: Floats, time: float) -> int:
 
 
 def _heading(episode: RecordedEpisode, row: int) -> float:
-    """Where the robot is headed [rad]; along its path where no heading was recorded."""
+    """Heading of the robot [rad]; along its path where no heading was recorded."""
     if "heading" in episode.poses:
         return float(episode.poses["heading"][row])
     step = np.subtract(*episode.places[[max(row, 1), max(row, 1) - 1]])

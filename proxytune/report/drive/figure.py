@@ -48,7 +48,7 @@ def episode_text(pair: SideBySide, first: Sequence[str]) -> TerminalTable:
 
 
 def say_parting(pair: SideBySide) -> str:
-    """When proxy and target part, in a sentence; empty where that cannot be told."""
+    """Say when proxy and target part; empty where that cannot be told."""
     if pair.target is None:
         return ""
     if not (pair.proxy.has_places and pair.target.has_places):
@@ -61,7 +61,7 @@ def say_parting(pair: SideBySide) -> str:
 CHANNEL_INCH, PICTURES_INCH, LINE_INCH = 0.62, 0.62, 0.13
 """Heights of a channel of commands, of a row of pictures, and of a line of text."""
 INSTANTS = 4
-"""How many pictures of each camera are shown."""
+"""Number of pictures shown of each camera."""
 
 
 def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:

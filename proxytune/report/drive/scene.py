@@ -66,7 +66,7 @@ def _bounds(paths: Iterable[Floats]) -> tuple[Floats, Floats]:
 ARROWS, LEAST_M = 6, 0.5
 """About so many arrows on a path, and at least so far apart [m]."""
 EVERY = 6
-"""Of so many points of a path one is looked at when words are placed."""
+"""One point in so many of a path is looked at when words are placed."""
 WIDTHS = {"proxy": 1.0, "target": 2.2}
 """The target is drawn wider and below, so that both are seen where they agree."""
 
@@ -148,7 +148,7 @@ GAP = 0.02
 CORNERS = np.array(((1, 1), (-1, 1), (1, -1), (-1, -1)))
 """To the right or left of its mark, and above or below."""
 OUTSIDE, HIDES = 1000, 100
-"""What it costs to leave the map, and to hide a mark or another label, in points of a path that are hidden."""
+"""Costs of leaving the map, and of hiding a mark or another label, in points of a path that are hidden."""
 
 
 def corners_of(marks: Floats, paths: Floats, low: Floats, high: Floats) -> list[tuple[int, int]]:

@@ -18,7 +18,7 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Instance:
-    """What is to be written.
+    """A domain instance to be written.
 
     Attributes:
         robot: The robot.
@@ -55,7 +55,7 @@ class Instance:
 
     @property
     def gains(self) -> Pair:
-        """How much faster than nominal the left and right wheels turn."""
+        """Speeds of the left and right wheels as multiples of the nominal."""
         trim = self.value("trim", "trim", 0.0)
         left, right = (self.value("wheel_gain", side, 1.0) for side in ("left", "right"))
         return left * (1.0 - trim), right * (1.0 + trim)
@@ -75,7 +75,7 @@ class Instance:
 
     @property
     def baseline_m(self) -> float:
-        """How far apart the wheels are as the turn rate shows it [m]."""
+        """Distance of the wheels as the turn rate shows it [m]."""
         return self.value("yaw_scrub", "baseline", self.figure("effective_baseline"))
 
     @property
@@ -87,7 +87,7 @@ class Instance:
 
     @property
     def tracked_point(self) -> tuple[float, float, float] | None:
-        """Where the tracked point is ahead of the axle's middle and to its left [m], and how it is turned [rad]."""
+        """Place of the tracked point ahead of the axle's middle and to its left [m], and its turn [rad]."""
         if not {"marker_offset", "heading_offset"} & set(self.effects):
             return None
         forward, left = (self.value("marker_offset", name, 0.0) for name in ("forward", "left"))
@@ -96,7 +96,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class ExportLine:
-    """What becomes of one value.
+    """One value and what becomes of it.
 
     Attributes:
         name: Its name in θ.
@@ -119,7 +119,7 @@ class ExportLine:
 
 
 def export_lines(instance: Instance, form: str) -> list[ExportLine]:
-    """What becomes of every value in a format; those that are neutral need no place."""
+    """Values with what becomes of each in a format; those that are neutral need no place."""
     parameters = instance.robot.catalogue.parameters
     lines = []
     for name, value in sorted(instance.theta.items()):
@@ -131,7 +131,7 @@ def export_lines(instance: Instance, form: str) -> list[ExportLine]:
 
 
 def header(instance: Instance, form: str) -> list[str]:
-    """What the head of a file says: whose values they are, where each went, and what is not in it."""
+    """Lines of the head of a file: whose values they are, where each went, and what is not in it."""
     found = export_lines(instance, form)
     placed, left_out = [line for line in found if line.place], [line for line in found if not line.place]
     return [
@@ -155,11 +155,11 @@ def xml_comment(instance: Instance, form: str, columns: int) -> str:
 
 
 FORMATS = ("urdf", "mjcf", "ros")
-"""What can be written, as `export --to` calls it."""
+"""Formats that can be written, as `export --to` calls it."""
 
 
 class Places(NamedTuple):
-    """Where an effect goes, by format; empty where it has no place.
+    """Places of an effect, by format; empty where it has no place.
 
     Attributes:
         urdf: In a URDF.
@@ -225,6 +225,6 @@ PLACES: Mapping[str, Places] = MappingProxyType(
 
 
 def place_of(effect: str, form: str) -> str:
-    """Where an effect goes in a format; empty where it has no place."""
+    """Place of an effect in a format; empty where it has no place."""
     place: str = getattr(PLACES.get(effect, _NOWHERE), form)
     return place

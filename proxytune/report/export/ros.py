@@ -92,7 +92,7 @@ def _transform(child: str, place: tuple[float, float, float], rotation: Floats) 
 
 
 def _quaternion(rotation: Floats) -> tuple[float, float, float, float]:
-    """Of a rotation by less than half a turn, (x, y, z, w)."""
+    """Quaternion of a rotation by less than half a turn, (x, y, z, w)."""
     w = math.sqrt(max(1e-12, 1.0 + float(np.trace(rotation)))) / 2.0
     skew = rotation - rotation.T
     return float(skew[2, 1]) / 4.0 / w, float(skew[0, 2]) / 4.0 / w, float(skew[1, 0]) / 4.0 / w, w

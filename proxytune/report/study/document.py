@@ -55,7 +55,7 @@ def _best(result: StudyResult) -> dict[str, Any]:
 
 
 def _worth(result: StudyResult) -> dict[str, Any]:
-    """What PRPV of the answer is held against: of its fresh episodes where they were driven."""
+    """Levels that PRPV of the answer is held against: of its fresh episodes where they were driven."""
     measures = score_document(result.judged)
     levels = ("noise_floor", "noise_floor_interval", "noise_floor_kind", "at_noise_floor", "chance", "chance_deviation")
     return {
@@ -65,7 +65,7 @@ def _worth(result: StudyResult) -> dict[str, Any]:
 
 
 def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any] | None:
-    """What fresh episodes say of the answer and of its rivals."""
+    """Scores of fresh episodes of the answer and of its rivals."""
     if confirmation is None:
         return None
     measures = score_document(confirmation.answer.assessment) if confirmation.answer.assessment else {}

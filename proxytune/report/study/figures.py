@@ -31,7 +31,7 @@ from proxytune.report.wording import plain, span, with_unit
 from proxytune.study import PRPV, StudyResult
 
 TWO_LINES = 0.14
-"""How far apart names of two lines are, as a share of the panel's height."""
+"""Distance between names of two lines, as a share of the panel's height."""
 
 
 def convergence_figure(result: StudyResult) -> Figure:
@@ -121,9 +121,9 @@ def _draw_fresh(axes: Axes, result: StudyResult) -> None:
 
 COLUMNS = 2
 BINS = 60
-"""Of a parameter's histogram, over the part of its range that counts."""
+"""Bins of a parameter's histogram, over the part of its range that counts."""
 SMOOTH_PROFILE = 0.5
-"""Of its standard deviation, divided by the fifth root of how many points count: what a histogram is smoothed by."""
+"""Share of its standard deviation, divided by the fifth root of the points that count, that a histogram is smoothed by."""
 
 
 def profiles_figure(result: StudyResult) -> Figure:
@@ -183,7 +183,7 @@ def density_of(result: StudyResult, place: int) -> tuple[Floats, Floats]:
 
 
 def _reach(values: Floats, weights: Floats) -> float:
-    """Over how much of its range a parameter's histogram is smoothed: the less, the more points count."""
+    """Part of its range over which a parameter's histogram is smoothed: the less, the more points count."""
     deviation = np.sqrt(weights @ (values - weights @ values) ** 2)
     return float(SMOOTH_PROFILE * deviation * (weights**2).sum() ** 0.2)
 
@@ -277,7 +277,7 @@ def _mark(axes: Axes, place: list[float], label: str) -> None:
 
 
 def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
-    """Where the 95 % region lies, whatever the other parameters are."""
+    """Draw where the 95 % region lies, whatever the other parameters are."""
     intervals, posterior = result.study.settings.space.intervals, result.knowledge.posterior
     inside = posterior.points[posterior.inside][:, places]
     low, high = inside.min(axis=0), inside.max(axis=0)

@@ -15,7 +15,7 @@ MOST_NAMED = 5
 
 @dataclass(frozen=True)
 class KnownParameter:
-    """What is known of one parameter.
+    """Knowledge of one parameter.
 
     Attributes:
         name: Its name.
@@ -36,7 +36,7 @@ class KnownParameter:
 
 @dataclass(frozen=True)
 class Finding:
-    """What the sentence is made of.
+    """Figures that the sentence is made of.
 
     Attributes:
         parameters: In the order of the box.
@@ -85,17 +85,17 @@ class Finding:
 
 
 def study_sentence(result: StudyResult) -> str:
-    """What a study found, how good the proxy is there, and what to do next."""
+    """Say what a study found, how good the proxy is there, and what to do next."""
     return say_finding(finding_of(result))
 
 
 def say_finding(finding: Finding) -> str:
-    """What was found, how good the proxy is there, and what to do next."""
+    """Say what was found, how good the proxy is there, and what to do next."""
     return f"{say_answer(finding)} Next: {say_next_step(finding)}"
 
 
 def say_answer(finding: Finding) -> str:
-    """What was found, and how good the proxy is there."""
+    """Say what was found, and how good the proxy is there."""
     return f"{_say_theta(finding)} {_say_usefulness(finding)}"
 
 
@@ -176,7 +176,7 @@ def _choose_next_step(finding: Finding) -> str:
 
 
 def _say_what_to_add(finding: Finding) -> str:
-    """What to add to learn more of the least known parameter."""
+    """Say what to add to learn more of the least known parameter."""
     if not finding.least.identified:
         informed = finding.information and finding.information.agents
         best = f" (so far {informed[0][0]}'s do most)" if informed else ""
@@ -196,7 +196,7 @@ def _more_trials(finding: Finding) -> str:
 
 
 def finding_of(result: StudyResult) -> Finding:
-    """What the sentence of a study is made of."""
+    """Gather what the sentence of a study is made of."""
     settings, learnt, judged = result.study.settings, result.knowledge, result.judged
     parameters = known_parameters(result)
     least = max(parameters, key=lambda one: one.share).name
@@ -226,7 +226,7 @@ def finding_of(result: StudyResult) -> Finding:
 
 
 def known_parameters(result: StudyResult) -> tuple[KnownParameter, ...]:
-    """What is known of each parameter, in the order of the box."""
+    """Knowledge of each parameter, in the order of the box."""
     units, learnt = result.study.family.parameters, result.knowledge
     parameters = []
     for interval in result.study.settings.space.intervals:

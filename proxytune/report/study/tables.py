@@ -26,7 +26,7 @@ THETA, USEFULNESS, INFORMATION, SEARCH = (
 )
 IN_SEARCH, MISFIT = "  in search", "misfit (p)"
 AGENTS, METRICS = 2, 1
-"""How many of each are named of those that inform a parameter most."""
+"""Numbers of agents and metrics that are named of those that inform a parameter most."""
 MEASURES = ("prpv", "ppv")
 
 
@@ -43,7 +43,7 @@ def study_text(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Gro
 
 
 def study_tables(result: StudyResult, spent: str = "") -> dict[str, Table]:
-    """What is known of θ, how useful the proxy is there, what tells of each parameter where anything does, the search.
+    """Tables by title: what is known of θ, how useful the proxy is there, what informs each parameter, the search.
 
     Args:
         result: What the study has found.
@@ -79,7 +79,7 @@ def theta_table(result: StudyResult) -> Table:
 
 
 def _theta_notes(result: StudyResult) -> list[str]:
-    """What the table of θ does not hold, most needed first."""
+    """Notes on what the table of θ does not hold, most needed first."""
     space, learnt = result.study.settings.space, result.knowledge
     notes = []
     if learnt.unidentified:

@@ -117,7 +117,7 @@ class Strayed(NamedTuple):
 
 
 def strayed(diagnosis: Diagnosis) -> dict[str, Strayed]:
-    """Distances of the models' predictions on the tested drives, by name in a legend: one model if nothing was added."""
+    """Distances of models' predictions on the tested drives, by name in a legend; one model if nothing is added."""
     tested, found = diagnosis.parts.tested, diagnosis.found
     models = {DECLARED_MODEL: found.declared.theta}
     if diagnosis.effects:

@@ -123,7 +123,7 @@ COLUMNS = 2
 BINS = 60
 """Bins of a parameter's histogram, over the part of its range that counts."""
 SMOOTH_PROFILE = 0.5
-"""Share of its standard deviation, divided by the fifth root of the points that count, that a histogram is smoothed by."""
+"""Share of its standard deviation, divided by the fifth root of the points that count, that smooths a histogram."""
 
 
 def profiles_figure(result: StudyResult) -> Figure:

@@ -15,6 +15,8 @@ from compare_report import compare_document, compare_figure, compare_lines, comp
 from compared_engines import NAMES, engine_of, why_not
 from judgement import judging_code
 from problems import Analytic, Objective, Ranking
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from rich.console import Group
 from rich.text import Text
 from runs import EngineSummary, Run, RunKey, append_run, finished_run, read_runs, summarise
@@ -25,8 +27,6 @@ from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.errors import InputError, StoreError
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
 from proxytune.report.writing import save, write_text
 from proxytune.running import Bars, working
 from proxytune.search import NAMES as STUDY_ENGINES, Engine, engine_code

@@ -10,15 +10,15 @@ from compared_engines import ENGINES, engine_of
 from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure
+from proxytune.report.line_names import LineName, name_lines
+from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
+from proxytune.report.page.tables import terminal_tables
+from proxytune.report.style import BLUE, COLUMN, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
 from rich import table as rich_table
 from rich.console import Group
 from runs import EngineSummary, Estimate, Region, Run, median_curve
 
 from proxytune.errors import InputError
-from proxytune.report.line_names import LineName, name_lines
-from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
-from proxytune.report.page.tables import terminal_tables
-from proxytune.report.style import BLUE, COLUMN, GREEN, LIGHT_BLUE, ORANGE, PURPLE, VERMILLION, dress
 from proxytune.search import Look
 
 LINES = {"solid": "-", "dashed": (0, (4, 1.5)), "dotted": (0, (1, 1)), "dashdot": (0, (5, 1, 1, 1))}

@@ -88,7 +88,7 @@ def test_the_help_of_the_commands_loads_no_library():
 
 @pytest.mark.slow
 def test_drawing_convergence_loads_no_simulator_and_no_search():
-    drawn = loaded("from proxytune.report.study.convergence import convergence")
+    drawn = loaded("from proxytune.report.study.figures import convergence_figure")
     assert drawn & {"pybullet", "sklearn", "skopt", "torch"} == set()
     assert "matplotlib" in drawn
 

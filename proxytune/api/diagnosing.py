@@ -1,6 +1,5 @@
 """A diagnosis from Python: what a model lacks of a log, of motion and camera."""
 
-import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
@@ -15,12 +14,14 @@ from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.importing import open_log
 from proxytune.logs import Log
-from proxytune.report.diagnosis.camera.document import noise_floor
-from proxytune.report.diagnosis.page import diagnosis_page
-from proxytune.report.diagnosis.whole import model_file, whole_document, whole_figures, whole_headline, whole_notes
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
-from proxytune.report.writing import save, write_text
+from proxytune.report import (
+    camera_noise_floor,
+    diagnosis_document,
+    diagnosis_figures,
+    diagnosis_headline,
+    diagnosis_notes,
+    write_diagnosis,
+)
 
 IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: ", "--test": "test"}
 """What a complaint calls an option of the command, and what it is here."""
@@ -37,7 +38,7 @@ class DiagnosisReport:
     found: LogDiagnosis
 
     def __repr__(self) -> str:
-        return f"DiagnosisReport of {whole_headline(self.found)}"
+        return f"DiagnosisReport of {diagnosis_headline(self.found)}"
 
     @property
     def diagnosis(self) -> Diagnosis | None:
@@ -65,7 +66,7 @@ class DiagnosisReport:
     @property
     def notes(self) -> tuple[str, ...]:
         """What else is to be known, a line each: what each effect is worth, what this log could not show."""
-        return tuple(whole_notes(self.found))
+        return tuple(diagnosis_notes(self.found))
 
     @property
     def _parts(self) -> tuple[Diagnosis | CameraDiagnosis, ...]:
@@ -90,16 +91,16 @@ class DiagnosisReport:
     def camera_errors(self) -> pd.DataFrame:
         """Mean errors on frames kept aside, before, after, noise floor: `markings` [px], `brightness` [grey levels]."""
         both = () if self.camera is None else (("markings", self.camera.pixels), ("brightness", self.camera.grey))
-        rows = [(name, one.before.value, one.after.value, noise_floor(one), one.unit) for name, one in both]
+        rows = [(name, one.before.value, one.after.value, camera_noise_floor(one), one.unit) for name, one in both]
         return pd.DataFrame(rows, columns=["of", "before", "after", "noise_floor", "unit"]).set_index("of")
 
     def figures(self) -> dict[str, Figure]:
         """The figures that there is something to draw for, by name."""
-        return dict(whole_figures(self.found))
+        return diagnosis_figures(self.found)
 
     def document(self) -> dict[str, Any]:
         """What `diagnose --json` prints of it."""
-        return whole_document(self.found)
+        return diagnosis_document(self.found)
 
     def write(self, folder: str | Path, command: str = "") -> list[Path]:
         """Write diagnosis.json, model.toml, which `predict` and a study's `proxy` read, figures and page; their paths.
@@ -111,17 +112,7 @@ class DiagnosisReport:
         Raises:
             RunError: If a file cannot be written.
         """
-        home = Path(folder)
-        text = json.dumps(self.document(), indent=2, allow_nan=False, ensure_ascii=False)
-        write_text(home / "diagnosis.json", text)
-        write_text(home / "model.toml", model_file(self.found))
-        figures = {home / f"{name}.png": figure for name, figure in self.figures().items()}
-        for path, figure in figures.items():
-            save(figure, path)
-        drawn = {path.stem: path.read_bytes() for path in figures}
-        foot = foot_of(command, [("log", self.found.log), ("robot", self.found.robot.name)])
-        write_text(home / "report.html", html_of(diagnosis_page(self.found, drawn, foot)))
-        return [home / "diagnosis.json", home / "model.toml", *figures, home / "report.html"]
+        return write_diagnosis(self.found, Path(folder), command)
 
 
 def diagnose(

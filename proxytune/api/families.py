@@ -10,12 +10,7 @@ from matplotlib.figure import Figure
 
 from proxytune.api.studies import StudyReport, most_episodes, read_study, run_opened
 from proxytune.errors import RunError
-from proxytune.report.families.document import families_document
-from proxytune.report.families.figure import families_figure
-from proxytune.report.families.page import families_page
-from proxytune.report.families.words import families_sentence
-from proxytune.report.page.rendering import html_of
-from proxytune.report.writing import save, write_text
+from proxytune.report import families_document, families_figure, families_sentence, write_families_report
 from proxytune.running import Bars, Silent, Watcher
 from proxytune.storage import Store, locked
 from proxytune.study import (
@@ -123,11 +118,7 @@ class FamiliesReport:
         Raises:
             RunError: If one cannot be written.
         """
-        home = self.compared.settings.home
-        figure, page = home / "figures" / "families.png", home / "report.html"
-        save(self.figure(), figure)
-        write_text(page, html_of(families_page(self.compared, figure.read_bytes())))
-        return figure, page
+        return write_families_report(self.compared)
 
 
 def run_families(path: str | Path, *, progress: bool = False, jobs: int | None = None) -> FamiliesReport:

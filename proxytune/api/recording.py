@@ -10,7 +10,7 @@ from proxytune.diagnosis import PICTURES, FilmedDrive, film, frames_text, log_te
 from proxytune.driving import LaneFollowing
 from proxytune.errors import InputError
 from proxytune.logs import Frames, Log
-from proxytune.report.writing import write_picture, write_text
+from proxytune.report import write_picture, write_text
 from proxytune.settings import Section
 from proxytune.study import StudySettings, bare_family
 

@@ -1,7 +1,7 @@
 """A study from Python: run or resume it, or look at what it has; the command `study` is this and a terminal."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,16 +10,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.report.page.rendering import html_of
-from proxytune.report.study.convergence import convergence
-from proxytune.report.study.document import study_document
-from proxytune.report.study.finding import finding_of
-from proxytune.report.study.importance_figure import importance_figure
-from proxytune.report.study.page import study_page
-from proxytune.report.study.profiles_figure import profiles_figure
-from proxytune.report.study.search_figures import evaluations_figure
-from proxytune.report.study.verdict import sentence
-from proxytune.report.writing import save, write_text
+from proxytune.report import study_document, study_figures, study_sentence, write_study_report
 from proxytune.running import Bars, Silent, Watcher
 from proxytune.search import History, make_proposer, optimize_result
 from proxytune.storage import Store, locked
@@ -49,13 +40,6 @@ from proxytune.study import (
     with_spending,
 )
 
-FIGURES: Mapping[str, Callable[[StudyResult], Figure]] = {
-    "convergence": convergence,
-    "profiles": profiles_figure,
-    "evaluations": evaluations_figure,
-    "importance": importance_figure,
-}
-
 
 class ReportFiles(NamedTuple):
     """Where a study's figures and its page were written."""
@@ -82,7 +66,7 @@ class StudyReport:
     @property
     def sentence(self) -> str:
         """What was found, how good the proxy is there, and what to do next."""
-        return sentence(finding_of(self.result))
+        return study_sentence(self.result)
 
     @property
     def best(self) -> Best:
@@ -109,7 +93,7 @@ class StudyReport:
 
     def figures(self) -> dict[str, Figure]:
         """Convergence, profiles, evaluations and importance, by name."""
-        return {name: draw(self.result) for name, draw in FIGURES.items()}
+        return study_figures(self.result)
 
     def history(self) -> History:
         """Its trials as a search of any kind has them, for Optuna and scikit-optimize."""
@@ -138,13 +122,7 @@ class StudyReport:
             RunError: If a file cannot be written.
         """
         home = self.result.study.settings.home if folder is None else Path(folder)
-        paths = [home / "figures" / f"{name}.png" for name in FIGURES]
-        for path, figure in zip(paths, self.figures().values(), strict=True):
-            save(figure, path)
-        report = home / "report.html"
-        figures = {path.stem: path.read_bytes() for path in paths}
-        write_text(report, html_of(study_page(self.result, figures, command)))
-        return ReportFiles(paths, report)
+        return ReportFiles(*write_study_report(self.result, home, command))
 
 
 def run_study(

@@ -18,7 +18,7 @@ from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.importing import open_log
 from proxytune.logs import Log
-from proxytune.report.diagnosis.whole import whole_tables_and_notes
+from proxytune.report import diagnosis_text
 
 MOTION = {
     "fitting what is declared": 0.02,
@@ -96,7 +96,7 @@ def _diagnosed(arguments: argparse.Namespace, log: Log, test: Log | None, import
         files = [str(path) for path in report.write(folder, typed(arguments))]
     lines = [*(f"{arguments.log.name}: {note}" for note in imported), *files]
     document = report.document() | {"files": files} | ({"imported": list(imported)} if imported else {})
-    return Answer(document, Group(whole_tables_and_notes(found), Text("\n".join(lines))))
+    return Answer(document, Group(diagnosis_text(found), Text("\n".join(lines))))
 
 
 def shares(log: Log) -> dict[str, float]:

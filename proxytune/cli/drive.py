@@ -12,8 +12,7 @@ from proxytune.cli.terminal.theta import ChosenTheta, choose_theta
 from proxytune.cli.terminal.waiting import waiting
 from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import InputError
-from proxytune.report.drive.document import episode_document, episode_table, parting
-from proxytune.report.drive.pictures import NO_PLACES, check_output, write_episode
+from proxytune.report import NO_PLACES, check_episode_file, episode_document, episode_text, say_parting, write_episode
 from proxytune.seeds import episode_seed
 from proxytune.space import Theta
 from proxytune.study import (
@@ -67,8 +66,8 @@ def run(arguments: argparse.Namespace) -> Answer:
     files = {"against": str(model) if model else None, "output": str(arguments.output) if arguments.output else None}
     document = {**episode_document(pair, seed), "theta_from": chosen.origin, **files}
     about = [_say_episode(pair, settings, seed), _say_theta(chosen), _say_target(model), ""]
-    below = ["", *(line for line in (parting(pair), files["output"]) if line)]
-    return Answer(document, Group(Text("\n".join(about)), episode_table(pair, compared), Text("\n".join(below))))
+    below = ["", *(line for line in (say_parting(pair), files["output"]) if line)]
+    return Answer(document, Group(Text("\n".join(about)), episode_text(pair, compared), Text("\n".join(below))))
 
 
 def _drive(
@@ -86,7 +85,7 @@ def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:
     if arguments.seed is not None and arguments.seed < 0:
         raise InputError(f"--seed must be at least 0, got {arguments.seed}")
     if arguments.output:
-        check_output(arguments.output)
+        check_episode_file(arguments.output)
         if not can_record(family):
             raise InputError(f"--output {arguments.output}: {NO_PLACES}; leave the option out to see its metrics")
 

@@ -11,12 +11,17 @@ from proxytune.cli.terminal.answer import Answer
 from proxytune.driving import LaneFollowing, Robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
-from proxytune.report.export.instance import Instance, Line, lines_of
-from proxytune.report.export.mjcf import mjcf_text
-from proxytune.report.export.places import FORMATS
-from proxytune.report.export.ros import ros_text
-from proxytune.report.export.urdf import urdf_text
-from proxytune.report.writing import write_text, write_whole
+from proxytune.report import (
+    FORMATS,
+    ExportLine,
+    Instance,
+    export_lines,
+    mjcf_text,
+    ros_text,
+    urdf_text,
+    write_text,
+    write_whole,
+)
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.study import bare_family
 
@@ -44,7 +49,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     if arguments.to in TRIALS:
         return _trials(arguments)
     instance = _of_study(arguments.model) if arguments.model.is_dir() else _of_model(arguments.model)
-    text, lines = WRITERS[arguments.to](instance), lines_of(instance, arguments.to)
+    text, lines = WRITERS[arguments.to](instance), export_lines(instance, arguments.to)
     write_text(arguments.output, text)
     document = {
         "output": str(arguments.output),
@@ -70,7 +75,7 @@ def _trials(arguments: argparse.Namespace) -> Answer:
     return Answer(document, Text(f"{len(history.trials)} trials of '{history.name}'\n{output}{look}"))
 
 
-def _row(line: Line) -> dict[str, object]:
+def _row(line: ExportLine) -> dict[str, object]:
     interval = list(line.interval) if line.interval else None
     return {
         "name": line.name,

@@ -10,7 +10,7 @@ from proxytune.api.families import FamiliesReport, Spending, read_families, run_
 from proxytune.api.studies import most_episodes
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.live_page import renewed_page
-from proxytune.report.families.table import families_table
+from proxytune.report import families_text
 from proxytune.running import Bars, Watcher
 from proxytune.study import Study, StudySettings
 
@@ -31,7 +31,7 @@ def redraw_families(settings: StudySettings) -> Answer:
 def _answer(report: FamiliesReport, spent: Mapping[str, Any]) -> Answer:
     figure, page = report.write()
     document = {**report.document(), **spent, "figures": [str(figure)], "report": str(page)}
-    return Answer(document, families_table(report.compared, {"figure": figure, "report": page}))
+    return Answer(document, families_text(report.compared, {"figure": figure, "report": page}))
 
 
 class Terminal:

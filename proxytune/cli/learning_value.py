@@ -3,19 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from rich.console import Group
-from rich.text import Text
-
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.live_page import renewed_page
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
-from proxytune.report.study.page import study_command, study_settings
-from proxytune.report.teaching.page import plv_page
-from proxytune.report.teaching.plv_document import plv_document, plv_table
-from proxytune.report.teaching.plv_figure import plv_figure
-from proxytune.report.teaching.words import plv_answer
-from proxytune.report.writing import save, write_text
+from proxytune.report import plv_document, plv_text, write_plv_report
 from proxytune.running import Bars
 from proxytune.search import make_proposer
 from proxytune.storage import Store, locked
@@ -37,10 +27,6 @@ def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]
         search = PlvSearch(settings, setup, store, space, bars)
         chosen = predictive.best.trial.theta if predictive else None
         result = search.run(make_proposer(study.engine, settings.initial), chosen)
-    figure = folder / "figures" / "plv.png"
-    save(plv_figure(result), figure)
-    page, foot = folder / "report.html", foot_of(study_command(settings), study_settings(settings))
-    write_text(page, html_of(plv_page(result, figure.read_bytes(), foot)))
+    figure, page = write_plv_report(result, folder)
     document = {**plv_document(result), "figure": str(figure), "report": str(page)}
-    shown = plv_table(result, {"figure": figure, "report": page})
-    return Answer(document, Group(Text(f"{plv_answer(result)}\n"), shown))
+    return Answer(document, plv_text(result, {"figure": figure, "report": page}))

@@ -9,19 +9,13 @@ from contextlib import AbstractContextManager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rich.console import Group
-from rich.markup import escape
-from rich.table import Table
-from rich.text import Text
-
 from proxytune.cli.diagnose import shares
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.steps import Steps
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.logs import Log
-from proxytune.loop import COLUMNS, Closed, close_loop, document_of, notes_of, open_loop, page_of, rows_of, table_rows
-from proxytune.report.page.rendering import html_of
-from proxytune.report.writing import write_text
+from proxytune.loop import Closed, close_loop, document_of, foot_of_loop, open_loop, text_of, view_of
+from proxytune.report import write_page
 from proxytune.running import Bars, Watcher
 
 
@@ -45,11 +39,12 @@ def run(arguments: argparse.Namespace) -> Answer:
     loop = open_loop(folder, arguments.twin, arguments.log)
     closed = close_loop(loop, Terminal())
     page = loop.home / "report.html"
-    write_text(page, html_of(page_of(closed, _command(arguments), datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"))))
+    date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    write_page(page, view_of(closed), foot_of_loop(closed, _command(arguments), date))
     document = document_of(closed)
     document["files"] = {name: str(path) for name, path in _files(closed, page).items()}
     document["this_run"]["seconds"] = time.perf_counter() - begun
-    return Answer(document, _text(closed, document["sentence"], document["next"], page))
+    return Answer(document, text_of(closed, page))
 
 
 class Terminal:
@@ -80,13 +75,3 @@ def _files(closed: Closed, page: Path) -> dict[str, Path]:
     found = {"model": home / "diagnosed" / "model.toml", "diagnosis": home / "diagnosed" / "diagnosis.json"}
     extended = {"extended": home / "extended" / "study.toml"} if closed.after else {}
     return {"report": page, "log": closed.loop.log or home / "log", **found, **extended}
-
-
-def _text(closed: Closed, sentence: str, following: str, page: Path) -> Group:
-    table = Table(box=None, pad_edge=False)
-    for name in COLUMNS:
-        table.add_column(name, overflow="fold")
-    for row in table_rows(rows_of(closed)):
-        table.add_row(*map(escape, row))
-    notes = [Text(f"note: {note}") for note in notes_of(closed)]
-    return Group(Text(sentence, style="bold"), table, *notes, Text(f"Next: {following}"), Text(str(page)))

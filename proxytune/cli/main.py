@@ -132,7 +132,7 @@ def _figures(named: Sequence[str]) -> AbstractContextManager[None]:
     """Have figures written in other formats too; what draws them is loaded only for that."""
     if not named:
         return nullcontext()
-    from proxytune.report.writing import figures_also_as
+    from proxytune.report import figures_also_as
 
     return figures_also_as(named)
 

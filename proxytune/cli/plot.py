@@ -13,11 +13,16 @@ from proxytune.api.studies import StudyReport
 from proxytune.cli.families import redraw_families
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.typed import typed
-from proxytune.report.study.document import study_document
-from proxytune.report.study.table import study_table
-from proxytune.report.study.table_files import write_tables
-from proxytune.report.sweep.document import curve_name
-from proxytune.report.sweep.files import draw_curves, held_alike, held_values, write_page
+from proxytune.report import (
+    curve_name,
+    draw_curves,
+    held_alike,
+    held_values,
+    study_document,
+    study_text,
+    write_study_tables,
+    write_sweep_page,
+)
 from proxytune.scores import Metric
 from proxytune.storage import Store
 from proxytune.study import (
@@ -72,7 +77,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         found = StudyReport(result, Spent())
         own_figures, report = found.write(folder, typed(arguments) if metrics else "")
         figures = [*own_figures, *figures]
-        tables = [str(path) for path in write_tables(result, found.trials(), folder / "figures")]
+        tables = [str(path) for path in write_study_tables(result, found.trials(), folder / "figures")]
         document = {**study_document(result), "report": str(report), "tables": tables}
     paths = [str(path) for path in figures]
     files = Text("\n".join([*paths, *pages, *([*document["tables"], document["report"]] if result else [])]))
@@ -86,7 +91,7 @@ def _pages(settings: StudySettings, curves: Sequence[Curve], folder: Path, comma
     """Write a page of all sweeps that hold the others at the same values."""
     drawn = list({curve_name(curve): curve for curve in curves}.values())
     for alike in held_alike(drawn):
-        yield write_page(settings, alike, folder, held_values(alike[0].base), command)
+        yield write_sweep_page(settings, alike, folder, held_values(alike[0].base), command)
 
 
 def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:
@@ -106,4 +111,4 @@ def _folder(study: Path, metrics: Sequence[Metric]) -> Path:
 def _by_other_metrics(result: StudyResult, files: Text) -> RenderableType:
     named = ", ".join(str(metric) for metric in result.study.settings.metrics)
     note = f"none run; scored with {named}; the trials are still those that the study's own metrics led to"
-    return Group(study_table(result, note, {}), files)
+    return Group(study_text(result, note, {}), files)

@@ -16,7 +16,7 @@ from proxytune.effects import Catalogue, Model, read_model
 from proxytune.errors import InputError
 from proxytune.importing import open_log
 from proxytune.logs import GEOMETRY, Log
-from proxytune.report.writing import write_picture, write_text
+from proxytune.report import write_picture, write_text
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -5,23 +5,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Group
-from rich.text import Text
-
 from proxytune.cli.score_tables import read_sides
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.typed import typed
 from proxytune.errors import InputError
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
-from proxytune.report.scores.document import document_of, document_of_ranking
-from proxytune.report.scores.figures import flipped_pairs, scatter
-from proxytune.report.scores.page import Drawn, score_page
-from proxytune.report.scores.table import measures, ranking
-from proxytune.report.scores.table_file import write_scores_table
-from proxytune.report.scores.words import score_answer
-from proxytune.report.table_files import check_ending
-from proxytune.report.writing import file_names, save, write_text
+from proxytune.report import (
+    check_table_file,
+    foot_of,
+    ranking_document,
+    score_document,
+    score_text,
+    write_score_report,
+    write_score_table,
+)
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import Assessment, Selection, assess, in_common, select_proxy
 
@@ -83,7 +79,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         between = f"{FEWEST_RESAMPLES} and {MOST_RESAMPLES}"
         raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
-        check_ending("--table", arguments.table)
+        check_table_file("--table", arguments.table)
     metrics = [Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])
     (target, proxies), left_out = _common(target, proxies) if arguments.common else ((target, proxies), ())
@@ -102,22 +98,18 @@ def run(arguments: argparse.Namespace) -> Answer:
     written = _write(arguments, assessments, selection, target_name) if arguments.output else {"figures": []}
     document = {"target": target_name, **written, "left_out": list(left_out)}
     if arguments.table:
-        write_scores_table(assessments, arguments.table)
+        write_score_table(assessments, arguments.table)
         document["table"] = str(arguments.table)
     return _answer(document, assessments, selection)
 
 
 def _answer(document: dict[str, Any], assessments: Mapping[str, Assessment], selection: Selection | None) -> Answer:
     """What is printed: the sentence, the table and the notes."""
-    target = document["target"]
-    first = Text(score_answer(assessments, selection, target=target) + "\n")
-    said = [Text(f"note: {line}") for line in document["left_out"]]
-    if selection is None:
-        ((name, assessment),) = assessments.items()
-        shown = measures(assessment, proxy=name, target=target)
-        return Answer({"proxy": name, **document, **document_of(assessment)}, Group(first, shown, *said))
-    ranked = ranking(assessments, selection, target=target)
-    return Answer(document | document_of_ranking(assessments, selection), Group(first, ranked, *said))
+    shown = score_text(assessments, selection, document["left_out"], target=document["target"])
+    if selection is not None:
+        return Answer(document | ranking_document(assessments, selection), shown)
+    ((name, assessment),) = assessments.items()
+    return Answer({"proxy": name, **document, **score_document(assessment)}, shown)
 
 
 def _common(
@@ -145,22 +137,7 @@ def _write(
     arguments: argparse.Namespace, assessments: Mapping[str, Assessment], selection: Selection | None, target: str
 ) -> dict[str, Any]:
     """Draw the figures and write the page; their paths."""
-    drawn = _draw(assessments, arguments.output)
-    figures = [Drawn(kind, proxy, path.read_bytes()) for path, (kind, proxy) in drawn.items()]
     settings = [("metrics", ", ".join(arguments.metric)), ("resamples", str(arguments.resamples))]
     foot = foot_of(typed(arguments), [*settings, ("seed", str(arguments.seed))])
-    page = arguments.output / "report.html"
-    write_text(page, html_of(score_page(assessments, selection, figures, foot, target=target)))
-    return {"figures": [str(path) for path in drawn], "report": str(page)}
-
-
-def _draw(assessments: Mapping[str, Assessment], folder: Path) -> dict[Path, tuple[str, str]]:
-    """Draw the figures; the kind of each and the proxy that it is of, by its path."""
-    drawn, files = {}, file_names(assessments)
-    for name, assessment in assessments.items():
-        suffix = "" if len(assessments) == 1 else f"_{files[name]}"
-        for kind, figure in (("scatter", scatter(assessment)), ("flipped_pairs", flipped_pairs(assessment.prpv))):
-            path = folder / f"{kind}{suffix}.png"
-            save(figure, path)
-            drawn[path] = (kind, name)
-    return drawn
+    figures, page = write_score_report(assessments, selection, arguments.output, foot, target=target)
+    return {"figures": [str(path) for path in figures], "report": str(page)}

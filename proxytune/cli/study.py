@@ -14,7 +14,7 @@ from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
 from proxytune.cli.terminal.live_page import renewed_page
 from proxytune.cli.terminal.study_folder import study_folder
-from proxytune.report.study.table import study_table
+from proxytune.report import study_text
 from proxytune.running import Bars
 from proxytune.study import LEARNING, Spent, Study, StudyResult, open_settings, read_study_settings, with_spending
 
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     costs = _costs(report.result, report.spent, time.perf_counter() - begun)
     document = {**report.document(), **costs, "figures": [str(path) for path in figures], "report": str(page)}
     files = {"figures": figures[0].parent, "report": page}
-    return Answer(document, study_table(report.result, _say_costs(costs), files))
+    return Answer(document, study_text(report.result, _say_costs(costs), files))
 
 
 def _search(study: Study, retry_failed: bool) -> StudyReport:

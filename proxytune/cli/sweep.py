@@ -1,11 +1,7 @@
 """`sweep`: usefulness along one parameter, or along each parameter of the study."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
-
-from rich.console import Group
-from rich.text import Text
 
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
@@ -14,14 +10,12 @@ from proxytune.cli.terminal.theta import read_theta
 from proxytune.cli.terminal.typed import typed
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.report.sweep.document import NO_POD, curve_document, curve_lines, curve_tables, failures
-from proxytune.report.sweep.files import draw_curves, held_values, write_curves, write_page
+from proxytune.report import curve_document, draw_curves, held_values, sweep_text, write_curves, write_sweep_page
 from proxytune.running import Bars
 from proxytune.space import Theta
 from proxytune.storage import Store, SweepRecord, locked
-from proxytune.study import Spent, Study, StudyRun, adopt, open_study
+from proxytune.study import Study, StudyRun, adopt, open_study
 from proxytune.sweep import (
-    Curve,
     best_theta,
     check_base,
     curve_of,
@@ -82,9 +76,16 @@ def run(arguments: argparse.Namespace) -> Answer:
     output = arguments.output or folder / "figures"
     figures = draw_curves(curves, output, study.truth)
     held = _held(word, sweeps[0].base)
-    page = write_page(study.settings, curves, output, held, typed(arguments))
-    answer = _answer(curves, run.spent, figures, [*write_curves(curves, output), page])
-    return _say_base(answer, word, sweeps[0].base, held)
+    page = write_sweep_page(study.settings, curves, output, held, typed(arguments))
+    files = [*write_curves(curves, output), page]
+    document = {
+        "curves": [curve_document(curve) for curve in curves],
+        "episodes": {"run": run.spent.episodes},
+        "figures": [str(path) for path in figures],
+        "files": [str(path) for path in files],
+        "at": {"chosen": word if word in ("best", "nominal") else "given", "theta": dict(sweeps[0].base)},
+    }
+    return Answer(document, sweep_text(curves, run.spent.episodes, [*figures, *files], held))
 
 
 def _plan(study: Study, arguments: argparse.Namespace, word: str) -> list[SweepRecord]:
@@ -96,31 +97,9 @@ def _plan(study: Study, arguments: argparse.Namespace, word: str) -> list[SweepR
     return [plan_sweep(sweep_interval(study, name), base, arguments.points) for name in names]
 
 
-def _answer(curves: Sequence[Curve], spent: Spent, figures: Sequence[Path], files: Sequence[Path]) -> Answer:
-    document = {
-        "curves": [curve_document(curve) for curve in curves],
-        "episodes": {"run": spent.episodes},
-        "figures": [str(path) for path in figures],
-        "files": [str(path) for path in files],
-    }
-    parts = [
-        part for curve in curves for part in (*curve_tables(curve), Text("\n".join(["", *curve_lines(curve), ""])))
-    ]
-    hints = [] if all(curve.has_pod for curve in curves) else [NO_POD]
-    lines = [*failures(curves), *hints, f"{spent.episodes} episodes run", *(str(path) for path in [*figures, *files])]
-    return Answer(document, Group(*parts, Text("\n".join(lines))))
-
-
 def _held(word: str, base: Theta) -> str:
     """What the other parameters are held at."""
     if word == "best":
         values = held_values(base, whose="the study's best θ: ")
         return f"{values}; --at nominal holds the robot's own"
     return "the others are nominal" if word == "nominal" else held_values(base)
-
-
-def _say_base(answer: Answer, word: str, base: Theta, held: str) -> Answer:
-    """The answer with what the other parameters are held at."""
-    chosen = word if word in ("best", "nominal") else "given"
-    document = {**answer.document, "at": {"chosen": chosen, "theta": dict(base)}}
-    return Answer(document, Group(answer.text, Text(held)))

@@ -3,22 +3,11 @@
 import argparse
 from pathlib import Path
 
-from rich.console import Group
-from rich.text import Text
-
 from proxytune.cli.terminal.answer import Answer
 from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
 from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.cli.terminal.typed import typed
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
-from proxytune.report.study.page import study_settings
-from proxytune.report.teaching.document import teach_document
-from proxytune.report.teaching.figure import teach_figure
-from proxytune.report.teaching.page import teach_page
-from proxytune.report.teaching.table import teach_table
-from proxytune.report.teaching.words import teach_answer
-from proxytune.report.writing import save, write_text
+from proxytune.report import study_foot, teach_document, teach_text, write_teach_report
 from proxytune.running import Bars
 from proxytune.storage import Store, locked
 from proxytune.study import StudyRun, adopt, open_study
@@ -50,9 +39,6 @@ def run(arguments: argparse.Namespace) -> Answer:
         with Bars(agents * len(proxies)) as bars:
             prpv = predictivity(StudyRun(study, store, bars), proxies)
     figure = folder / "figures" / "teach.png"
-    save(teach_figure(experiment), figure)
-    page, foot = figure.with_suffix(".html"), foot_of(typed(arguments), study_settings(study.settings))
-    write_text(page, html_of(teach_page(experiment, prpv, figure.read_bytes(), foot)))
+    page = write_teach_report(experiment, prpv, figure, study_foot(study.settings, typed(arguments)))
     document = {**teach_document(experiment, prpv), "figure": str(figure), "report": str(page)}
-    shown = teach_table(experiment, prpv, {"figure": figure, "report": page})
-    return Answer(document, Group(Text(f"{teach_answer(experiment)}\n"), shown))
+    return Answer(document, teach_text(experiment, prpv, {"figure": figure, "report": page}))

@@ -45,7 +45,7 @@ from .motion.prediction import (
     predict as predict,
 )
 from .motion.screening import MOTION_EFFECTS as MOTION_EFFECTS, motion_effects as motion_effects
-from .motion.signals import SignalCurve as SignalCurve
+from .motion.signals import SignalCurve as SignalCurve, refit_beside_curve as refit_beside_curve
 from .recording import (
     PICTURES as PICTURES,
     FilmedDrive as FilmedDrive,

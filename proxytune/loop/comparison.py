@@ -11,8 +11,19 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from proxytune.report.numbers import listed, short
-from proxytune.report.style import BLUE, COLUMN, GREY, LIGHT_GREY, VERMILLION, dress, plain
+from proxytune.report import (
+    BLUE,
+    COLUMN,
+    GREY,
+    LIGHT_GREY,
+    VERMILLION,
+    dress,
+    listed,
+    plain,
+    short,
+    short_span,
+    with_span,
+)
 from proxytune.space import Theta
 from proxytune.usefulness import Assessment
 
@@ -177,8 +188,7 @@ def level_text(level: Level | None, unit: str) -> str:
     """A measure with its interval, as "28 (21 to 45)"."""
     if level is None:
         return "–"
-    ends = f" ({_span(level.interval)})" if level.interval else ""
-    return f"{short(level.value)}{unit and ' '}{unit}{ends}"
+    return with_span(f"{short(level.value)}{unit and ' '}{unit}", *(level.interval or (None, None)))
 
 
 def floor_text(level: Level | None, unit: str) -> str:
@@ -186,10 +196,9 @@ def floor_text(level: Level | None, unit: str) -> str:
     if level is None or (level.floor is None and level.floor_ends is None):
         return "–"
     if level.floor is None and level.floor_ends:
-        return f"{_span(level.floor_ends)}{unit and ' '}{unit}"
+        return f"{short_span(*level.floor_ends)}{unit and ' '}{unit}"
     assert level.floor is not None
-    ends = f" ({_span(level.floor_ends)})" if level.floor_ends else ""
-    return f"{short(level.floor)}{unit and ' '}{unit}{ends}"
+    return with_span(f"{short(level.floor)}{unit and ' '}{unit}", *(level.floor_ends or (None, None)))
 
 
 def chance_text(level: Level | None) -> str:
@@ -210,10 +219,6 @@ def _change(row: Compared) -> str:
         overlap = "; the intervals overlap" if row.before.interval and row.after.interval else ""
         return f"{row.title} goes from {before} to {after}{overlap}"
     return f"{row.title} does not fall: {before} before, {after} after"
-
-
-def _span(ends: tuple[float, float]) -> str:
-    return f"{short(ends[0])} to {short(ends[1])}"
 
 
 HALF = 0.3

@@ -23,7 +23,7 @@ from proxytune.importing import open_log
 from proxytune.logs import Log
 from proxytune.loop.comparison import NEXT, compare_errors, floor_text, following, lacking, level_text
 from proxytune.loop.opening import Loop, Teller
-from proxytune.report.writing import write_text
+from proxytune.report import write_text
 from proxytune.settings import read_settings
 from proxytune.storage import Store, locked
 from proxytune.study import FILE_NAME, MADE, Study, StudyRun, StudySettings, check_facts, study_facts

@@ -17,12 +17,7 @@ from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import EpisodeError, StoreError
 from proxytune.loop.opening import Loop
-from proxytune.report.drive.document import parting
-from proxytune.report.drive.figure import episode_figure
-from proxytune.report.numbers import short
-from proxytune.report.page.parts import Picture
-from proxytune.report.style import plain
-from proxytune.report.writing import save, write_text
+from proxytune.report import Picture, episode_figure, plain, save_figure, say_parting, short, write_text
 from proxytune.seeds import episode_seed
 from proxytune.study import SideBySide, can_record, drive_side_by_side, load_family
 from proxytune.usefulness import Assessment, dominance
@@ -104,7 +99,7 @@ def write_pictures(closed: Closed) -> None:
     if gain and both:
         metrics = [metric.name for metric in closed.loop.settings.metrics]
         for name, pair, caption in zip(BothEpisodes._fields, both, _captions(closed, gain, both), strict=True):
-            save(episode_figure(pair, metrics), path.with_name(f"{name}.png"))
+            save_figure(episode_figure(pair, metrics), path.with_name(f"{name}.png"))
             title = f"{gain['agent']} beside the target, {name}"
             texts.append({"file": f"{name}.png", "title": title, "caption": caption})
     write_text(path, json.dumps(texts, indent=2) + "\n")
@@ -174,7 +169,7 @@ def _starts(closed: Closed) -> range:
 
 def _captions(closed: Closed, gain: dict[str, Any], both: BothEpisodes) -> tuple[str, str]:
     metrics = [metric.name for metric in closed.loop.settings.metrics]
-    before, after = (f"{parting(pair)} {_scores(pair, metrics)}" for pair in both)
+    before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both)
     rest = "This is one episode; the order of the agents counts every start, under other seeds."
     return (
         f"{_introduction(closed, gain, both.before)} {before}",

@@ -21,7 +21,7 @@ from proxytune.errors import InputError, LogError, RunError, SettingsError, Stor
 from proxytune.extensions import ask
 from proxytune.importing import Facts, open_log
 from proxytune.logs import Log
-from proxytune.report.writing import write_text
+from proxytune.report import write_text
 from proxytune.running import Watcher
 from proxytune.scores import ScoreTable, read_scores
 from proxytune.seeds import fresh_seed

@@ -9,6 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rich.console import Group
+from rich.text import Text
+
 from proxytune.api.recording import record_log
 from proxytune.api.studies import StudyReport, most_episodes, run_opened
 from proxytune.driving import robot_home
@@ -50,8 +53,18 @@ from proxytune.loop.opening import (
     held_out_settings,
     scored_agents,
 )
-from proxytune.report.page.parts import Foot, Page, Picture, Table, Words
-from proxytune.report.writing import png_of
+from proxytune.report import (
+    Foot,
+    Paragraphs,
+    Picture,
+    Table,
+    View,
+    columns_of,
+    group_texts,
+    note_texts,
+    png_of,
+    table_text,
+)
 from proxytune.scores import write_scores
 from proxytune.seeds import target_seed
 from proxytune.storage import locked
@@ -241,7 +254,7 @@ class _Closing:
         return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]
 
 
-COLUMNS = ("", "before", "after", "noise floor before; after", "a random ranking")
+COLUMNS = columns_of(("",), ("before", "after", "noise floor before; after", "a random ranking"))
 PACKAGES = ("proxytune", "numpy", "scipy", "pybullet")
 PICTURES = {
     "effect_curve": ("The effect", "What was measured against what the simulator did without it, and with it."),
@@ -294,35 +307,52 @@ def document_of(closed: Closed) -> dict[str, Any]:
     }
 
 
-def page_of(closed: Closed, command: str, date: str) -> Page:
-    """The page.
+def text_of(closed: Closed, page: Path) -> Group:
+    """A closed loop as `loop` prints it.
 
     Args:
         closed: The loop.
-        command: The command that makes it, as typed in a shell.
-        date: When it was written.
+        page: Where its page is.
     """
     rows = rows_of(closed)
+    sentence, table = Text(answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
+    shown = table_text(replace(table, title=""), ragged=True)
+    return group_texts(sentence, shown, *note_texts(table.notes), f"Next: {_following(closed)}", str(page))
+
+
+def view_of(closed: Closed) -> View:
+    """A closed loop: before and after, its figures, and what each step said."""
+    rows = rows_of(closed)
     prpv = [row for row in rows if row.key in ("prpv", "held_out")]
-    values = {key: value for key, value in as_document(closed.loop.settings).items() if value not in (None, {}, [])}
-    settings = tuple((key, _text(value)) for key, value in values.items() if key != "path")
     caption = "PRPV of the best θ on fresh episodes with 95 % intervals; grey: what a perfect proxy scores."
     shown = []
     if closed.after:
         first = Picture("PRPV before and after", png_of(prpv_figure(prpv)), caption)
         shown = [first, *read_pictures(closed.loop.home)]
-    return Page(
+    return View(
         title=f"{closed.loop.settings.name}: the loop closed",
-        answer=answer(closed.diagnosis, rows),
-        following=_following(closed),
-        parts=(_table(closed, rows), *shown, *_found(closed), _words(closed)),
-        foot=Foot(command, settings, tuple(versions_of(PACKAGES).items()), date),
+        sentence=answer(closed.diagnosis, rows),
+        next_step=_following(closed),
+        parts=(_table(closed, rows), *shown, *_found(closed), _steps(closed)),
     )
 
 
-def table_rows(rows: list[Compared]) -> list[tuple[str, ...]]:
-    """The table's cells as COLUMNS says."""
-    return [
+def foot_of_loop(closed: Closed, command: str, date: str) -> Foot:
+    """The foot of a loop's page.
+
+    Args:
+        closed: The loop.
+        command: The command that makes the page, as typed in a shell.
+        date: When it was written.
+    """
+    values = {key: value for key, value in as_document(closed.loop.settings).items() if value not in (None, {}, [])}
+    settings = tuple((key, _text(value)) for key, value in values.items() if key != "path")
+    return Foot(command, settings, tuple(versions_of(PACKAGES).items()), date)
+
+
+def _table(closed: Closed, rows: list[Compared]) -> Table:
+    """Every measure before and after, with its noise floor and chance."""
+    cells = tuple(
         (
             f"{row.title}, 0 to {row.most}" if row.most else row.title,
             level_text(row.before, row.unit),
@@ -331,10 +361,11 @@ def table_rows(rows: list[Compared]) -> list[tuple[str, ...]]:
             "; ".join(dict.fromkeys(chance_text(level) for level in (row.before, row.after) if level)),
         )
         for row in rows
-    ]
+    )
+    return Table("Before and after", COLUMNS, cells, tuple(_notes(closed)))
 
 
-def notes_of(closed: Closed) -> list[str]:
+def _notes(closed: Closed) -> list[str]:
     """What the table does not hold."""
     counted = "PRPV (proxy relative predictivity value) counts wrongly ordered pairs of agents at the best θ"
     notes = [f"{counted}; in brackets 95 % intervals"]
@@ -345,18 +376,14 @@ def notes_of(closed: Closed) -> list[str]:
     return notes
 
 
-def _table(closed: Closed, rows: list[Compared]) -> Table:
-    return Table("Before and after", COLUMNS, tuple(table_rows(rows)), tuple(notes_of(closed)))
-
-
-def _words(closed: Closed) -> Words:
+def _steps(closed: Closed) -> Paragraphs:
     found = lacking(closed.diagnosis) or "nothing that has a name"
     paragraphs = (
         f"Found: {found}; verdict: {closed.diagnosis['verdict']}.",
         f"Before: {closed.before.sentence}",
         *((f"After: {closed.after.sentence}",) if closed.after else ()),
     )
-    return Words("What each step said", paragraphs)
+    return Paragraphs("What each step said", paragraphs)
 
 
 def _found(closed: Closed) -> list[Picture]:

@@ -1,1 +1,9 @@
-"""What is found, for people: figures, tables, pages and JSON documents."""
+"""Results for people: one view of each, as terminal text, page, JSON document, figures and files.
+
+A subject (study, scores, sweep, teaching, families, diagnosis, episode) builds its tables, sentences and pictures once,
+as `view` has them; `text` prints them and `html` writes the page. `export` writes robots for other simulators.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,7 +9,6 @@ from proxytune.errors import InputError
 from proxytune.report.writing import write_text
 
 ENDINGS = (".csv", ".tex")
-
 GREEK = {
     "α": "alpha",
     "β": "beta",
@@ -46,12 +45,11 @@ IN_LATEX = {
     "∞": r"$\infty$",
     **{letter: f"$\\{name}$" for letter, name in GREEK.items()},
 }
-"""What pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
-
+"""Characters that pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
 Cell = str | float | None
 
 
-def check_ending(option: str, path: Path) -> None:
+def check_table_file(option: str, path: Path) -> None:
     """Refuse a file of another kind before anything is worked out.
 
     Raises:
@@ -84,11 +82,11 @@ def write_latex(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]
 
 def booktabs(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A tabular with the rules of booktabs: the first column is of names, the others of figures."""
-    head, *body = (" & ".join(map(latex, row)) + r" \\" for row in (columns, *rows))
+    head, *body = (" & ".join(map(latex_text, row)) + r" \\" for row in (columns, *rows))
     lines = [rf"\begin{{tabular}}{{{'l' + 'r' * (len(columns) - 1)}}}", r"\toprule", head, r"\midrule"]
     return "\n".join([*lines, *body, r"\bottomrule", r"\end{tabular}"]) + "\n"
 
 
-def latex(text: str) -> str:
+def latex_text(text: str) -> str:
     """A text as LaTeX shows it."""
     return "".join(IN_LATEX.get(character, character) for character in text.strip())

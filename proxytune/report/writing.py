@@ -21,8 +21,7 @@ from proxytune.errors import RunError
 from proxytune.files import draft_of
 
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-"""What is left out of files, so that the same figure gives the same bytes."""
-
+"""Metadata left out of files, so that the same figure gives the same bytes."""
 _beside: ContextVar[tuple[str, ...]] = ContextVar("beside", default=())
 
 
@@ -45,13 +44,13 @@ def write_text(path: Path, text: str) -> None:
     write_whole(path, "", lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
 
 
-def save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as PNG, and in the formats of `figures_also_as`; an interrupted write leaves the old file.
 
     Raises:
         RunError: If the figure cannot be written.
     """
-    write_whole(path, "the figure ", lambda draft: _save(figure, draft, format="png", dpi=200))
+    write_whole(path, "the figure ", lambda draft: _save_as(figure, draft, format="png", dpi=200))
     for form in _beside.get():
         write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
 
@@ -59,17 +58,17 @@ def save(figure: Figure, path: Path) -> None:
 def png_of(figure: Figure) -> bytes:
     """A figure as the bytes of a PNG file."""
     image = BytesIO()
-    _save(figure, image, format="png", dpi=200)
+    _save_as(figure, image, format="png", dpi=200)
     return image.getvalue()
 
 
 def _draw(figure: Figure, form: str, draft: Path) -> None:
     """Write a vector file; journals refuse the fonts that Matplotlib's PDF has by default."""
     with mpl.rc_context({"pdf.fonttype": 42, "svg.hashsalt": "proxytune"}):
-        _save(figure, draft, format=form, metadata=UNDATED[form])
+        _save_as(figure, draft, format=form, metadata=UNDATED[form])
 
 
-def _save(figure: Figure, where: Path | BytesIO, **how: Any) -> None:
+def _save_as(figure: Figure, where: Path | BytesIO, **how: Any) -> None:
     """Save a figure with names as they are: a dollar begins no formula, and a letter without a glyph is no news."""
     for text in figure.findobj(Text):
         if "$" in text.get_text():
@@ -80,7 +79,7 @@ def _save(figure: Figure, where: Path | BytesIO, **how: Any) -> None:
 
 
 def file_names(names: Iterable[str]) -> dict[str, str]:
-    """What names are called in file names; of those that would be alike, the later ones are numbered."""
+    """Names as file names have them; of those that would be alike, the later ones are numbered."""
     called: dict[str, str] = {}
     for name in names:
         plain = re.sub(r"[^\w.-]+", "_", name)

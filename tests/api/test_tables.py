@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 from proxytune.api.tables import score
 from proxytune.cli.main import main
 from proxytune.errors import InputError, ScoresError
-from proxytune.report.scores.document import document_of
+from proxytune.report.scores import score_document
 from proxytune.scores import Metric, read_scores
 
 METRICS = ["distance:max", "time:min:5%"]
@@ -28,7 +28,7 @@ def table(seed, agents="ABCDE", episodes=4):
 
 
 def documented(assessment):
-    return json.loads(json.dumps(document_of(assessment)))
+    return json.loads(json.dumps(score_document(assessment)))
 
 
 @pytest.fixture

@@ -20,11 +20,11 @@ from compare_report import (
 from compared_engines import ENGINES, NAMES
 from judgement import Judgement, Reading
 from PIL import Image
+from proxytune.report.page.foot import foot_of
+from proxytune.report.page.rendering import html_of
 from rich.console import Console
 from runs import Estimate, Run, RunKey, summarise
 
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.rendering import html_of
 from proxytune.search import Engine, Look
 from proxytune.search.engine import Sobol
 

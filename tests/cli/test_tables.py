@@ -8,7 +8,8 @@ from rich.console import Console
 from taught import make_taught
 
 from proxytune.cli.main import COMMANDS, parser
-from proxytune.report.diagnosis.tables import plain_table
+from proxytune.report.text import table_text
+from proxytune.report.view import Table, columns_of
 
 LONG = "an_agent_with_a_name_that_is_much_longer_than_any_column_of_a_narrow_terminal"
 SCORES = "domain,agent,episode,distance,lane_error_of_the_whole_drive\n" + "".join(
@@ -76,6 +77,6 @@ def test_what_a_source_holds_is_whole(tmp_path):
 
 
 def test_tables_of_a_diagnosis_are_whole():
-    table = plain_table("Candidates", ("effect", "held-out gain [nats]", "p", "value"))
-    table.add_row(LONG, "1234.5678", "0.001", "−0.123 to 0.456")
-    assert_whole(table)
+    columns = columns_of(("effect",), ("held-out gain [nats]", "p", "value"))
+    row = (LONG, "1234.5678", "0.001", "−0.123 to 0.456")
+    assert_whole(table_text(Table("Candidates", columns, (row,))))

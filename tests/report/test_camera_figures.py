@@ -1,26 +1,35 @@
 """The document, figures and sentences of a camera's diagnosis, on frames whose camera is known."""
 
 import math
+import sys
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.text import Text
+
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
 from pictured import ROBOT, lane_poses, write_still_frames
 
 from proxytune.diagnosis import Blemish, CameraEffect, Estimate, LaidLine, LaidMap
 from proxytune.diagnosis.camera import error as weighing
 from proxytune.diagnosis.camera.appearance import look_at
-from proxytune.diagnosis.camera.diagnose import conclude, diagnose_camera
+from proxytune.diagnosis.camera.diagnose import Evidence, conclude, diagnose_camera
 from proxytune.logs import read_log
-from proxytune.report.diagnosis.camera.displacement_figure import displacement_figure, measured_displacements
-from proxytune.report.diagnosis.camera.document import camera_document
-from proxytune.report.diagnosis.camera.figures import camera_figures, loss_of_nothing
-from proxytune.report.diagnosis.camera.markings_figure import outline_field
-from proxytune.report.diagnosis.camera.models import camera_models
-from proxytune.report.diagnosis.camera.words import camera_headline, camera_notes
-from proxytune.report.diagnosis.model_names import BEFORE
+from proxytune.report.diagnosis.camera_figures import (
+    camera_figures,
+    camera_models,
+    displacement_figure,
+    loss_of_nothing,
+    measured_displacements,
+    outline_field,
+)
+from proxytune.report.diagnosis.camera_notes import camera_headline, camera_notes
+from proxytune.report.diagnosis.document import camera_document
+from proxytune.report.diagnosis.error_figures import DECLARED_MODEL
 
 AFTER = "with camera roll"
 DECLARED = ("camera_pitch", "blur")
@@ -75,7 +84,7 @@ def test_effects_that_do_not_matter_are_told_with_the_values_they_had(diagnosis,
     monkeypatch.setattr(weighing, "MATERIAL", math.inf)
     weighed = weighing.weigh_effects(diagnosis.named, 1)
     look = look_at(diagnosis.gathered, weighed.named.model)
-    dropped = conclude(diagnosis.gathered, weighed, look, DECLARED, (), 1)
+    dropped = conclude(Evidence(diagnosis.gathered, weighed, look, DECLARED_MODEL, ()), 1)
     document = camera_document(dropped)
     assert "camera_roll" not in document["extended"]
     low, high = document["immaterial"][0]["parameters"]["camera_roll"]["interval"]
@@ -118,7 +127,7 @@ def test_axes_say_what_they_show_in_which_unit(figures):
 
 def test_the_markings_are_drawn_before_and_after_on_two_frames(figures, clean):
     titles = [axes.get_title() for axes in figures["camera_markings"].axes]
-    assert [title.split(",")[0] for title in titles] == [BEFORE, AFTER] * 2
+    assert [title.split(",")[0] for title in titles] == [DECLARED_MODEL, AFTER] * 2
     assert all(axes.images and axes.collections for axes in figures["camera_markings"].axes)
     assert len(camera_figures(clean)["camera_markings"].axes) == 2
 
@@ -130,7 +139,7 @@ def test_outlines_of_the_fitted_camera_lie_on_the_edges_of_the_picture(diagnosis
         field = outline_field(fit, 4, white=False)[2]
         at = np.abs(field[edges.row[own].astype(int), edges.column[own].astype(int)])
         distances[name] = np.nanmedian(at)
-    assert 4.0 * distances[AFTER] < 2.0 < distances[BEFORE]
+    assert 4.0 * distances[AFTER] < 2.0 < distances[DECLARED_MODEL]
 
 
 def test_displaced_edges_are_drawn_where_they_went(diagnosis):

@@ -1,34 +1,61 @@
+"""Figures of a diagnosis of motion and their captions."""
+
+import re
+import sys
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
-import hidden_cases as hidden
 import numpy as np
 import pytest
 from matplotlib.container import ErrorbarContainer
 from matplotlib.text import Text
 
+sys.path.append(str(Path(__file__).parents[1] / "diagnosis"))
+
+import hidden
+from planted import TRUTH, planted_drives
+
+import proxytune
 from proxytune.diagnosis import (
     MOTION_EFFECTS,
     RANDOM_EFFECTS,
     RULES,
     AdoptedEffect,
+    Learning,
     cut,
     disturbed_increments,
     increments,
     pose_errors,
 )
 from proxytune.diagnosis.motion.diagnose import diagnose
+from proxytune.diagnosis.motion.discrepancy import Remainder
 from proxytune.diagnosis.motion.innovations import huber
 from proxytune.diagnosis.motion.screening import candidates
 from proxytune.diagnosis.motion.signals import signal_groups
 from proxytune.driving import read_robot
-from proxytune.effects import CATALOGUE, Means, theta_names
-from proxytune.report.diagnosis.effect_figure import effect_curve
-from proxytune.report.diagnosis.figures import diagnosis_figures
-from proxytune.report.diagnosis.means import ANY, GROUPS, MEASURED, retuned
-from proxytune.report.diagnosis.model_names import BEFORE
-from proxytune.report.diagnosis.ranking_figure import JUDGES, SHOWN, ranking_figure
-from proxytune.report.diagnosis.residual_figure import MANY_WINDOWS, residual_map, residual_over_time, strayed
+from proxytune.effects import GROUPS, Curve, Learnt, Means, Panel, Seen, learnt_theta, theta_names
+from proxytune.effects.catalogue import CATALOGUE
+from proxytune.effects.effect import MOTIONS, SIGNALS
+from proxytune.report.diagnosis.answer import CAPTIONS, diagnosis_pictures
+from proxytune.report.diagnosis.effect_figure import (
+    ANY,
+    CUE_PANELS,
+    MEASURED,
+    NAMES,
+    Rates,
+    _signal,
+    effect_curve,
+    refit_beside_curve,
+)
+from proxytune.report.diagnosis.error_figures import (
+    DECLARED_MODEL,
+    MANY_WINDOWS,
+    residual_map,
+    residual_over_time,
+    strayed,
+)
+from proxytune.report.diagnosis.figures import JUDGES, SHOWN, learnt_figure, motion_figures, ranking_figure
 
 WIDTH = 0.12
 AFTER = "with dead band"
@@ -49,12 +76,12 @@ def clean(diagnosis):
 
 @pytest.fixture(scope="module")
 def figures(diagnosis):
-    return diagnosis_figures(diagnosis)
+    return motion_figures(diagnosis)
 
 
-def without_effects(diagnosis, unnamed_curves=()):
+def without_effects(diagnosis, remainder=()):
     """The same drives, as if nothing had been added, and these signals were left over."""
-    found = replace(diagnosis.found, model=diagnosis.found.declared, adopted=(), unnamed_curves=unnamed_curves)
+    found = replace(diagnosis.found, model=diagnosis.found.declared, adopted=(), remainder=remainder)
     return replace(diagnosis, effects=(), found=found)
 
 
@@ -77,7 +104,7 @@ def values(axes, label):
 def test_every_figure_is_drawn_without_a_warning(diagnosis):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        figures = diagnosis_figures(diagnosis)
+        figures = motion_figures(diagnosis)
         for figure in figures.values():
             figure.draw_without_rendering()
     assert set(figures) == {"residual_over_time", "residual_map", "ranking", "effect_curve", "error"}
@@ -144,7 +171,7 @@ def test_the_error_figure_holds_the_errors_in_millimetres_and_degrees(diagnosis,
 
 def test_an_interval_without_end_is_not_drawn(diagnosis):
     endless = [replace(e, before=e.before._replace(interval=(0.0, np.inf))) for e in diagnosis.errors]
-    figure = diagnosis_figures(replace(diagnosis, errors=tuple(endless)))["error"]
+    figure = motion_figures(replace(diagnosis, errors=tuple(endless)))["error"]
     _, _, (bars,) = next(one for one in figure.axes[0].containers if isinstance(one, ErrorbarContainer))
     assert all(np.ptp(segment[:, 1]) == 0.0 for segment in bars.get_segments())
 
@@ -163,10 +190,10 @@ def test_many_episodes_become_a_median_with_a_band(diagnosis):
     drives = diagnosis.parts.fitted
     both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=drives)))
     (axes,) = residual_over_time(drives, both).axes
-    _, middle = values(axes, BEFORE)
-    first = np.unique(both[BEFORE].window, return_index=True)[1]
-    start = drives.first[both[BEFORE].increment[first]] / drives.tick_hz
-    assert middle[0] == pytest.approx(np.median(both[BEFORE].rms[start < 1.0]))
+    _, middle = values(axes, DECLARED_MODEL)
+    first = np.unique(both[DECLARED_MODEL].window, return_index=True)[1]
+    start = drives.first[both[DECLARED_MODEL].increment[first]] / drives.tick_hz
+    assert middle[0] == pytest.approx(np.median(both[DECLARED_MODEL].rms[start < 1.0]))
     bands = [band for band in axes.collections if band.get_paths()]
     assert len(bands) == 2
 
@@ -176,9 +203,9 @@ def test_the_maps_share_one_scale_and_equal_axes(diagnosis, figures):
     one, other = before.collections[0], after.collections[0]
     assert one.norm is other.norm
     assert before.get_aspect() == after.get_aspect() == 1.0
-    assert (before.get_title(), after.get_title()) == (BEFORE, AFTER)
+    assert (before.get_title(), after.get_title()) == (DECLARED_MODEL, AFTER)
     both = strayed(diagnosis)
-    assert list(one.get_array()) == pytest.approx(both[BEFORE].rms)
+    assert list(one.get_array()) == pytest.approx(both[DECLARED_MODEL].rms)
     assert list(other.get_array()) == pytest.approx(both[AFTER].rms)
 
 
@@ -211,12 +238,12 @@ def test_a_path_on_the_map_is_where_the_window_was_measured(diagnosis, figures):
 
 
 def test_more_paths_than_can_be_told_apart_become_means_by_place(diagnosis, monkeypatch):
-    monkeypatch.setattr("proxytune.report.diagnosis.residual_figure.MANY_WINDOWS", 3)
-    both = {BEFORE: strayed(diagnosis)[BEFORE]}
+    monkeypatch.setattr("proxytune.report.diagnosis.error_figures.MANY_WINDOWS", 3)
+    both = {DECLARED_MODEL: strayed(diagnosis)[DECLARED_MODEL]}
     mesh = residual_map(diagnosis.parts.tested, both).axes[0].collections[0]
     shown = mesh.get_array().compressed()
-    assert 0 < len(shown) <= len(both[BEFORE].increment)
-    assert both[BEFORE].rms.min() <= shown.min() <= shown.max() <= both[BEFORE].rms.max()
+    assert 0 < len(shown) <= len(both[DECLARED_MODEL].increment)
+    assert both[DECLARED_MODEL].rms.min() <= shown.min() <= shown.max() <= both[DECLARED_MODEL].rms.max()
     assert MANY_WINDOWS > 3
 
 
@@ -255,7 +282,7 @@ def test_with_nothing_added_the_ranking_begins_with_what_was_tried(clean):
 def test_rivals_are_marked_in_the_ranking(diagnosis):
     rival = next(c for c in candidates(diagnosis.robot, diagnosis.found.declared.theta, ()) if c.effect == "stiction")
     adopted = (replace(diagnosis.found.adopted[0], rivals=(rival,)),)
-    figure = diagnosis_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
+    figure = motion_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
     upper = figure.axes[1]
     names = [tick.get_text() for tick in upper.get_yticklabels()]
     pairs = zip(names, dots(upper), strict=True)
@@ -271,7 +298,7 @@ def test_the_effect_curve_shows_the_dead_band_that_was_fitted(diagnosis, figures
     still = commands[np.abs(speeds) < 1e-9]
     assert np.abs(still).max() == pytest.approx(width, abs=0.015)
     trim = diagnosis.declared["trim"].value
-    commands, speeds = values(upper, BEFORE)
+    commands, speeds = values(upper, DECLARED_MODEL)
     assert speeds == pytest.approx(commands * 0.6 * (1.0 - trim), abs=1e-6)
 
 
@@ -300,8 +327,8 @@ def test_an_effect_on_one_wheel_bends_the_curves_of_that_wheel_alone(diagnosis):
     label = "with wheel gain"
     assert np.abs(values(left, label)[1]).max() > 50.0
     assert np.abs(values(right, label)[1]).max() < 5.0
-    assert values(upper_left, label)[1] == pytest.approx(0.8 * values(upper_left, BEFORE)[1], abs=1e-6)
-    assert values(upper_right, label)[1] == pytest.approx(values(upper_right, BEFORE)[1], abs=1e-6)
+    assert values(upper_left, label)[1] == pytest.approx(0.8 * values(upper_left, DECLARED_MODEL)[1], abs=1e-6)
+    assert values(upper_right, label)[1] == pytest.approx(values(upper_right, DECLARED_MODEL)[1], abs=1e-6)
 
 
 def test_the_curve_over_the_signal_is_drawn_for_the_wheel_that_it_moves(diagnosis):
@@ -320,9 +347,9 @@ def test_declared_parameters_give_way_to_the_curve_that_was_fitted_with_them(dia
         said = disturbed_increments(declared.drives, theta, curve.group.twists @ curve.weights)
         return huber(declared.whiten.whiten(declared.drives.measured - said)).sum()
 
-    assert loss(retuned(declared, curve)) < loss(declared.theta) - 5.0
+    assert loss(refit_beside_curve(declared, curve)) < loss(declared.theta) - 5.0
     idle = curve._replace(weights=np.zeros_like(curve.weights))
-    assert retuned(declared, idle) == pytest.approx(dict(declared.theta), abs=0.02)
+    assert refit_beside_curve(declared, idle) == pytest.approx(dict(declared.theta), abs=0.02)
 
 
 def test_means_are_drawn_over_a_signal_that_has_a_figure_of_its_own():
@@ -330,7 +357,7 @@ def test_means_are_drawn_over_a_signal_that_has_a_figure_of_its_own():
     shown = [trace.shown_in(form) for trace, form in forms]
     means = [one for one in shown if isinstance(one, Means)]
     assert len(means) >= 6
-    assert all(one.cue in GROUPS and one.panels for one in means)
+    assert all(one.cue in CUE_PANELS and one.panels for one in means)
 
 
 EVERY = candidates(read_robot("duckiebot"), {}, ("trim", "delay"))
@@ -349,8 +376,8 @@ def test_each_form_of_an_effect_bends_its_curve(diagnosis, candidate):
     for axes in figure.axes:
         flat = (
             np.zeros_like(values(axes, label)[1])
-            if len(line(axes, BEFORE).get_ydata()) == 2
-            else values(axes, BEFORE)[1]
+            if len(line(axes, DECLARED_MODEL).get_ydata()) == 2
+            else values(axes, DECLARED_MODEL)[1]
         )
         bent = max(bent, float(np.abs(values(axes, label)[1] - flat).max()))
     assert bent > 1e-3
@@ -366,7 +393,7 @@ def test_a_random_effect_shows_single_draws_that_differ(diagnosis, effect):
 
 
 def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
-    figures = diagnosis_figures(clean)
+    figures = motion_figures(clean)
     assert "effect_curve" not in figures
     assert len([one for one in figures["error"].axes[0].containers if isinstance(one, ErrorbarContainer)]) == 1
     assert len(figures["residual_map"].axes) == 2
@@ -375,14 +402,14 @@ def test_with_nothing_added_there_is_one_model_and_no_effect_to_draw(clean):
 
 def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnosis):
     names = {group.name for group in signal_groups(diagnosis.found.declared)}
-    assert names <= set(GROUPS)
+    assert names <= set(CUE_PANELS)
     for curve in diagnosis.found.curves:
         figure = effect_curve(without_effects(diagnosis, (curve._replace(gain=50.0),)))
         figure.draw_without_rendering()
-        for axes, panel in zip(figure.axes, GROUPS[curve.group.name], strict=True):
+        for axes, panel in zip(figure.axes, CUE_PANELS[curve.group.name], strict=True):
             assert axes.get_xlabel() == panel.label
             assert np.isfinite(values(axes, ANY)[1]).all()
-            assert {one.get_label() for one in axes.get_lines()} == {BEFORE, MEASURED, ANY}
+            assert {one.get_label() for one in axes.get_lines()} == {DECLARED_MODEL, MEASURED, ANY}
 
 
 def test_a_curve_that_says_nothing_is_not_drawn(diagnosis):
@@ -399,4 +426,77 @@ def test_a_curve_that_says_nothing_is_not_drawn(diagnosis):
 
 
 def test_without_a_candidate_there_is_no_ranking(diagnosis):
-    assert "ranking" not in diagnosis_figures(replace(diagnosis, found=replace(diagnosis.found, tried=())))
+    assert "ranking" not in motion_figures(replace(diagnosis, found=replace(diagnosis.found, tried=())))
+
+
+KNOTS = {"speed_and_turn": ((-0.2, -1.0), (0.2, 1.0)), "direction": (-1.0,), "heading": (1.0, 2.0)}
+
+
+def learning(*groups):
+    curves = [
+        Curve(group, channel, knots, tuple(0.01 * (number + 1) for number in range(len(knots))))
+        for group in groups
+        for channel in GROUPS[group].channels
+        for knots in [KNOTS.get(group, (0.5, 1.0, 2.0))]
+    ]
+    theta = learnt_theta(Learnt(Seen((-0.3, 0.4), (-3.0, 3.0)), tuple(curves)))
+    return Learning(Remainder(theta, {GROUPS[group].title: 1.0 / len(groups) for group in groups}, {}, True), (), False)
+
+
+def test_every_group_is_drawn_without_a_warning_and_every_panel_has_units():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = learnt_figure(learning(*GROUPS))
+        figure.draw_without_rendering()
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert all("[" in axes.get_ylabel() for axes in shown)
+    assert all("[" in axes.get_xlabel() for axes in shown if axes.get_xlabel())
+    assert len({axes.get_xlabel() for axes in shown if axes.get_xlabel()}) == len(GROUPS) - 1  # the level is no curve
+
+
+def test_a_curve_is_drawn_through_its_weights_and_through_nothing_at_rest():
+    figure = learnt_figure(learning("turn_rate"))
+    line = figure.axes[2].get_lines()[0]
+    np.testing.assert_allclose(line.get_xdata(), (0.0, 0.5, 1.0, 2.0))
+    np.testing.assert_allclose(line.get_ydata(), np.degrees((0.0, 0.01, 0.02, 0.03)))
+
+
+def test_harmonics_of_the_heading_are_drawn_as_what_they_add_up_to():
+    figure = learnt_figure(learning("heading"))
+    forward = figure.axes[0].get_lines()[0]
+    around = np.radians(forward.get_xdata())
+    expected = sum(10.0 * k * (np.cos(k * around) + np.sin(k * around)) for k in (1, 2))
+    np.testing.assert_allclose(forward.get_ydata(), expected, atol=1e-9)
+
+
+def test_nothing_is_drawn_where_nothing_is_used():
+    assert learnt_figure(Learning(Remainder({"learnt.turn_rate.yaw@1.0": 0.1}), (), False)) is None
+
+
+DRIVES = planted_drives(TRUTH, episodes=1, seconds=10.0)
+
+
+@pytest.mark.parametrize("signal", SIGNALS[1:])
+def test_every_signal_of_a_panel_is_known_at_each_increment(signal):
+    rates = Rates(dict.fromkeys(MOTIONS, np.ones(len(DRIVES.measured))), {})
+    assert np.isfinite(_signal(DRIVES, rates, None, Panel(signal, "", "forward"))).sum() == len(DRIVES.measured)
+
+
+def test_every_motion_of_a_panel_has_a_name():
+    assert set(MOTIONS) == set(NAMES)
+
+
+FIGURES = Path(proxytune.__file__).parent / "report" / "diagnosis"
+
+
+def test_every_figure_that_is_drawn_has_a_title_and_a_caption():
+    texts = [(FIGURES / name).read_text(encoding="utf-8") for name in ("figures.py", "camera_figures.py")]
+    drawn = {name for text in texts for name in re.findall(r'^        "(\w+)": \w+\(', text, flags=re.M)}
+    assert len(drawn) >= 10
+    assert drawn == CAPTIONS.keys()
+    assert all(title and len(caption) > 60 for title, caption in CAPTIONS.values())
+
+
+def test_figures_come_in_one_order_and_an_unknown_one_last():
+    names = [one.title for one in diagnosis_pictures({"new": b"", "ranking": b"", "error": b""})]
+    assert names == [CAPTIONS["error"][0], CAPTIONS["ranking"][0], "new"]

@@ -1,15 +1,40 @@
-"""What a diagnosis says in sentences follows from its figures."""
+"""Document and sentences of a diagnosis of motion."""
 
+import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from proxytune.diagnosis.motion.discrepancy_match import LearntError
 
-from proxytune.diagnosis import AdoptedEffect, Estimate, Learning, Ratio
-from proxytune.diagnosis.motion.discrepancy import Discrepancy
+from proxytune.diagnosis import (
+    AdoptedEffect,
+    Clocks,
+    Estimate,
+    Learning,
+    MatchedEffect,
+    Offset,
+    Ratio,
+    Rmse,
+    RobotClusters,
+)
+from proxytune.diagnosis.motion.clocks import Jump
+from proxytune.diagnosis.motion.discrepancy import Remainder
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, Manoeuvre
-from proxytune.diagnosis.motion.multistep_fit import MultistepFit
-from proxytune.report.diagnosis.notes import MEANINGS, decisive, headline, may_matter, notes, per_cent
+from proxytune.diagnosis.motion.multistep_fit import Polish
+from proxytune.report.diagnosis.document import clocks_document, learnt_document, unlike_document
+from proxytune.report.diagnosis.notes import (
+    MEANINGS,
+    clocks_notes,
+    decisive,
+    learnt_notes,
+    may_matter,
+    motion_headline,
+    motion_notes,
+    per_cent,
+    unlike_notes,
+)
 
 SLIP = AdoptedEffect("lateral_slip", "", ("lateral_slip",), (("lateral_slip",),), 75.2, 0.002, ())
 BAND = AdoptedEffect("dead_band", "left wheel", ("dead_band.width",), (("dead_band.width",),), 900.0, 0.002, ())
@@ -24,16 +49,16 @@ def diagnosis(**changes):
         "log": "run",
         "verdict": "explained",
         "effects": (),
-        "negligible": (),
-        "effect_sizes": {},
-        "multistep": None,
+        "immaterial": (),
+        "worth": {},
+        "polish": None,
     }
     plain |= {"errors": (), "residual_depends_on": (), "could_not_be_seen": (), "manoeuvre": None}
     plain |= {
         "clocks": (),
-        "robot_clusters": None,
+        "unlike": None,
         "drive_names": (),
-        "learning": Learning(Discrepancy(), (), False),
+        "learning": Learning(Remainder(), (), False),
         "theta": {},
     }
     plain |= {"dropped_values": {"lateral_slip": Estimate(0.0024, (0.0024, 0.0024), "s")}}
@@ -42,11 +67,11 @@ def diagnosis(**changes):
 
 @pytest.mark.parametrize("verdict", MEANINGS)
 def test_every_verdict_is_told_with_its_meaning(verdict):
-    assert headline(diagnosis(verdict=verdict)) == f"run: {verdict}: {MEANINGS[verdict]}"
+    assert motion_headline(diagnosis(verdict=verdict)) == f"run: {verdict}: {MEANINGS[verdict]}"
 
 
 def test_an_effect_that_was_added_says_what_the_error_is_without_it():
-    (note,) = notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
+    (note,) = motion_notes(diagnosis(effects=(BAND,), effect_sizes={"dead_band": MUCH}))
     assert note == (
         "added dead_band (left wheel): log-likelihood gain 900 nats, p = 0.002; "
         "without it the error grows by 34 % (20 to +50) at 2 s"
@@ -54,7 +79,7 @@ def test_an_effect_that_was_added_says_what_the_error_is_without_it():
 
 
 def test_an_effect_that_is_shown_not_to_matter_is_called_immaterial():
-    (note,) = notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": SURE}))
+    (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": SURE}))
     assert note == (
         "detectable but immaterial: lateral_slip 0.0024 s, log-likelihood gain 75 nats, "
         "changes the error at 5 s by 1.0 % (−1.0 to +3.0)"
@@ -62,33 +87,35 @@ def test_an_effect_that_is_shown_not_to_matter_is_called_immaterial():
 
 
 def test_an_effect_that_may_matter_is_not_called_immaterial():
-    (note,) = notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": LITTLE}))
+    (note,) = motion_notes(diagnosis(negligible=(SLIP,), effect_sizes={"lateral_slip": LITTLE}))
     assert note.startswith(
         "not shown to matter: lateral_slip 0.0024 s, log-likelihood gain 75 nats, changes the error at 5 s by 1.0 % "
     )
 
 
 def test_an_effect_that_could_not_be_weighed_is_not_shown_to_matter():
-    assert notes(diagnosis(negligible=(SLIP,))) == ["not shown to matter: lateral_slip, log-likelihood gain 75 nats"]
+    assert motion_notes(diagnosis(negligible=(SLIP,))) == [
+        "not shown to matter: lateral_slip, log-likelihood gain 75 nats"
+    ]
 
 
 def test_where_noise_is_not_known_a_manoeuvre_is_to_be_driven_ten_times():
     name, text, shape = LIBRARY[0]
     again = Manoeuvre(name, text, ("noise", "what is missing"), None, shape(TIMES), 10)
-    (note,) = notes(diagnosis(manoeuvre=again))
+    (note,) = motion_notes(diagnosis(manoeuvre=again))
     assert note.startswith("to tell noise from what is missing, drive figure-eight 10 times from the same commands")
     rivals = Manoeuvre(name, text, ("a", "b"), 50.0, shape(TIMES), 10)
-    lines = notes(diagnosis(manoeuvre=rivals))
+    lines = motion_notes(diagnosis(manoeuvre=rivals))
     assert lines[0].startswith("to tell a from b, drive figure-eight (one minute is ample): ")
     assert "10 times" in lines[1]
-    (weak,) = notes(diagnosis(manoeuvre=Manoeuvre(name, text, ("a", "b"), 3.0, shape(TIMES))))
+    (weak,) = motion_notes(diagnosis(manoeuvre=Manoeuvre(name, text, ("a", "b"), 3.0, shape(TIMES))))
     assert "(expected gain 3 nats a minute)" in weak
-    assert len(notes(diagnosis(manoeuvre=Manoeuvre(name, text, ("a", "b"), 50.0, shape(TIMES))))) == 1
+    assert len(motion_notes(diagnosis(manoeuvre=Manoeuvre(name, text, ("a", "b"), 50.0, shape(TIMES))))) == 1
 
 
 def test_parameters_fitted_to_windows_are_told_with_what_that_did():
-    polish = MultistepFit(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
-    (note,) = notes(diagnosis(multistep=polish))
+    polish = Polish(2.0, {1.0: Ratio(0.95, (0.9, 1.0)), 2.0: Ratio(0.8, (0.7, 0.9))}, {})
+    (note,) = motion_notes(diagnosis(multistep=polish))
     assert "fitted to windows of 2 s" in note
     assert "1 s: 0.95, 2 s: 0.80" in note
 
@@ -102,11 +129,132 @@ def test_a_ratio_is_told_as_what_it_adds():
 
 
 def test_a_value_at_the_end_of_its_range_is_no_physics():
-    lines = notes(diagnosis(effects=(BAND,), at_edge=lambda effect: effect.names))
+    lines = motion_notes(diagnosis(effects=(BAND,), at_edge=lambda effect: effect.names))
     assert "beware: dead_band.width at the end of the range: it probably stands for something else" in lines
 
 
 def test_beside_what_has_no_name_values_are_no_physics_yet():
-    lines = notes(diagnosis(verdict="partly explained"))
+    lines = motion_notes(diagnosis(verdict="partly explained"))
     assert any("no physics yet" in line for line in lines)
-    assert notes(diagnosis()) == []
+    assert motion_notes(diagnosis()) == []
+
+
+NONE = Offset(0.0, (0.0, 0.0))
+
+
+def clocks(latency=0.14, offset=0.0, drives=None, jumps=()):
+    own = Offset(offset, (offset - 0.01, offset + 0.01)) if offset else NONE
+    measured = Offset(latency, (latency - 0.01, latency + 0.01))
+    return Clocks(measured, own, 0.15, drives or {}, tuple(jumps), np.zeros(2), np.zeros((2, 2)))
+
+
+def test_the_document_has_what_was_promised_and_can_be_written():
+    found = clocks(-0.11, -0.26, {"b": Offset(0.3, (0.28, 0.32))}, [Jump("a", 31.0, -0.2)])
+    told = json.loads(json.dumps(clocks_document((found,)), allow_nan=False))
+    assert (told["offset_s"], told["interval"]) == (-0.26, [-0.27, -0.25])
+    assert told["drives"] == {"b": {"offset_s": 0.3, "interval": [0.28, 0.32]}}
+    assert told["jumps"] == [{"drive": "a", "time_s": 31.0, "by_s": -0.2}]
+    assert "test" not in told
+    assert clocks_document((found, clocks()))["test"]["offset_s"] == 0.0
+
+
+def test_one_clock_is_no_news_but_a_delay_is_said_to_be_one_number_with_an_offset():
+    assert clocks_notes("yard", (clocks(),), {}) == []
+    (note,) = clocks_notes("yard", (clocks(),), {"delay": 0.1})
+    assert "one number" in note
+
+
+@pytest.mark.parametrize(
+    ("found", "says"),
+    [
+        (clocks(-0.11, -0.26), "motion comes 0.11 s before its command, which no robot does"),
+        (clocks(-0.11, -0.26), "stamped 0.26 s too early (0.27 to 0.25) if the robot's delay is 0.15 s"),
+        (clocks(2.0, 1.85), "motion comes 2.00 s after its command; poses are stamped 1.85 s too late"),
+        (clocks(drives={"b": Offset(0.3, (0.28, 0.32))}), "in drive b poses are stamped 0.30 s later (0.28 to 0.32)"),
+        (
+            clocks(jumps=[Jump("a", 31.2, -0.2)]),
+            "in drive a the clock jumps at about 31 s: poses are stamped 0.20 s earl",
+        ),
+    ],
+)
+def test_what_is_wrong_is_one_sentence_with_what_to_do(found, says):
+    (note,) = clocks_notes("yard", (found,), {})
+    assert note.startswith("clocks of yard: ")
+    assert says in note
+    assert "\n" not in note
+    assert any(word in note for word in ("Stamp both", "Check how", "Keep clocks"))
+
+
+def test_an_offset_that_the_log_declares_is_told_instead_of_a_doubt():
+    declared = replace(clocks(), declared_s=-0.25)
+    assert clocks_document((declared,))["declared_offset_s"] == -0.25
+    (note,) = clocks_notes("yard", (declared,), {"delay": 0.1})
+    assert note == "poses of yard are stamped -0.25 s later than commands, as it declares; that was taken out"
+
+
+RATIO = Ratio(0.5, (0.4, 0.6))
+ERROR = LearntError(2.0, Rmse(0.01, (0.009, 0.011)), Rmse(0.02, (0.01, 0.03)), RATIO)
+THETA = {"learnt.turn_rate.yaw@1.0": 0.1}
+SHARE = {"heading": 0.25, "turn rate": 0.75}
+USED = Learning(Remainder(THETA, SHARE, {2.0: RATIO}, True), (ERROR,), False)
+REFUSED = Learning(Remainder(THETA, SHARE, {2.0: RATIO}, False), (), True)
+
+
+def test_the_document_has_groups_shares_and_ratios_by_horizon():
+    told = json.loads(json.dumps(learnt_document(USED)))
+    assert told["used"] is True
+    assert told["groups"] == ["turn rate", "heading"]
+    assert told["share"] == SHARE
+    assert told["ratio"] == {"2": {"value": 0.5, "interval": [0.4, 0.6]}}
+    assert told["errors"][0]["after"] == 0.01
+
+
+def test_what_is_refused_has_no_groups_but_its_guard_is_told():
+    told = learnt_document(REFUSED)
+    assert (told["used"], told["groups"], told["share"], told["ratio"]) == (False, [], {}, {})
+    assert told["guard"]["2"]["value"] == 0.5
+    assert told["names_doubtful"] is True
+
+
+def test_a_note_says_what_it_is_worth_and_that_it_is_no_physics():
+    (note,) = learnt_notes(USED)
+    assert "not physics" in note
+    assert "turn rate (75 %)" in note
+    assert "2 s: 10.0 mm, 0.50 (0.40 … 0.60)" in note
+
+
+def test_what_was_tried_and_left_out_is_told_and_doubtful_names_are_warned_of():
+    first, second = learnt_notes(REFUSED)
+    assert "left out" in first
+    assert "names are likely wrong" in second
+
+
+def test_nothing_is_said_where_nothing_was_found():
+    assert learnt_notes(Learning(Remainder(), (), False)) == []
+
+
+def test_a_name_that_would_do_as_well_is_told():
+    like = Learning(USED.remainder, USED.errors, False, MatchedEffect("turn_slip", "", {"turn_slip": 0.1}, 0.93))
+    assert learnt_notes(like)[1] == "the curves look like turn_slip (turn_slip 0.1), which alone keeps 93 % of it"
+    assert learnt_document(like)["looks_like"]["share"] == 0.93
+    assert learnt_document(USED)["looks_like"] is None
+
+
+FOUND = RobotClusters("left", (0.88, 1.02), ((0, 2), (1, 3)))
+NAMES = ("a", "b", "c", "d")
+
+
+def test_both_groups_are_told_with_their_gains():
+    told = json.loads(json.dumps(unlike_document(FOUND, NAMES)))
+    assert told == {
+        "wheel": "left",
+        "groups": [{"gain": 0.88, "drives": ["a", "c"]}, {"gain": 1.02, "drives": ["b", "d"]}],
+    }
+    (note,) = unlike_notes(FOUND, NAMES)
+    assert "0.88 in a, c but 1.02 in b, d" in note
+    assert "diagnose each group alone" in note
+
+
+def test_drives_that_are_alike_are_no_news():
+    assert unlike_document(None, NAMES) is None
+    assert unlike_notes(None, NAMES) == []

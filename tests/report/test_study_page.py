@@ -7,14 +7,11 @@ from dataclasses import replace
 import pytest
 from confirmations import TOLD, planted
 
-from proxytune.report.page.rendering import html_of
-from proxytune.report.study.captions import TITLES
-from proxytune.report.study.convergence import convergence
-from proxytune.report.study.finding import finding_of
-from proxytune.report.study.live_page import live_page
-from proxytune.report.study.page import study_page
-from proxytune.report.study.verdict import answer, next_step, sentence
-from proxytune.report.writing import save
+from proxytune.report.html import page_html
+from proxytune.report.study.figures import convergence_figure
+from proxytune.report.study.page import RENEW_S, TITLES, live_view, study_foot, study_view, write_live_page
+from proxytune.report.study.sentence import finding_of, say_answer, say_finding, say_next_step
+from proxytune.report.writing import save_figure
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, result_of
 
@@ -28,12 +25,12 @@ def result(finished):
 
 
 def text_of(result, figures=None):
-    return html_of(study_page(result, figures or {}))
+    return page_html(study_view(result, figures or {}), study_foot(result.study.settings))
 
 
 @pytest.fixture
 def figures(result, tmp_path):
-    save(convergence(result), tmp_path / "convergence.png")
+    save_figure(convergence_figure(result), tmp_path / "convergence.png")
     return {"convergence": (tmp_path / "convergence.png").read_bytes()}
 
 
@@ -47,11 +44,11 @@ def test_the_page_needs_nothing_else_and_is_small(result, figures):
 def test_it_begins_with_the_answer_and_the_next_step_which_are_the_sentence(result, figures):
     finding = finding_of(result)
     text = text_of(result, figures)
-    first, after = html.escape(answer(finding)), html.escape(next_step(finding)).split("`")[0]
+    first, after = html.escape(say_answer(finding)), html.escape(say_next_step(finding)).split("`")[0]
     heads = (f'class="answer">{first}</p>', after, ">95 % interval</th>", "<img ", ">Trials</h2>")
     places = [text.index(one) for one in heads]
     assert places == sorted(places)
-    assert sentence(finding) == f"{answer(finding)} Next: {next_step(finding)}"
+    assert say_finding(finding) == f"{say_answer(finding)} Next: {say_next_step(finding)}"
 
 
 def test_every_figure_has_a_caption_and_an_alternative_text_that_says_what_to_see(result, figures):
@@ -77,9 +74,8 @@ def test_its_foot_has_the_command_the_settings_the_versions_and_the_date(result)
     assert f"python -m proxytune study {folder}</code>" in foot
     assert '<th scope="row">engine</th><td>gp</td>' in foot
     assert re.search(r"Written \d{4}-\d\d-\d\d \d\d:\d\d .*with Python 3\..*numpy \d", foot)
-    assert "plot &#x27;a b&#x27; --metric" in html_of(
-        study_page(result, {}, "python -m proxytune plot 'a b' --metric x")
-    )
+    other = page_html(study_view(result, {}), study_foot(result.study.settings, "plot 'a b' --metric x"))
+    assert "plot &#x27;a b&#x27; --metric" in other
 
 
 def test_names_are_not_taken_for_markup(result):
@@ -93,26 +89,26 @@ def test_names_are_not_taken_for_markup(result):
     assert "<i>" not in text
 
 
-def test_a_page_under_way_renews_itself_and_names_the_best_trial_as_possible_luck(result):
-    settings = result.study.settings
-    page = live_page(settings, "prpv", result.trials[:4], "trial 5 of 7")
+def test_a_page_under_way_renews_itself_and_names_the_best_trial_as_possible_luck(result, tmp_path):
+    settings, path = result.study.settings, tmp_path / "report.html"
+    write_live_page(path, settings, "prpv", result.trials[:4], "trial 5 of 7")
+    text = path.read_text(encoding="utf-8")
     best = min(result.trials[:4], key=lambda trial: trial.score)
-    assert page.answer.startswith("Under way: trial 5 of 7. Best of 4 trials so far: ")
-    assert f"trial {best.number}, PRPV {best.prpv:g}, which may be partly luck" in page.answer
-    text = html_of(page)
-    assert f'<meta http-equiv="refresh" content="{page.renew_s}">' in text
-    assert page.renew_s > 0
+    assert "Under way: trial 5 of 7. Best of 4 trials so far: " in text
+    assert f"trial {best.number}, PRPV {best.prpv:g}, which may be partly luck" in text
+    assert f'<meta http-equiv="refresh" content="{RENEW_S}">' in text
     assert text.count('<th scope="row" class="number">') == 4
 
 
-def test_a_page_under_way_is_there_before_any_trial_has_ended_and_says_when_a_study_was_stopped(result):
-    settings = replace(result.study.settings, name=EVIL)
-    first = live_page(settings, "prpv", (), "pre-flight")
-    assert first.answer == "Under way: pre-flight. No trial has a score yet."
+def test_a_page_under_way_is_there_before_any_trial_has_ended_and_says_when_a_study_was_stopped(result, tmp_path):
+    settings, path = replace(result.study.settings, name=EVIL), tmp_path / "report.html"
+    first = live_view(settings, "prpv", (), "pre-flight")
+    assert first.sentence == "Under way: pre-flight. No trial has a score yet."
     assert first.parts == ()
-    assert "<script" not in html_of(first)
-    stopped = live_page(settings, "prpv", result.trials, "")
-    assert stopped.renew_s == 0
-    assert stopped.answer.startswith("Stopped before its end.")
-    assert 'http-equiv="refresh"' not in html_of(stopped)
-    assert "run the same command to continue" in stopped.following
+    write_live_page(path, settings, "prpv", (), "pre-flight")
+    assert "<script" not in path.read_text(encoding="utf-8")
+    stopped = live_view(settings, "prpv", result.trials, "")
+    assert stopped.sentence.startswith("Stopped before its end.")
+    assert "run the same command to continue" in stopped.next_step
+    write_live_page(path, settings, "prpv", result.trials, "")
+    assert 'http-equiv="refresh"' not in path.read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from proxytune.errors import InputError
-from proxytune.report.table_files import IN_LATEX, booktabs, check_ending, latex, write_csv, write_latex
+from proxytune.report.table_files import IN_LATEX, booktabs, check_table_file, latex_text, write_csv, write_latex
 
 COLUMNS, ROWS = ("measure", "sim_1", "95 % interval"), [("SRCC d_x", "−0.5", "−1 to 1"), ("Kendall τ", "1", "")]
 
@@ -29,7 +29,7 @@ def test_a_latex_table_has_the_rules_of_booktabs_and_a_line_per_row(tmp_path):
 
 @given(st.text(alphabet=[*IN_LATEX, "a", "7", " "], max_size=20))
 def test_nothing_that_latex_would_take_for_a_command_is_left(text):
-    shown = re.sub(r"\\[&%$#_{}]|\\[a-zA-Z]+(\{\})?|\$[^$]*\$", "", latex(text))
+    shown = re.sub(r"\\[&%$#_{}]|\\[a-zA-Z]+(\{\})?|\$[^$]*\$", "", latex_text(text))
     assert not set(shown) & set("\\&%$#_{}~^<>")
     assert shown.isascii()
 
@@ -51,4 +51,4 @@ def test_a_csv_reads_back_and_what_is_undefined_is_empty(tmp_path):
 @pytest.mark.parametrize("name", ["t.txt", "t", "t.TEX"])
 def test_a_file_of_another_kind_is_refused(name):
     with pytest.raises(InputError, match=rf"--table {name}: a table is written as .csv or .tex; name the file so"):
-        check_ending("--table", Path(name))
+        check_table_file("--table", Path(name))

@@ -7,7 +7,7 @@ from PIL import Image
 
 from proxytune.errors import RunError
 from proxytune.files import draft_path
-from proxytune.report.writing import figures_also_as, save, write_picture, write_text
+from proxytune.report.writing import figures_also_as, save_figure, write_picture, write_text
 
 
 @pytest.fixture
@@ -19,25 +19,25 @@ def figure():
 
 
 def test_a_figure_is_a_png_and_beside_it_only_what_is_asked_for(figure, tmp_path):
-    save(figure, tmp_path / "sweep_trim_delay=0.1.png")
+    save_figure(figure, tmp_path / "sweep_trim_delay=0.1.png")
     assert [path.name for path in tmp_path.iterdir()] == ["sweep_trim_delay=0.1.png"]
     plain = (tmp_path / "sweep_trim_delay=0.1.png").read_bytes()
     with figures_also_as(("svg", "pdf")):
-        save(figure, tmp_path / "sweep_trim_delay=0.1.png")
+        save_figure(figure, tmp_path / "sweep_trim_delay=0.1.png")
     begins = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
     assert {path.suffix: path.read_bytes()[:4] for path in tmp_path.iterdir()} == {
         ending: first[:4] for ending, first in begins.items()
     }
     assert (tmp_path / "sweep_trim_delay=0.1.png").read_bytes() == plain
     (tmp_path / "other").mkdir()
-    save(figure, tmp_path / "other" / "plain.png")
+    save_figure(figure, tmp_path / "other" / "plain.png")
     assert len(list((tmp_path / "other").iterdir())) == 1
 
 
 def test_the_same_figure_is_the_same_file_in_every_format_and_a_pdf_has_fonts_that_journals_take(figure, tmp_path):
     with figures_also_as(("svg", "pdf")):
-        save(figure, tmp_path / "one.png")
-        save(figure, tmp_path / "two.png")
+        save_figure(figure, tmp_path / "one.png")
+        save_figure(figure, tmp_path / "two.png")
     for ending in ("png", "svg", "pdf"):
         assert (tmp_path / f"one.{ending}").read_bytes() == (tmp_path / f"two.{ending}").read_bytes()
     assert b"/Type3" not in (tmp_path / "one.pdf").read_bytes()

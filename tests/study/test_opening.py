@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from proxytune.errors import InputError, SettingsError
-from proxytune.report.study.usefulness_table import objective_rows, usefulness_rows
+from proxytune.report.study.tables import usefulness_table
 from proxytune.search import make_proposer
 from proxytune.storage import Store
 from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_confirmation, run_study, study_facts
@@ -67,11 +67,11 @@ def test_its_value_is_told_in_the_search_and_on_fresh_episodes(own):
         again = StudyRun(study_run.study, store)
         run_confirmation(again)
         result = result_of(again)
-    searched, fresh = objective_rows(result)
+    searched, fresh = usefulness_table(result).rows[:2]
     best = result.best.trial.measures["mine:NEARNESS"]
     assert searched[:2] == ("nearness", f"{best:.4g}")
     assert fresh[1] == f"{-result.confirmation.answer.scores[0]:.4g}"
-    assert usefulness_rows(result)[0] == searched
+    assert searched[3] == "the objective, in the search's own episodes"
 
 
 def test_ppv_is_an_objective_too(make_study):

@@ -12,7 +12,7 @@ from stopping import Stopping
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError, RunError
 from proxytune.report.study.document import study_document
-from proxytune.report.study.usefulness_table import prpv_rows
+from proxytune.report.study.tables import usefulness_table
 from proxytune.running import Silent
 from proxytune.search import make_proposer
 from proxytune.search.posterior import Misfit
@@ -185,7 +185,7 @@ def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, fi
 def test_it_can_be_turned_off(finished):
     spent, found = confirmed(finished, confirm=0)
     assert (spent.episodes, found.confirmation) == (0, None)
-    assert [row[0] for row in prpv_rows(found)] == ["PRPV"]
+    assert "  in search" not in [row[0] for row in usefulness_table(found).rows]
     assert study_document(found)["best"]["fresh"] is None
 
 
@@ -208,7 +208,12 @@ def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_s
     _, found = confirmed(finished)
     assert found.confirmation.answer.scores == (None,)
     assert found.best.trial == found.confirmation.candidates[0].trial
-    assert prpv_rows(found)[0] == ("PRPV", "–", "", "none on fresh episodes: an agent failed in all of them")
+    assert usefulness_table(found).rows[0] == (
+        "PRPV",
+        "–",
+        "",
+        "none on fresh episodes: an agent failed in all of them",
+    )
     assert study_document(found)["best"]["fresh"]["prpv"] is None
 
 
@@ -224,13 +229,15 @@ def test_how_much_was_luck_is_in_the_row_of_the_search(finished):
     _, found = confirmed(finished)
     answer = found.confirmation.answer
     lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
-    fresh, searched = prpv_rows(replace(found, confirmation=replace(found.confirmation, answer=lucky)))
+    luck = replace(found, confirmation=replace(found.confirmation, answer=lucky))
+    fresh, searched = usefulness_table(luck).rows[:2]
     assert fresh[:2] == ("PRPV", str(answer.assessment.prpv.value))
     assert "; fresh episodes" in fresh[3]
     assert searched[:2] == ("  in search", str(found.best.assessment.prpv.value))
     assert searched[3].startswith("4 lower by luck")
     unlucky = replace(answer, scores=(int(answer.trial.prpv),))
-    _, searched = prpv_rows(replace(found, confirmation=replace(found.confirmation, answer=unlucky)))
+    none = replace(found, confirmation=replace(found.confirmation, answer=unlucky))
+    searched = usefulness_table(none).rows[1]
     assert searched[3].startswith("no optimism")
 
 

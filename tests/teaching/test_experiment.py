@@ -18,7 +18,7 @@ from telling import Telling
 
 from proxytune.errors import EpisodeError, InputError, LearnerError, SettingsError
 from proxytune.learning import Costs, Curve, Distribution, difference, mean_score, sample_needs, teaching
-from proxytune.report.teaching.observations import observation_lines
+from proxytune.report.teaching import observation_lines
 from proxytune.running import Silent
 from proxytune.storage import Store
 from proxytune.study import StudyRun, adopt, open_study, read_study_settings

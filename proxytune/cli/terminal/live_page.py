@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 
 from proxytune.errors import ProxytuneError
-from proxytune.report.page.rendering import html_of
-from proxytune.report.study.live_page import RENEW_S, live_page
-from proxytune.report.writing import write_text
+from proxytune.report import RENEW_S, write_live_page
 from proxytune.running import Watcher
 from proxytune.storage import Store
 from proxytune.study import StudySettings
@@ -53,7 +51,7 @@ class LivePage:
         with suppress(ProxytuneError):
             with Store.read(self._settings.home) as store:
                 trials = [one for one in store.trials(self._objective) if one.state != "open"]
-            write_text(self._path, html_of(live_page(self._settings, self._objective, trials, doing)))
+            write_live_page(self._path, self._settings, self._objective, trials, doing)
             if not self.written:
                 print(f"proxytune study: page: {self._path} (renews itself while the study runs)", file=sys.stderr)
             self.written = True

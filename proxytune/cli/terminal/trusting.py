@@ -55,7 +55,7 @@ def remember(folder: Path) -> None:
         RunError: If that cannot be written down.
     """
     # It brings the figures along, which few commands need.
-    from proxytune.report.writing import write_text
+    from proxytune.report import write_text
 
     real = folder.resolve()
     kept = {path: owner for path, owner in _known().items() if Path(path).is_dir()}

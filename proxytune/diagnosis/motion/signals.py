@@ -24,15 +24,20 @@ from proxytune.diagnosis.motion.fitting import (
     held_out_log_likelihood,
 )
 from proxytune.diagnosis.motion.innovations import (
+    HUBER,
     arrived_commands,
+    disturbed_increments,
     fit_noise,
     huber,
     increments,
     increments_of_twists,
+    span,
+    theta_at,
     twists_of,
     wheel_speeds,
 )
 from proxytune.effects import CATALOGUE, Cue
+from proxytune.space import Theta
 
 KNOTS = 6
 """Corners of a curve over a signal."""
@@ -335,3 +340,17 @@ def _ridge(fitted: Fit, unit: Floats, sums: tuple[Floats, Floats], ridge: Floats
     weights = -np.linalg.solve(hessian.sum(axis=0) + penalty, gradient.sum(axis=0))
     loss = huber(held_out_innovations(fitted, unit, sums, penalty)).sum() + fitted.whiten.log_determinant.sum()
     return -float(loss), weights
+
+
+def refit_beside_curve(declared: Fit, curve: SignalCurve) -> Theta:
+    """The declared parameters as they are fitted together with a flexible curve: one step of least squares."""
+    drives, theta = declared.drives, declared.theta
+    if not declared.free:
+        return theta
+    moved = disturbed_increments(drives, theta, curve.group.twists @ curve.weights) - increments(drives, theta)
+    left = declared.innovations - declared.whiten.whiten(moved)
+    inner = np.abs(left) < HUBER
+    step = -np.linalg.lstsq(declared.slopes[inner], left[inner], rcond=None)[0]
+    low, high = np.array([span(coordinate, drives.robot) for coordinate in declared.free]).T
+    here = np.array([theta[coordinate[0]] for coordinate in declared.free])
+    return theta_at(theta, declared.free, np.clip(here + step * (high - low), low, high))

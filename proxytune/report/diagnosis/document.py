@@ -1,45 +1,99 @@
-"""A diagnosis of motion as one JSON document, and as tables for people."""
+"""JSON document of a diagnosis, of motion and camera, and the extended model as model.toml."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rich.console import Group
-from rich.table import Table
-from rich.text import Text
+import numpy as np
 
-from proxytune.diagnosis import AdoptedEffect, Diagnosis, EffectSize, Estimate, HorizonError, Ratio, main_error
-from proxytune.effects import Catalogue
-from proxytune.report.diagnosis.clocks import clocks_document
-from proxytune.report.diagnosis.learnt import learnt_document, ratio_document, ratios_document
-from proxytune.report.diagnosis.likeness import unlike_document
-from proxytune.report.diagnosis.notes import decisive, headline, may_matter, notes, per_cent
-from proxytune.report.diagnosis.tables import parameters_table, plain_table
+from proxytune.diagnosis import (
+    AdoptedEffect,
+    Blemish,
+    CameraDiagnosis,
+    CameraEffect,
+    Clocks,
+    Comparison,
+    Diagnosis,
+    EffectSize,
+    Estimate,
+    HorizonError,
+    LaidMap,
+    Learning,
+    LogDiagnosis,
+    Ratio,
+    RobotClusters,
+    main_error,
+)
+from proxytune.driving import robot_names
+from proxytune.effects import Catalogue, Model, model_text
+from proxytune.logs import GEOMETRY
+from proxytune.report.diagnosis.notes import decisive, may_matter, per_cent
+
+TOP = ("verdict", "declared", "effects", "extended", "could_not_be_seen")
+"""Keys of the camera that the document has above all, where there is nothing to say of motion."""
 
 
-def document(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Everything that `diagnose --json` prints."""
+def diagnosis_document(found: LogDiagnosis) -> dict[str, Any]:
+    """Everything that `diagnose --json` prints: motion above, `camera` beside it."""
+    camera = None if found.camera is None else camera_document(found.camera)
+    top = {"log": found.log, "robot": found.robot.name}
+    if found.motion is not None:
+        top |= motion_document(found.motion)
+    elif camera is not None:
+        top |= {key: camera[key] for key in TOP}
+    refused = {"motion_refused": found.motion_refused or None, "camera_refused": found.camera_refused or None}
+    return {**top, "camera": camera, **refused}
+
+
+def extended_model_text(found: LogDiagnosis) -> str:
+    """The extended model of both as model.toml."""
+    robot, parts = found.robot, [part for part in (found.motion, found.camera) if part is not None]
+    estimates = {name: one for part in parts for name, one in part.theta.items()}
+    theta = {name: robot.catalogue.parameters[name].clipped(float(one.value)) for name, one in estimates.items()}
+    theta |= {} if found.motion is None else dict(found.motion.learning.theta)
+    bounds = {name: (float(one.interval[0]), float(one.interval[1])) for name, one in estimates.items()}
+    in_robots = robot.name in robot_names(robot.catalogue.folder)
+    geometry = {} if in_robots else {figure: robot.figures[figure] for figure in GEOMETRY.values()}
+    comments = []
+    for part in parts:
+        added = ", ".join(effect.effect for effect in part.effects) or "nothing"
+        kind = "" if part is found.motion else "camera: "
+        comments.append(f"{kind}{part.verdict}: fitted to {found.log}; added to what was declared: {added}")
+    return model_text(Model(robot.name, None, theta, bounds, geometry), comments, robot.catalogue)
+
+
+def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Everything that `diagnose --json` prints of motion."""
+    polish, drive = diagnosis.multistep, diagnosis.manoeuvre
+    manoeuvre = drive and {
+        "name": drive.name,
+        "description": drive.description,
+        "tells_apart": list(drive.between),
+        "nats_per_minute": drive.nats_per_minute,
+        "times": drive.times,
+    }
     return {
         "log": diagnosis.log,
         "robot": diagnosis.robot.name,
         "verdict": diagnosis.verdict,
-        "declared": {name: _estimate(estimate) for name, estimate in diagnosis.declared.items()},
+        "declared": {name: _estimate_document(estimate) for name, estimate in diagnosis.declared.items()},
         "effects": [_added_document(effect, diagnosis) for effect in diagnosis.effects],
         "immaterial": [_immaterial_document(effect, diagnosis) for effect in diagnosis.negligible],
-        "extended": {name: _estimate(estimate) for name, estimate in diagnosis.theta.items()},
+        "extended": {name: _estimate_document(estimate) for name, estimate in diagnosis.theta.items()},
         "candidates": [
             {"name": tried.effect, "form": tried.form, "held_out_gain": tried.gain, "p_value": tried.p_value}
             for tried in diagnosis.found.tried
         ],
         "signals": [{"name": curve.group.name, "held_out_gain": curve.gain} for curve in diagnosis.found.curves],
         "residual_depends_on": list(diagnosis.residual_depends_on),
-        "error": _error(main_error(diagnosis.errors)),
+        "error": _error_document(main_error(diagnosis.errors)),
         "learnt": learnt_document(diagnosis.learning),
-        "errors": [_error(error) for error in diagnosis.errors],
-        "error_on_bullet": _error(diagnosis.confirmed) if diagnosis.confirmed else None,
-        "fitted_to_windows": _polish(diagnosis),
+        "errors": [_error_document(error) for error in diagnosis.errors],
+        "error_on_bullet": _error_document(diagnosis.confirmed) if diagnosis.confirmed else None,
+        "fitted_to_windows": polish and {"horizon_s": polish.horizon_s, "error_ratio": ratios_document(polish.ratios)},
         "noise": {"drive": list(diagnosis.noise.drive), "pose": list(diagnosis.noise.pose)},
         "could_not_be_seen": list(diagnosis.could_not_be_seen),
-        "next_manoeuvre": _manoeuvre(diagnosis),
+        "next_manoeuvre": manoeuvre,
         "fitted_s": diagnosis.parts.fitted.seconds,
         "tested_s": diagnosis.parts.tested.seconds,
         "clocks": clocks_document(diagnosis.clocks),
@@ -47,17 +101,17 @@ def document(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _estimate(estimate: Estimate) -> dict[str, Any]:
+def _estimate_document(estimate: Estimate) -> dict[str, Any]:
     return {"value": estimate.value, "interval": list(estimate.interval), "unit": estimate.unit}
 
 
-def _effect(effect: AdoptedEffect, theta: Mapping[str, Estimate], catalogue: Catalogue) -> dict[str, Any]:
+def _effect_document(effect: AdoptedEffect, theta: Mapping[str, Estimate], catalogue: Catalogue) -> dict[str, Any]:
     kind = catalogue.effect(effect.effect)
     names = dict(zip(catalogue.theta_names(effect.effect), (one.name for one in kind.parameters), strict=True))
     return {
         "name": effect.effect,
         "form": effect.form,
-        "parameters": {names[name]: _estimate(theta[name]) for name in effect.names if name in theta},
+        "parameters": {names[name]: _estimate_document(theta[name]) for name in effect.names if name in theta},
         "held_out_gain": effect.gain,
         "p_value": effect.p_value,
         "indistinguishable_from": [rival.effect for rival in effect.rivals],
@@ -65,11 +119,9 @@ def _effect(effect: AdoptedEffect, theta: Mapping[str, Estimate], catalogue: Cat
 
 
 def _added_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
-    worth = _worth(diagnosis.effect_sizes.get(effect.effect, {}))
-    return _effect(effect, diagnosis.theta, diagnosis.robot.catalogue) | {
-        "worth": worth,
-        "at_edge": list(diagnosis.at_edge(effect)),
-    }
+    worth = {"worth": _worth_document(diagnosis.effect_sizes.get(effect.effect, {}))}
+    own = _effect_document(effect, diagnosis.theta, diagnosis.robot.catalogue)
+    return own | worth | {"at_edge": list(diagnosis.at_edge(effect))}
 
 
 def _immaterial_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -78,11 +130,11 @@ def _immaterial_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[st
     horizon = decisive(worth) if worth else None
     change = _percent(worth[horizon]) if horizon is not None else {"value": None, "interval": None, "unit": "%"}
     evidence = {"nats": effect.gain, "changes_error_by": change["value"], "interval": change["interval"], "unit": "%"}
-    open_ = {"horizon_s": horizon, "may_matter": not worth or may_matter(worth), "worth": _worth(worth)}
-    return _effect(effect, diagnosis.dropped_values, diagnosis.robot.catalogue) | evidence | open_
+    open_ = {"horizon_s": horizon, "may_matter": not worth or may_matter(worth), "worth": _worth_document(worth)}
+    return _effect_document(effect, diagnosis.dropped_values, diagnosis.robot.catalogue) | evidence | open_
 
 
-def _worth(worth: EffectSize) -> dict[str, Any]:
+def _worth_document(worth: EffectSize) -> dict[str, Any]:
     return {f"{horizon:g}": _percent(one) for horizon, one in worth.items()}
 
 
@@ -91,17 +143,7 @@ def _percent(one: Ratio) -> dict[str, Any]:
     return {"value": value, "interval": list(interval), "unit": "%"}
 
 
-def _polish(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    polish = diagnosis.multistep
-    if polish is None:
-        return None
-    return {
-        "horizon_s": polish.horizon_s,
-        "error_ratio": ratios_document(polish.ratios),
-    }
-
-
-def _error(error: HorizonError) -> dict[str, Any]:
+def _error_document(error: HorizonError) -> dict[str, Any]:
     return {
         "horizon_s": error.horizon_s,
         "windows": error.windows,
@@ -125,52 +167,170 @@ def _error(error: HorizonError) -> dict[str, Any]:
     }
 
 
-def _manoeuvre(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    manoeuvre = diagnosis.manoeuvre
-    if manoeuvre is None:
+def clocks_document(clocks: Sequence[Clocks]) -> dict[str, Any]:
+    """The clocks of the log, and under `test` those of the log to test on where that is another."""
+    own, *test = clocks
+    own_document = {
+        "offset_s": own.offset.value,
+        "interval": list(own.offset.interval),
+        "latency_s": own.latency.value,
+        "latency_interval": list(own.latency.interval),
+        "assumed_delay_s": own.assumed_delay_s,
+        "declared_offset_s": own.declared_s,
+        "drives": {name: {"offset_s": one.value, "interval": list(one.interval)} for name, one in own.drives.items()},
+        "jumps": [{"drive": jump.drive, "time_s": jump.time_s, "by_s": jump.by_s} for jump in own.jumps],
+    }
+    return own_document | ({"test": clocks_document(test)} if test else {})
+
+
+def unlike_document(unlike: RobotClusters | None, names: Sequence[str]) -> dict[str, Any] | None:
+    """The wheel that differs, and its gain in each of two groups of drives; None where all drives are alike."""
+    if unlike is None:
         return None
+    groups = [
+        {"gain": gain, "drives": [names[number] for number in group]}
+        for gain, group in zip(unlike.gains, unlike.groups, strict=True)
+    ]
+    return {"wheel": unlike.wheel, "groups": groups}
+
+
+def learnt_document(learning: Learning) -> dict[str, Any]:
+    """The `learnt` part of `diagnose --json`: what the guard saw, and the error on drives that were not fitted.
+
+    Keys of `ratio` and `guard` are horizons in seconds. `groups` and `share` are empty where nothing is used.
+    """
+    beside, like = learning.discrepancy, learning.looks_like
+    share = beside.share if beside.used else {}
     return {
-        "name": manoeuvre.name,
-        "description": manoeuvre.description,
-        "tells_apart": list(manoeuvre.between),
-        "nats_per_minute": manoeuvre.nats_per_minute,
-        "times": manoeuvre.times,
+        "used": beside.used,
+        "groups": list(learning.depends_on(())),
+        "share": dict(share),
+        "ratio": ratios_document({error.horizon_s: error.ratio for error in learning.errors}),
+        "guard": ratios_document(beside.guard),
+        "errors": [
+            {
+                "horizon_s": error.horizon_s,
+                "after": error.after.value,
+                "after_interval": list(error.after.interval),
+                "heading": error.heading.value,
+            }
+            for error in learning.errors
+        ],
+        "names_doubtful": learning.names_doubtful,
+        "looks_like": like
+        and {"name": like.effect, "form": like.form, "values": dict(like.theta), "share": like.share},
     }
 
 
-def tables_and_notes(diagnosis: Diagnosis) -> Group:
-    """The diagnosis as `diagnose` prints it: the verdict, tables and notes."""
-    parts = [
-        parameters_table("Fitted parameters", diagnosis.declared, diagnosis.theta),
-        _errors(diagnosis),
-        _candidates(diagnosis),
+def ratio_document(one: Ratio) -> dict[str, Any]:
+    """One error by another, with its interval."""
+    return {"value": one.value, "interval": list(one.interval)}
+
+
+def ratios_document(ratios: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
+    """Such ratios by horizon in seconds."""
+    return {f"{horizon_s:g}": ratio_document(one) for horizon_s, one in ratios.items()}
+
+
+def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
+    """Everything that `diagnose --json` prints of the camera: plain numbers, None where there is none."""
+    views = diagnosis.named.full.views
+    place, turn = views.position_m / views.tracks.share, np.degrees(views.heading_rad) / views.tracks.share
+    keys = ("nats", "share", "rms_px")
+    left = [
+        {key: _number(getattr(one, key)) for key in keys} | {"open": bool(one.significant)}
+        for one in diagnosis.residual_fields
     ]
-    return Group(Text(headline(diagnosis), style="bold"), *parts, *(Text(note) for note in notes(diagnosis)))
+    return {
+        "verdict": diagnosis.verdict,
+        "declared": estimates_document(diagnosis.declared),
+        "effects": [_camera_effect_document(effect, diagnosis, diagnosis.theta) for effect in diagnosis.effects],
+        "immaterial": [
+            _camera_effect_document(effect, diagnosis, diagnosis.dropped) for effect in diagnosis.negligible
+        ],
+        "extended": estimates_document(diagnosis.theta),
+        "candidates": [{"name": "+".join(one.effects), "loss": _number(one.loss)} for one in diagnosis.candidates],
+        "error": _comparison_document(diagnosis.pixels),
+        "grey_error": _comparison_document(diagnosis.grey),
+        "fixed_to_camera": dict(zip(("before", "after"), left, strict=True)),
+        "blemishes": [_blemish_document(blemish) for blemish in diagnosis.blemishes],
+        "could_not_be_seen": list(diagnosis.could_not_be_seen),
+        "next_views": list(diagnosis.next_views),
+        "map": _map_document(diagnosis.laid),
+        "matched_share": _number(diagnosis.matched),
+        "frames": {"used": len(diagnosis.gathered.numbers), "of": len(diagnosis.gathered.frames.paths)},
+        # The tracker's, before its poses are smoothed, as log.toml states it.
+        "pose_scatter": {"position_m": _number(place), "heading_deg": _number(float(turn))},
+        "notes": list(diagnosis.notes),
+    }
 
 
-def _errors(diagnosis: Diagnosis) -> Table:
-    table = plain_table(
-        "Error on held-out drives: RMSE of position [mm] (heading [deg])",
-        ("window", "before", "after", "after / before", "noise floor"),
-    )
-    confirmed = [(diagnosis.confirmed, ", bullet")] if diagnosis.confirmed else []
-    for error, plant in [*((error, "") for error in diagnosis.errors), *confirmed]:
-        table.add_row(
-            f"{error.horizon_s:g} s{plant}",
-            _millimetres(error.before.value, error.before.interval, error.heading_before.value),
-            _millimetres(error.after.value, error.after.interval, error.heading_after.value),
-            f"{error.ratio.value:.2f} ({error.ratio.interval[0]:.2f} … {error.ratio.interval[1]:.2f})",
-            f"{1e3 * error.floor.lower:.1f} to {1e3 * error.floor.upper:.1f} ({57.2958 * error.heading_floor:.2f})",
-        )
-    return table
+def estimates_document(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
+    """Values with their intervals and units, by name."""
+    return {name: _finite_estimate(one) for name, one in estimates.items()}
 
 
-def _millimetres(value: float, interval: tuple[float, float], heading: float) -> str:
-    return f"{1e3 * value:.1f} [{1e3 * interval[0]:.1f} … {1e3 * interval[1]:.1f}] ({57.2958 * heading:.2f})"
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
-def _candidates(diagnosis: Diagnosis) -> Table:
-    table = plain_table("Effects tried, best first", ("effect", "form", "log-likelihood gain [nats]", "p"))
-    for tried in diagnosis.found.tried[:8]:
-        table.add_row(tried.effect, tried.form, f"{tried.gain:.1f}", f"{tried.p_value:.3f}")
-    return table
+def _interval(ends: tuple[float, float]) -> list[float | None]:
+    return [_number(end) for end in ends]
+
+
+def _finite_estimate(one: Estimate) -> dict[str, Any]:
+    return {"value": _number(one.value), "interval": _interval(one.interval), "unit": one.unit}
+
+
+def _camera_effect_document(
+    effect: CameraEffect, diagnosis: CameraDiagnosis, theta: Mapping[str, Estimate]
+) -> dict[str, Any]:
+    catalogue = diagnosis.named.full.views.optics.robot.catalogue
+    kind = catalogue.effect(effect.effect)
+    own = dict(zip(catalogue.theta_names(effect.effect), (one.name for one in kind.parameters), strict=True))
+    return {
+        "name": effect.effect,
+        "parameters": {own[name]: _finite_estimate(theta[name]) for name in effect.names if name in theta},
+        "held_out_gain": None if effect.nats is None else _number(effect.nats),
+        "indistinguishable_from": list(effect.rivals),
+        "error_without": _number(effect.error_without) if effect.error_without is not None else None,
+    }
+
+
+def camera_noise_floor(error: Comparison) -> float | None:
+    """The error that no camera could remove; None where it is not known."""
+    return None if error.floor is None else _number(error.floor.value)
+
+
+def _comparison_document(error: Comparison) -> dict[str, Any]:
+    return {
+        "before": _number(error.before.value),
+        "before_interval": _interval(error.before.interval),
+        "after": _number(error.after.value),
+        "after_interval": _interval(error.after.interval),
+        "noise_floor": camera_noise_floor(error),
+        "unit": error.unit,
+        "frames": int(np.isfinite(error.before.frames).sum()),
+    }
+
+
+def _blemish_document(blemish: Blemish) -> dict[str, Any]:
+    return {
+        "columns": [int(end) for end in blemish.columns],
+        "rows": [int(end) for end in blemish.rows],
+        "contrast": _number(blemish.contrast),
+        "share": _number(blemish.share),
+    }
+
+
+def _map_document(laid: LaidMap) -> dict[str, Any]:
+    lines = [
+        {
+            "line": one.line,
+            "stretch": int(one.stretch),
+            "right_m": _number(one.right_m),
+            "interval": _interval(one.interval),
+        }
+        for one in laid.lines
+    ]
+    return {"offset": estimates_document(laid.offset), "lines": lines, "widths": estimates_document(laid.widths)}

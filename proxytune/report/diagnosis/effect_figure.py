@@ -1,7 +1,9 @@
-"""The figure of the first effect that was added, or of the signal that no named effect accounts for."""
+"""Figure of the first effect that was added, or of the signal that no named effect accounts for."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,24 +16,23 @@ from proxytune.diagnosis import (
     Drives,
     Floats,
     SignalCurve,
+    disturbed_increments,
     drawn_wheel_speeds,
+    increments,
+    refit_beside_curve,
     wheel_speeds,
 )
-from proxytune.effects import Catalogue, Means, WheelCurve
-from proxytune.report.diagnosis.means import ANY, GROUPS, draw_means, means_figure, rates_of, retuned
-from proxytune.report.diagnosis.model_names import BEFORE, after
-from proxytune.report.style import BLUE, COLUMN, LIGHT_GREY, PURPLE, VERMILLION, dress, legend_below
+from proxytune.effects import TURN, Catalogue, Means, Panel, WheelCurve
+from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, extended_name
+from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_GREY, PURPLE, VERMILLION, dress, legend_below
 from proxytune.space import Theta
 
 HELD_S = 5.0
 """A command is held so long before the wheel speed counts as steady."""
-
 COMMANDS = 201
 """So many commands along a curve of steady speeds."""
-
 STEP_S, STEPS_S = 1.5, 3.0
 """A step response is followed so long before the command is reversed, and altogether."""
-
 DRAWS = 40
 """Step responses that are drawn of a random effect."""
 
@@ -44,7 +45,7 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
     found = diagnosis.found
     if not found.adopted:
         best = next(iter(found.unnamed_curves), None)
-        return None if best is None else means_figure(diagnosis, best, GROUPS[best.group.name])
+        return None if best is None else means_figure(diagnosis, best, CUE_PANELS[best.group.name])
     first = found.adopted[0]
     kind = _curve_kind(first, diagnosis.robot.catalogue)
     if isinstance(kind, Means):
@@ -71,8 +72,8 @@ def _wheels_figure(diagnosis: Diagnosis) -> Figure:
     models = _steady_models(diagnosis, commands)
     for column, side in enumerate(("left", "right")):
         _draw_steady(panels[0, column], commands, {name: steady[:, column] for name, steady in models.items()})
-        place = np.interp(rates.declared[side], models[BEFORE][:, column], commands)
-        draw_means(panels[1, column], rates, place, GROUPS["wheel command"][column])
+        place = np.interp(rates.declared[side], models[DECLARED_MODEL][:, column], commands)
+        draw_means(panels[1, column], rates, place, CUE_PANELS["wheel command"][column])
         panels[0, column].set_title(f"{side} wheel", fontsize=8)
         panels[1, column].set_xlabel("command [duty]", fontsize=8)
     for row, label in enumerate(("steady speed [m/s]", "speed − declared\n[mm/s]")):
@@ -86,17 +87,17 @@ def _steady_models(diagnosis: Diagnosis, commands: Floats) -> dict[str, Floats]:
     """Steady wheel speeds (commands, 2) [m/s] of every model, by name: declared, extended, with the flexible curve."""
     found, drives = diagnosis.found, diagnosis.found.declared.drives
     before = _steady(drives, found.declared.theta, commands)
-    models = {BEFORE: before, after(diagnosis): _steady(drives, found.model.theta, commands)}
+    models = {DECLARED_MODEL: before, extended_name(diagnosis): _steady(drives, found.model.theta, commands)}
     curve = _curve(found.curves, "wheel command")
     if curve is not None and curve.gain > 0.0:
         extra = [np.interp(before[:, side], *_flexible(diagnosis, curve, side)) for side in (0, 1)]
-        models[ANY] = _steady(drives, retuned(found.declared, curve), commands) + np.stack(extra, axis=1)
+        models[ANY] = _steady(drives, refit_beside_curve(found.declared, curve), commands) + np.stack(extra, axis=1)
     return models
 
 
 def _draw_steady(axes: Axes, commands: Floats, models: Mapping[str, Floats]) -> None:
     for name, speeds in models.items():
-        style, colour = {BEFORE: ("-", VERMILLION), ANY: ("--", PURPLE)}.get(name, ("-", BLUE))
+        style, colour = {DECLARED_MODEL: ("-", VERMILLION), ANY: ("--", PURPLE)}.get(name, ("-", BLUE))
         axes.plot(commands, speeds, style, color=colour, lw=1.3, label=name)
     dress(axes)
 
@@ -139,12 +140,13 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     full = drives.robot.figures["full_speed"]
     # An area, which no line on its edge can hide.
     axes.fill_between(times, duties[0, :, 0] * full, color=LIGHT_GREY, linewidth=0, zorder=0, label="command")
-    for fitted, colour, name in ((found.declared, VERMILLION, BEFORE), (found.model, BLUE, after(diagnosis))):
+    for fitted, colour, name in (
+        (found.declared, VERMILLION, DECLARED_MODEL),
+        (found.model, BLUE, extended_name(diagnosis)),
+    ):
         draws = full * _responses(_driven(drives, duties), fitted.theta)[..., column]
         _draw_responses(axes, times, draws, colour, name)
-    axes.set_xlabel("time since the command [s]", fontsize=8)
-    axes.set_ylabel(f"speed of the {('left', 'right')[column]} wheel [m/s]", fontsize=8)
-    dress(axes)
+    dress(axes, "time since the command [s]", f"speed of the {('left', 'right')[column]} wheel [m/s]")
     legend_below(figure, axes)
     return figure
 
@@ -162,3 +164,123 @@ def _responses(drives: Drives, theta: Theta) -> Floats:
     if not any(theta.get(name, 0.0) > 0.0 for name in RANDOM_EFFECTS):
         return wheel_speeds(drives, theta)
     return np.stack([drawn_wheel_speeds(drives, theta, seed)[0] for seed in range(DRAWS)])
+
+
+BINS = 20
+"""Values of the signal, equally often driven, over which means are taken."""
+COLUMNS = 2
+MEASURED, ANY = "measured", "free curve"
+DEGREES = 180.0 / np.pi
+CUE_PANELS: Mapping[str, tuple[Panel, ...]] = {
+    "wheel command": (
+        Panel("left", "speed of the left wheel [m/s]", "left"),
+        Panel("right", "speed of the right wheel [m/s]", "right"),
+    ),
+    "difference of the wheel commands": tuple(
+        Panel("", "right less left command [duty]", m) for m in ("forward", "turn")
+    ),
+    "command transients": tuple(
+        Panel("", "left command less its slow average [duty]", motion) for motion in ("left", "forward")
+    ),
+    "distance since reversal": (Panel("", "way since the left wheel reversed [m]", "left", True),),
+    "time in the episode": tuple(Panel("", "time in the episode [s]", side, True) for side in ("left", "right")),
+    "cumulated use": tuple(Panel("", "use so far [s at full duty]", m, True) for m in ("forward", "turn")),
+    "turn rate": (Panel("turn", TURN, "forward", True), Panel("turn", TURN, "turn")),
+    "heading": tuple(Panel("heading", "heading [deg]", motion) for motion in ("forward", "turn")),
+    "position": (
+        Panel("x", "x [m]", "forward", True),
+        Panel("y", "y [m]", "forward", True),
+        Panel("x", "x [m]", "turn"),
+    ),
+    "left wheel angle": (Panel("", "angle of the left wheel [rad]", "left", True),),
+    "right wheel angle": (Panel("", "angle of the right wheel [rad]", "right", True),),
+    "direction of travel": tuple(Panel("", "direction of travel", m, True) for m in ("forward", "turn")),
+}
+"""Panels drawn for a signal group."""
+NAMES = {
+    "forward": "forward speed",
+    "sideways": "speed to the left",
+    "turn": "turn rate",
+    "left": "left wheel speed",
+    "right": "right wheel speed",
+}
+
+
+class Rates(NamedTuple):
+    """Motion per second between the measured poses, by channel, each (N,)."""
+
+    declared: Mapping[str, Floats]
+    added: Mapping[str, Mapping[str, Floats]]
+
+
+def rates_of(diagnosis: Diagnosis, curve: SignalCurve | None) -> Rates:
+    """Motion as the declared model has it, and what is added to it by measurement, by effects, by a flexible curve."""
+    found, drives = diagnosis.found, diagnosis.found.declared.drives
+    declared = increments(drives, found.declared.theta)
+    added = {MEASURED: drives.measured - declared}
+    if found.adopted:
+        added[extended_name(diagnosis)] = increments(drives, found.model.theta) - declared
+    if curve is not None and curve.gain > 0.0:
+        free = curve.group.twists @ curve.weights
+        added[ANY] = disturbed_increments(drives, refit_beside_curve(found.declared, curve), free) - declared
+    return Rates(_channels(drives, declared), {name: _channels(drives, moved) for name, moved in added.items()})
+
+
+def _channels(drives: Drives, moved: Floats) -> dict[str, Floats]:
+    forward, sideways, turn = (moved / ((drives.last - drives.first) / drives.tick_hz)[:, None]).T
+    side = turn * drives.robot.figures["effective_baseline"] / 2.0
+    return {"forward": forward, "sideways": sideways, "turn": turn, "left": forward - side, "right": forward + side}
+
+
+def _signal(drives: Drives, rates: Rates, curve: SignalCurve | None, panel: Panel) -> Floats:
+    """The signal of a panel at each increment (N,)."""
+    declared = rates.declared
+    direct = {
+        "x": drives.poses[:, 0, 0],
+        "y": drives.poses[:, 0, 1],
+        "heading": np.degrees(np.mod(drives.poses[:, 0, 2], 2.0 * np.pi)),
+        "turn": np.degrees(declared["turn"]),
+        "left angle": np.mod(drives.angles[drives.episode, drives.first, 0], 2.0 * np.pi),
+        "right angle": np.mod(drives.angles[drives.episode, drives.first, 1], 2.0 * np.pi),
+        "bend": declared["forward"] * declared["turn"],
+    }
+    if panel.signal:
+        return np.asarray(direct.get(panel.signal, declared.get(panel.signal)))
+    assert curve is not None
+    return np.asarray(curve.group.signal[drives.episode, (drives.first + drives.last) // 2])
+
+
+def _means(signal: Floats, added: Floats, share_of: Floats | None) -> tuple[Floats, Floats]:
+    """Mean of what is added, or its share of a motion [%], over equally filled bins of the signal."""
+    edges = np.unique(np.quantile(signal, np.linspace(0.0, 1.0, BINS + 1)))
+    place = np.clip(np.searchsorted(edges, signal, side="right") - 1, 0, max(0, len(edges) - 2))
+    weight = np.ones_like(signal) if share_of is None else share_of
+    count, total, size = (np.bincount(place, w) for w in (np.ones_like(signal), weight * added, weight**2))
+    kept = size > 1e-9 * size.max()
+    value = (total[kept] / size[kept]) * (1.0 if share_of is None else 100.0)
+    return np.bincount(place, signal)[kept] / count[kept], value
+
+
+def means_figure(diagnosis: Diagnosis, curve: SignalCurve | None, panels: tuple[Panel, ...]) -> Figure:
+    """Draw panels, two in a row; the curve is the flexible one, where there is one."""
+    rows = ceil(len(panels) / COLUMNS)
+    figure = Figure(figsize=(COLUMN, 1.7 * rows + 0.6), layout="constrained")
+    rates, across = rates_of(diagnosis, curve), min(COLUMNS, len(panels))
+    all_axes = [figure.add_subplot(rows, across, number + 1) for number in range(len(panels))]
+    for axes, panel in zip(all_axes, panels, strict=True):
+        signal = _signal(diagnosis.found.declared.drives, rates, curve, panel)
+        draw_means(axes, rates, signal, panel)
+        axes.set_xlabel(panel.label, fontsize=8)
+    legend_below(figure, *all_axes)
+    return figure
+
+
+def draw_means(axes: Axes, rates: Rates, signal: Floats, panel: Panel) -> None:
+    """Draw means of what is added over a signal of the increments (N,)."""
+    factor, unit = (1.0, "%") if panel.share else (DEGREES, "deg/s") if panel.motion == "turn" else (1e3, "mm/s")
+    axes.axhline(0.0, color=VERMILLION, lw=1.0, label=DECLARED_MODEL)
+    for name, added in rates.added.items():
+        places, values = _means(signal, added[panel.motion], rates.declared[panel.motion] if panel.share else None)
+        style = {MEASURED: ("o", GREY, 3.0, 1), ANY: ("--", PURPLE, 0.0, 3)}.get(name, ("-", BLUE, 0.0, 2))
+        axes.plot(places, factor * values, style[0], color=style[1], ms=style[2], lw=1.4, zorder=style[3], label=name)
+    dress(axes, up=f"{NAMES[panel.motion]}\n− declared [{unit}]")

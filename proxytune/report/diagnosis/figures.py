@@ -1,18 +1,24 @@
-"""The figures of a diagnosis: what the declared model leaves over, why, and what the added effects are worth."""
+"""Figures of a diagnosis of motion: all of them, the evidence for each effect, and what was learnt."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import ceil
+from textwrap import fill
+from typing import NamedTuple
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
-from proxytune.diagnosis import Diagnosis
+from proxytune.diagnosis import RULES, Diagnosis, Findings, Learning, TriedEffect
+from proxytune.effects import GROUPS, HEADING, LEVEL, Curve, Learnt, learnt_effect
 from proxytune.report.diagnosis.effect_figure import effect_curve
-from proxytune.report.diagnosis.error_figure import error_figure
-from proxytune.report.diagnosis.learnt_figure import learnt_figure
-from proxytune.report.diagnosis.ranking_figure import ranking_figure
-from proxytune.report.diagnosis.residual_figure import residual_map, residual_over_time, strayed
+from proxytune.report.diagnosis.error_figures import error_figure, residual_map, residual_over_time, strayed
+from proxytune.report.figure_style import BLUE, COLUMN, GREY, LIGHT_BLUE, PURPLE, dress, legend_below
+from proxytune.report.wording import plain
 
 
-def diagnosis_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
+def motion_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
     """Draw everything that a diagnosis has to show, by the name of the figure.
 
     What has nothing to show is left out: the curve of an effect where none was added and no signal explains anything,
@@ -28,3 +34,199 @@ def diagnosis_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
         "error": error_figure(diagnosis),
     }
     return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+SHOWN = 12
+"""So many effects are ranked that were not added."""
+JUDGES = 5
+"""So many signals are ranked beneath them."""
+LEAST_GAIN = RULES.least_gain_nats
+LINEAR = 20.0
+"""Evidence of no more than so many thresholds is drawn on a linear axis."""
+ROW, ELSE = 0.145, 0.95
+"""Height of a row, and of all else [inch]."""
+
+
+class _Role(NamedTuple):
+    """Meaning of a dot."""
+
+    name: str
+    edge: str
+    face: str
+
+
+class _Row(NamedTuple):
+    """A name, its evidence [nats], and what its dot stands for."""
+
+    name: str
+    gain: float
+    role: _Role
+
+
+ADDED = _Role("added", BLUE, BLUE)
+RIVAL = _Role("fits as well as one added", LIGHT_BLUE, LIGHT_BLUE)
+OTHER = _Role("not added", GREY, GREY)
+CHANCE = _Role(f"not added, p > {RULES.p_value:g}", GREY, "white")
+SIGNAL = _Role("free curve", PURPLE, PURPLE)
+
+
+def ranking_figure(found: Findings) -> Figure | None:
+    """Draw effects in the order in which they were added, others tried, and signals under any curve, on one axis.
+
+    The evidence of those added is that when they were added; of the others, alone, in the first round. Nothing is
+    drawn where nothing was tried.
+    """
+    forms = {(one.effect, one.form) for one in found.adopted}
+    others = [one for one in found.tried if (one.effect, one.form) not in forms][:SHOWN]
+    added = [_Row(_name(one.effect, one.form), one.gain, ADDED) for one in found.adopted]
+    tried = [_Row(_name(one.effect, one.form), one.gain, _role(found, one)) for one in others]
+    signals = [_Row(curve.group.name, curve.gain, SIGNAL) for curve in found.curves[:JUDGES]]
+    if not tried or not signals:
+        return None
+    parts = {"added, in this order": added} if added else {}
+    parts |= {"tried alone": tried, "any curve over": signals}
+    heights = [len(rows) + 1.2 for rows in parts.values()]
+    figure = Figure(figsize=(COLUMN, ELSE + ROW * sum(heights)), layout="constrained")
+    panels = figure.subplots(len(parts), 1, sharex=True, height_ratios=heights)
+    for axes, (title, rows) in zip(panels, parts.items(), strict=True):
+        _dots(axes, rows)
+        axes.axvline(LEAST_GAIN, color="0.45", lw=1.0, ls=":", label=f"least to be added: {LEAST_GAIN:g} nats")
+        axes.set_title(title, fontsize=7, loc="left", pad=2)
+    _scale(panels[-1], [row.gain for rows in parts.values() for row in rows])
+    panels[-1].set_xlabel("evidence on drives left out [nats]", fontsize=8, loc="right")
+    legend_below(figure, *panels, without=[ADDED.name, SIGNAL.name])
+    return figure
+
+
+def _name(effect: str, form: str) -> str:
+    return plain(effect) + (f" ({form})" if form else "")
+
+
+def _role(found: Findings, tried: TriedEffect) -> _Role:
+    if any(rival.effect == tried.effect for one in found.adopted for rival in one.rivals):
+        return RIVAL
+    return OTHER if tried.p_value <= RULES.p_value else CHANCE
+
+
+def _scale(axes: Axes, gains: Sequence[float]) -> None:
+    """A linear axis for evidence of one size, a logarithmic one with plain numbers where sizes differ by orders."""
+    low, high = min(0.0, *gains), max(2.0 * LEAST_GAIN, *gains)
+    if high <= LINEAR * LEAST_GAIN:
+        axes.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
+        return
+    axes.set_xscale("symlog", linthresh=2.0 * LEAST_GAIN, linscale=0.5)
+    axes.set_xlim(1.3 * low, 1.5 * high)
+    axes.set_xticks([0.0, *(10.0**power for power in range(2, 9) if 10.0**power <= 1.5 * high)])
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}".replace(",", "\u2009")))
+
+
+def _dots(axes: Axes, rows: Sequence[_Row]) -> None:
+    for place, (_, gain, role) in enumerate(rows):
+        axes.plot([0.0, gain], [place, place], "-", color=role.edge, lw=0.9, alpha=0.6)
+        axes.plot([gain], [place], "o", color=role.edge, mfc=role.face, ms=4, label=role.name)
+    axes.set_yticks(range(len(rows)), [row.name for row in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    dress(axes)
+    axes.tick_params(axis="y", labelsize=6.5)
+
+
+SHOWN_AS = {
+    "m/s": (1e3, "mm/s"),
+    "rad/s": (180.0 / np.pi, "deg/s"),
+    "rad/m": (180.0 / np.pi, "deg/m"),
+}
+"""Units in which weights are told, by their own: a factor and its unit; shares in per cent."""
+FADING = {
+    "transients": "time constant",
+    "load": "time constant",
+    "reversal": "fading over",
+    "start": "fading over",
+    "ringing": "frequency",
+    "play": "half the play",
+}
+"""Groups whose weights are points, each of something that fades, and what their knots are."""
+PAIRS = "speed_and_turn"
+COLUMNS = 2
+WIDEST, HIGHEST = 24, 18
+"""Characters in a line below a panel, and beside it."""
+
+
+def learnt_figure(learning: Learning) -> Figure | None:
+    """A panel for each learnt curve, two in a row, largest share first; nothing where none is used."""
+    effect = learnt_effect(learning.theta)
+    if effect is None:
+        return None
+    order = list(learning.discrepancy.share)
+    members = {curve.group for curve in effect.curves} - {LEVEL}
+    groups = sorted(members, key=lambda group: order.index(GROUPS[group].title))
+    by_group = [[curve for curve in effect.curves if curve.group == group] for group in groups]
+    curves = [one for row in by_group for one in (_courses(row) if row[0].group == HEADING else row)]
+    rows, across = ceil(len(curves) / COLUMNS), min(COLUMNS, len(curves))
+    figure = Figure(figsize=(COLUMN, 1.65 * rows + 0.25), layout="constrained")
+    for place, curve in enumerate(curves):
+        _draw_learnt(figure.add_subplot(rows, across, place + 1), effect, curve)
+    figure.suptitle("learnt from drives, not physics: what is added", fontsize=8)
+    return figure
+
+
+def _courses(curves: Sequence[Curve]) -> list[Curve]:
+    """Harmonics of the heading as curves over it, one for each direction."""
+    around = np.linspace(0.0, 360.0, 73)
+    courses = []
+    for to in dict.fromkeys(curve.channel.split("_")[0] for curve in curves):
+        total = np.zeros(len(around))
+        for curve in curves:
+            if curve.channel.startswith(to):
+                wave = np.cos if curve.channel.endswith("cos") else np.sin
+                total += wave(np.radians(around)[:, None] * np.asarray(curve.knots)) @ np.asarray(curve.weights)
+        courses.append(Curve(HEADING, to, tuple(around.tolist()), tuple(total.tolist())))
+    return courses
+
+
+def _draw_learnt(axes: Axes, effect: Learnt, curve: Curve) -> None:
+    group = GROUPS[curve.group]
+    unit = group.channels[curve.channel if curve.group != HEADING else f"{curve.channel}_cos"].unit
+    factor, label_unit = SHOWN_AS.get(unit, (100.0, f"% {unit}"))
+    label = fill(f"{plain(curve.channel)} [{label_unit}]", HIGHEST)
+    if curve.group == PAIRS:
+        _surface(axes, curve, factor, label)
+    else:
+        _line(axes, curve, factor)
+        of = f"{group.title}, {FADING[curve.group]}" if curve.group in FADING else group.title
+        axes.set_xlabel(fill(f"{of} [{'deg' if curve.group == HEADING else group.unit}]", WIDEST), fontsize=7)
+        axes.set_ylabel(label, fontsize=8)
+        axes.axhline(0.0, color=GREY, lw=0.6)
+    if curve.group == "turn_rate":
+        axes.axvspan(*effect.seen.yaw, color=GREY, alpha=0.12, lw=0)
+    dress(axes)
+
+
+def _line(axes: Axes, curve: Curve, factor: float) -> None:
+    """A curve through its knots, and through 0 at 0; what fades is points."""
+    knots, weights = np.array(curve.knots), factor * np.array(curve.weights)
+    if curve.group in FADING:
+        axes.set_xscale("log")
+        axes.set_xticks(knots, [f"{knot:g}" for knot in knots])
+        axes.set_xticks([], minor=True)
+        axes.vlines(knots, 0.0, weights, color=BLUE, lw=1.0)
+        axes.plot(knots, weights, "o", color=BLUE, ms=4)
+        return
+    if curve.group != HEADING:
+        order = np.argsort(np.append(knots, 0.0))
+        knots, weights = np.append(knots, 0.0)[order], np.append(weights, 0.0)[order]
+    axes.plot(knots, weights, "-" if curve.group == HEADING else ".-", color=BLUE, lw=1.3, ms=5)
+
+
+def _surface(axes: Axes, curve: Curve, factor: float, label: str) -> None:
+    """Colours over speed and yaw rate."""
+    places, weights = np.array(curve.knots), factor * np.array(curve.weights)
+    speeds, turns = (np.unique(np.append(axis, 0.0)) for axis in places.T)
+    values = np.zeros((len(turns), len(speeds)))
+    values[np.searchsorted(turns, places[:, 1]), np.searchsorted(speeds, places[:, 0])] = weights
+    most = float(np.abs(values).max()) or 1.0
+    mesh = axes.pcolormesh(speeds, turns, values, shading="gouraud", cmap="RdBu_r", vmin=-most, vmax=most)
+    axes.set_xlabel("forward speed [m/s]", fontsize=8)
+    axes.set_ylabel("yaw rate [rad/s]", fontsize=8)
+    bar = axes.figure.colorbar(mesh, ax=axes)
+    bar.set_label(label, fontsize=8)
+    bar.ax.tick_params(labelsize=7)

@@ -1,10 +1,20 @@
-"""What a diagnosis says in sentences: each effect and its worth, what does not matter, what is left, what to drive."""
+"""Sentences of a diagnosis of motion: each effect and its worth, what is left, clocks, what to drive next."""
 
-from proxytune.diagnosis import RULES, AdoptedEffect, Diagnosis, EffectSize, Ratio
-from proxytune.report.diagnosis.clocks import clocks_notes
-from proxytune.report.diagnosis.learnt import learnt_notes
-from proxytune.report.diagnosis.likeness import unlike_notes
-from proxytune.report.numbers import fixed, listed
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from proxytune.diagnosis import (
+    RULES,
+    AdoptedEffect,
+    Clocks,
+    Diagnosis,
+    EffectSize,
+    Learning,
+    Offset,
+    Ratio,
+    RobotClusters,
+)
+from proxytune.report.wording import fixed, listed
 
 MEANINGS = {
     "nothing missing": "only noise is left",
@@ -14,18 +24,16 @@ MEANINGS = {
     "cannot be told": "the error is larger than the noise of the poses but shows no structure; how far two drives "
     "from the same commands differ is not known",
 }
-
-
 AMPLE = 30.0
 """Log-likelihood gain [nats] in a minute above which one minute surely decides."""
 
 
-def headline(diagnosis: Diagnosis) -> str:
+def motion_headline(diagnosis: Diagnosis) -> str:
     """The verdict and what it means."""
     return f"{diagnosis.log}: {diagnosis.verdict}: {MEANINGS[diagnosis.verdict]}"
 
 
-def notes(diagnosis: Diagnosis) -> list[str]:
+def motion_notes(diagnosis: Diagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
     lines = clocks_notes(diagnosis.log, diagnosis.clocks, diagnosis.theta)
     lines += unlike_notes(diagnosis.robot_clusters, diagnosis.drive_names)
@@ -52,7 +60,7 @@ def decisive(worth: EffectSize) -> float:
 
 
 def may_matter(worth: EffectSize) -> bool:
-    """Whether these drives leave it open that an effect matters."""
+    """Tell whether these drives leave it open that an effect matters."""
     return any(one.interval[1] >= RULES.material_factor for one in worth.values())
 
 
@@ -106,14 +114,14 @@ def _cautions(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.multistep is not None:
         ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.multistep.ratios.items())
         lines.append(
-            f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps; ratio "
-            f"of the errors on blocks left out: {ratios}"
+            f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps; ratio of "
+            f"the errors on blocks left out: {ratios}"
         )
     return lines
 
 
 def next_drives(diagnosis: Diagnosis) -> list[str]:
-    """What to drive next, a line each; nothing where there is nothing to tell apart."""
+    """Say what to drive next, a line each; nothing where there is nothing to tell apart."""
     next_drive = diagnosis.manoeuvre
     if next_drive is None:
         return []
@@ -127,3 +135,99 @@ def next_drives(diagnosis: Diagnosis) -> list[str]:
     if next_drive.times > 1:
         lines.append(f"to tell noise from what is missing, drive this {often}")
     return lines
+
+
+def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -> list[str]:
+    """Say what is wrong with the clocks and what to do; where a delay was fitted, that an offset looks the same."""
+    notes = [note for own in clocks for note in (*_say_offset(own), *_say_drives(own), *_say_jumps(own))]
+    notes = [f"clocks of {log}: {note}" for note in notes]
+    declared = next((own.declared_s for own in clocks), None)
+    if declared is not None:
+        notes.append(
+            f"poses of {log} are stamped {declared:.3g} s later than commands, as it declares; that was taken out"
+        )
+    elif "delay" in theta:
+        notes.append(
+            "delay and an offset between the clocks of commands and poses are one number: the delay is the "
+            "robot's only if one clock stamped both"
+        )
+    return notes
+
+
+def _say_offset(clocks: Clocks) -> list[str]:
+    if not clocks.offset.value:
+        return []
+    latency, offset, assumed = clocks.latency, clocks.offset, clocks.assumed_delay_s
+    lag = (
+        f"motion comes {-latency.value:.2f} s before its command, which no robot does"
+        if latency.value < 0.0
+        else f"motion comes {latency.value:.2f} s after its command"
+    )
+    early = "early" if offset.value < 0.0 else "late"
+    return [
+        f"{lag}; poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)}) if the robot's delay "
+        f"is {assumed:.2f} s; this was corrected. Stamp both with one clock, or move the poses yourself"
+    ]
+
+
+def _say_drives(clocks: Clocks) -> list[str]:
+    return [
+        f"in drive {name} poses are stamped {abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} "
+        f"({_ends_s(one)}) than in the others; this was corrected. Check how its clocks were set"
+        for name, one in clocks.drives.items()
+    ]
+
+
+def _say_jumps(clocks: Clocks) -> list[str]:
+    return [
+        f"in drive {jump.drive} the clock jumps at about {jump.time_s:.0f} s: poses are stamped {abs(jump.by_s):.2f} s "
+        f"{'earlier' if jump.by_s < 0.0 else 'later'} from then on; only the longest stretch without a jump was used. "
+        "Keep clocks from being set during a drive"
+        for jump in clocks.jumps
+    ]
+
+
+def _ends_s(offset: Offset) -> str:
+    return f"{abs(offset.interval[0]):.2f} to {abs(offset.interval[1]):.2f}"
+
+
+def unlike_notes(unlike: RobotClusters | None, names: Sequence[str]) -> list[str]:
+    """One sentence that names the groups and says what to do."""
+    if unlike is None:
+        return []
+    parts = [
+        f"{gain:.2f} in {', '.join(names[number] for number in group)}"
+        for gain, group in zip(unlike.gains, unlike.groups, strict=True)
+    ]
+    return [
+        f"drives disagree: the {unlike.wheel} wheel's gain is {' but '.join(parts)}, as if of two robots, or of "
+        "one on two floors; no result here holds for both: diagnose each group alone, or find what changed"
+    ]
+
+
+def learnt_notes(learning: Learning) -> list[str]:
+    """Say what was learnt; nothing where nothing was."""
+    beside = learning.discrepancy
+    notes = []
+    curves = ", ".join(f"{title} ({100.0 * beside.share[title]:.0f} %)" for title in beside.share)
+    if beside.used:
+        worth = "; ".join(
+            f"{error.horizon_s:g} s: {1e3 * error.after.value:.1f} mm, {error.ratio.value:.2f} "
+            f"({error.ratio.interval[0]:.2f} … {error.ratio.interval[1]:.2f}) of that with names alone"
+            for error in learning.errors
+        )
+        notes.append(f"learnt, not physics: curves over {curves}; position error with them at {worth}")
+    elif beside.theta:
+        notes.append(f"curves over {curves} were tried and dropped: they do not clearly help on drives left out")
+    if learning.looks_like is not None:
+        like = learning.looks_like
+        values = ", ".join(f"{name} {value:.3g}" for name, value in like.theta.items())
+        notes.append(
+            f"the curves look like {like.effect} ({values}), which alone keeps {100.0 * like.share:.0f} % of it"
+        )
+    if learning.names_doubtful:
+        notes.append(
+            "beware: curves beside the declared model predict better than beside the named effects: the names are "
+            "likely wrong"
+        )
+    return notes

@@ -1,4 +1,4 @@
-"""The moving picture of an episode: proxy and target next to each other, frame by frame."""
+"""Moving picture of an episode: proxy and target next to each other, frame by frame."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,17 +12,16 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from proxytune.report.drive.path import draw_start
-from proxytune.report.drive.scene import COLOURS, draw_map
-from proxytune.report.style import dress, plain
+from proxytune.arrays import Floats
+from proxytune.report.drive.scene import COLOURS, draw_map, draw_start
+from proxytune.report.figure_style import dress
+from proxytune.report.wording import plain
 from proxytune.study import RecordedEpisode, SideBySide
 
 FRAME_HZ = 10
 """Frames a second, of the episode and of who watches it."""
-
 SIDE_INCH, HEIGHT_INCH, DPI = 3.4, 5.6, 100
 """Size of a side; all is an even number of pixels, as video encoders ask for."""
-
 LINGER_S = 1.0
 """The last frame stays so long [s]."""
 
@@ -52,7 +51,7 @@ class Animation:
         return [self.frame(self.times[place]) for place in (0, len(self.times) // 2, -1)]
 
     def frame(self, time: float) -> NDArray[np.uint8]:
-        """What is seen at a time [s], (rows, columns, 3)."""
+        """Frame of a time [s], (rows, columns, 3)."""
         self._canvas.restore_region(self._still)
         for view in self._views:
             view.show(time)
@@ -134,13 +133,13 @@ def _bars(figure: SubFigure, pair: SideBySide, side: str) -> Mapping[str, Line2D
     return {channel: axes.plot([place] * 2, [0.0, 0.0], **look)[0] for place, channel in enumerate(channels)}
 
 
-def _row(times: NDArray[np.float64], time: float) -> int:
+def _row(times: Floats, time: float) -> int:
     """The last row that is not later than a time [s]; rounding does not make it an earlier one."""
     return max(0, int(np.searchsorted(times, time + 1e-6, side="right")) - 1)
 
 
 def _heading(episode: RecordedEpisode, row: int) -> float:
-    """Where the robot is headed [rad]; along its path where no heading was recorded."""
+    """Heading of the robot [rad]; along its path where no heading was recorded."""
     if "heading" in episode.poses:
         return float(episode.poses["heading"][row])
     step = np.subtract(*episode.places[[max(row, 1), max(row, 1) - 1]])

@@ -1,22 +1,67 @@
-"""The still picture of an episode: the map with both paths, commands over time, and what the cameras saw."""
+"""Still picture of an episode, its scores in proxy and target, and when the two part."""
 
 import functools
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure, SubFigure
+from rich.table import Table as TerminalTable
 
-from proxytune.report.drive.path import draw_parting, draw_paths
-from proxytune.report.drive.scene import COLOURS, draw_map, map_aspect
-from proxytune.report.numbers import short
-from proxytune.report.style import COLUMN, GREY, LIGHT_GREY, dress, plain
+from proxytune.report.drive.scene import COLOURS, draw_map, draw_parting, draw_paths, map_aspect
+from proxytune.report.figure_style import COLUMN, GREY, LIGHT_GREY, dress
+from proxytune.report.text import table_text
+from proxytune.report.view import Table, columns_of
+from proxytune.report.wording import plain, short, with_unit
 from proxytune.study import APART_M, SideBySide
+
+
+def episode_document(pair: SideBySide, study_seed: int) -> dict[str, Any]:
+    """Scores as plain numbers.
+
+    Args:
+        pair: The episode.
+        study_seed: From which its own is derived, as study.toml and `--seed` have it.
+    """
+    return {
+        "agent": pair.episode.agent,
+        "start": pair.episode.start,
+        "seed": study_seed,
+        "theta": dict(pair.episode.theta),
+        "proxy": {"metrics": dict(pair.proxy.metrics)},
+        "target": None if pair.target is None else {"metrics": dict(pair.target.metrics)},
+        "parted_s": pair.parted_s,
+    }
+
+
+def episode_text(pair: SideBySide, first: Sequence[str]) -> TerminalTable:
+    """A row for each metric, those that the study compares first."""
+    names = [*first, *(name for name in pair.proxy.metrics if name not in first)]
+    rows = tuple(
+        (
+            with_unit(name, pair.units[name]),
+            *(short(side.metrics[name]) if name in side.metrics else "" for side in pair.sides.values()),
+        )
+        for name in names
+    )
+    return table_text(Table("", columns_of(("metric",), list(pair.sides)), rows))
+
+
+def say_parting(pair: SideBySide) -> str:
+    """Say when proxy and target part; empty where that cannot be told."""
+    if pair.target is None:
+        return ""
+    if not (pair.proxy.has_places and pair.target.has_places):
+        return "The domain family keeps no places (x, y): where proxy and target part cannot be told."
+    if pair.parted_s is None:
+        return f"Their places stay within {100.0 * APART_M:g} cm of each other while both drive."
+    return f"Their places are first more than {100.0 * APART_M:g} cm apart at {pair.parted_s:.1f} s."
+
 
 CHANNEL_INCH, PICTURES_INCH, LINE_INCH = 0.62, 0.62, 0.13
 """Heights of a channel of commands, of a row of pictures, and of a line of text."""
-
 INSTANTS = 4
-"""How many pictures of each camera are shown."""
+"""Number of pictures shown of each camera."""
 
 
 def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
@@ -76,14 +121,9 @@ def _draw_commands(pair: SideBySide, figure: SubFigure) -> None:
         panels[0].annotate(
             f"{100 * APART_M:g} cm apart at {pair.parted_s:.1f} s (ring on the map)",
             (pair.parted_s, 1.0), xytext=(0, 2), xycoords=("data", "axes fraction"), textcoords="offset points",
-            ha=_inwards(pair.parted_s, pair.proxy.seconds), fontsize=7,
+            ha="left" if pair.parted_s < pair.proxy.seconds / 2.0 else "right", fontsize=7,
         )  # fmt: skip
     panels[-1].set_xlabel("time [s]", fontsize=7)
-
-
-def _inwards(time: float, end: float) -> str:
-    """How a text is aligned on a time, so that it stays within the axes."""
-    return "left" if time < end / 2.0 else "right"
 
 
 def _draw_pictures(pair: SideBySide, figure: SubFigure) -> None:

@@ -1,8 +1,9 @@
-"""Frames as a file: a GIF by Pillow, an MP4 by ffmpeg."""
+"""Episodes as files, by what the file is called: a PNG, a GIF by Pillow, an MP4 by ffmpeg."""
 
 import contextlib
 import importlib
 import logging
+import os
 import shutil
 import subprocess
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,13 +17,66 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from proxytune.errors import InputError, RunError
-from proxytune.report.writing import write_movie
+from proxytune.report.drive.animation import FRAME_HZ, Animation
+from proxytune.report.drive.figure import episode_figure
+from proxytune.report.writing import save_figure, write_movie
+from proxytune.running import Bars, Watcher
+from proxytune.study import SideBySide
 
 Frame = NDArray[np.uint8]
-COLOURS = 64
+PALETTE_SIZE = 64
 """In a GIF's palette, which all of its frames share: what does not move is then not stored again."""
-
 DPI = 100.0
+STILL, GIF, MP4 = ".png", ".gif", ".mp4"
+NO_PLACES = "nothing can be drawn, as this study's domain family records no x and y"
+
+
+def check_episode_file(path: Path) -> None:
+    """Refuse a file that cannot be written, before anything is simulated for it.
+
+    Raises:
+        InputError: If its format is unknown, its writer is missing, or its folder cannot be written to.
+    """
+    if path.suffix.lower() not in (STILL, GIF, MP4):
+        raise InputError(f"--output {path}: unknown format '{path.suffix}'; end the name in {STILL}, {GIF} or {MP4}")
+    folder = next(parent for parent in path.absolute().parents if parent.exists())
+    if path.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(f"--output {path}: cannot be written there; choose another place")
+    if path.suffix.lower() == MP4:
+        find_ffmpeg()
+
+
+def write_episode(pair: SideBySide, metrics: Sequence[str], path: Path) -> None:
+    """Write a still picture, or an animation whose frames are counted on standard error.
+
+    Args:
+        pair: The episode.
+        metrics: Those that a still picture shows.
+        path: Where to; its ending says as what.
+
+    Raises:
+        InputError: If it is not known where the robots were.
+        RunError: If it cannot be written.
+    """
+    if not all(episode.has_places for episode in pair.sides.values()):
+        raise InputError(f"--output {path}: {NO_PLACES}; leave the option out to see its metrics")
+    if path.suffix.lower() == STILL:
+        save_figure(episode_figure(pair, metrics), path)
+        return
+    animation = Animation(pair)
+    with Bars(len(animation.times), "frames") as bars:
+        bars.begin("drawing", 0)
+        frames = _count_frames(animation, bars)
+        if path.suffix.lower() == MP4:
+            write_mp4(path, frames, FRAME_HZ)
+        else:
+            write_gif(path, frames, animation.samples(), FRAME_HZ)
+
+
+def _count_frames(animation: Animation, watcher: Watcher) -> Iterator[Frame]:
+    for time in animation.times:
+        yield animation.frame(time)
+        watcher.episode()
 
 
 def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], frame_hz: float) -> None:
@@ -38,18 +92,14 @@ def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], fra
         RunError: If it cannot be written.
     """
     # Without k-means the white of the ground turns grey where pictures have many colours
-    palette = Image.fromarray(np.concatenate(list(samples))).quantize(COLOURS, kmeans=2, dither=Image.Dither.NONE)
-    pictures = _with_palette(frames, palette)
+    palette = Image.fromarray(np.concatenate(list(samples))).quantize(PALETTE_SIZE, kmeans=2, dither=Image.Dither.NONE)
+    pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     first = next(pictures)
     how = {"save_all": True, "append_images": pictures, "duration": round(1000.0 / frame_hz), "loop": 0}
     write_movie(path, lambda draft: first.save(draft, format="GIF", optimize=True, **how))
 
 
-def _with_palette(frames: Iterable[Frame], palette: Image.Image) -> Iterator[Image.Image]:
-    return (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-
-
-def ffmpeg() -> str:
+def find_ffmpeg() -> str:
     """The program that writes an MP4: the one that is installed, or that of the package imageio-ffmpeg.
 
     Raises:
@@ -71,7 +121,7 @@ def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:
         InputError: If ffmpeg is missing.
         RunError: If it cannot be written.
     """
-    with matplotlib.rc_context({"animation.ffmpeg_path": ffmpeg()}), _quiet():
+    with matplotlib.rc_context({"animation.ffmpeg_path": find_ffmpeg()}), _quiet():
         try:
             write_movie(path, lambda draft: _encode(draft, iter(frames), frame_hz))
         except subprocess.CalledProcessError as problem:

@@ -1,1 +1,1 @@
-"""What was found, written for other simulators and for the robot: URDF, MJCF and ROS parameters."""
+"""Domain instances written for other simulators and for the robot: URDF, MJCF and ROS parameters."""

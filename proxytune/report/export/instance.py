@@ -1,15 +1,16 @@
-"""A domain instance in the figures that other simulators take: wheels, motors, camera and the tracked point."""
+"""Domain instance in the figures that other simulators take, and where each effect goes in each format."""
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from proxytune.driving import CAMERA, CameraFigures, Robot, mounted_camera
 from proxytune.effects import SMALLEST_LIMIT, Effect, effect_of, effects_from
 from proxytune.errors import InputError
-from proxytune.report.export.places import place_of
 from proxytune.space import Theta
 
 Pair = tuple[float, float]
@@ -17,7 +18,7 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Instance:
-    """What is to be written.
+    """A domain instance to be written.
 
     Attributes:
         robot: The robot.
@@ -54,7 +55,7 @@ class Instance:
 
     @property
     def gains(self) -> Pair:
-        """How much faster than nominal the left and right wheels turn."""
+        """Speeds of the left and right wheels as multiples of the nominal."""
         trim = self.value("trim", "trim", 0.0)
         left, right = (self.value("wheel_gain", side, 1.0) for side in ("left", "right"))
         return left * (1.0 - trim), right * (1.0 + trim)
@@ -74,7 +75,7 @@ class Instance:
 
     @property
     def baseline_m(self) -> float:
-        """How far apart the wheels are as the turn rate shows it [m]."""
+        """Distance of the wheels as the turn rate shows it [m]."""
         return self.value("yaw_scrub", "baseline", self.figure("effective_baseline"))
 
     @property
@@ -86,7 +87,7 @@ class Instance:
 
     @property
     def tracked_point(self) -> tuple[float, float, float] | None:
-        """Where the tracked point is ahead of the axle's middle and to its left [m], and how it is turned [rad]."""
+        """Place of the tracked point ahead of the axle's middle and to its left [m], and its turn [rad]."""
         if not {"marker_offset", "heading_offset"} & set(self.effects):
             return None
         forward, left = (self.value("marker_offset", name, 0.0) for name in ("forward", "left"))
@@ -94,8 +95,8 @@ class Instance:
 
 
 @dataclass(frozen=True)
-class Line:
-    """What becomes of one value.
+class ExportLine:
+    """One value and what becomes of it.
 
     Attributes:
         name: Its name in θ.
@@ -117,21 +118,21 @@ class Line:
         return f"{self.name} {self.value:.4g}{unit}{interval}: {self.place or 'NO PLACE, not in this file'}"
 
 
-def lines_of(instance: Instance, form: str) -> list[Line]:
-    """What becomes of every value in a format; those that are neutral need no place."""
+def export_lines(instance: Instance, form: str) -> list[ExportLine]:
+    """Values with what becomes of each in a format; those that are neutral need no place."""
     parameters = instance.robot.catalogue.parameters
     lines = []
     for name, value in sorted(instance.theta.items()):
         parameter, place = parameters.get(name), place_of(effect_of(name), form)
         if place or parameter is None or isinstance(parameter.neutral, str) or value != parameter.neutral:
             unit = parameter.unit if parameter else ""
-            lines.append(Line(name, value, unit, instance.intervals.get(name), place))
+            lines.append(ExportLine(name, value, unit, instance.intervals.get(name), place))
     return lines
 
 
 def header(instance: Instance, form: str) -> list[str]:
-    """What the head of a file says: whose values they are, where each went, and what is not in it."""
-    found = lines_of(instance, form)
+    """Lines of the head of a file: whose values they are, where each went, and what is not in it."""
+    found = export_lines(instance, form)
     placed, left_out = [line for line in found if line.place], [line for line in found if not line.place]
     return [
         f"{instance.robot.name} as proxytune found it: {instance.source}",
@@ -151,3 +152,79 @@ def xml_comment(instance: Instance, form: str, columns: int) -> str:
         columns: By how many its lines are indented.
     """
     return re.sub("-(?=-)", "- ", ("\n" + columns * " ").join(header(instance, form)))
+
+
+FORMATS = ("urdf", "mjcf", "ros")
+"""Formats that can be written, as `export --to` calls it."""
+
+
+class Places(NamedTuple):
+    """Places of an effect, by format; empty where it has no place.
+
+    Attributes:
+        urdf: In a URDF.
+        mjcf: In a MuJoCo model.
+        ros: In ROS parameters.
+    """
+
+    urdf: str = ""
+    mjcf: str = ""
+    ros: str = ""
+
+
+_MOUNT = Places("joint camera_mount", "camera pos and xyaxes", "static_transform base_link to camera")
+_MARKER = Places("link tracked_point", "site tracked_point", "static_transform base_link to tracked_point")
+_NOWHERE = Places()
+PLACES: Mapping[str, Places] = MappingProxyType(
+    {
+        "delay_jitter": _NOWHERE,
+        "dropped_commands": _NOWHERE,
+        "command_quantisation": _NOWHERE,
+        "delay": Places(mjcf="actuator delay"),
+        "slew_rate": Places(ros="max_acceleration"),
+        "driver_map": _NOWHERE,
+        "dead_band": _NOWHERE,
+        "stiction": _NOWHERE,
+        "saturation": Places("joint limit velocity", "actuator ctrlrange", "max_velocity"),
+        "trim": Places("wheel radii", "actuator gainprm", "wheel_radius_multiplier, max_velocity"),
+        "wheel_gain": Places("wheel radii", "actuator gainprm", "wheel_radius_multiplier, max_velocity"),
+        "battery_sag": _NOWHERE,
+        "thermal_fade": _NOWHERE,
+        "motor_lag": Places(mjcf="actuator dynprm"),
+        "backlash": _NOWHERE,
+        "wheel_ripple": _NOWHERE,
+        "yaw_scrub": Places("wheel distance", "wheel distance", "wheel_separation_multiplier, max_velocity"),
+        "understeer": _NOWHERE,
+        "yaw_lag": _NOWHERE,
+        "turn_slip": _NOWHERE,
+        "lateral_slip": _NOWHERE,
+        "cross_coupling": _NOWHERE,
+        "floor_slope": _NOWHERE,
+        "slippery_patch": _NOWHERE,
+        "marker_offset": _MARKER,
+        "heading_offset": _MARKER,
+        "camera_pitch": _MOUNT,
+        "camera_roll": _MOUNT,
+        "camera_yaw": _MOUNT,
+        "camera_height": _MOUNT,
+        "camera_forward": _MOUNT,
+        "field_of_view": Places(mjcf="camera fovy", ros="camera_info k, p"),
+        "lens_distortion": Places(ros="camera_info d"),
+        "lens_centre": Places(ros="camera_info k, p"),
+        "pixel_aspect": Places(ros="camera_info k, p"),
+        "blur": _NOWHERE,
+        "rolling_shutter": _NOWHERE,
+        "camera_latency": _NOWHERE,
+        "defocus": _NOWHERE,
+        "vignetting": _NOWHERE,
+        "exposure": _NOWHERE,
+        "image_noise": _NOWHERE,
+    }
+)
+"""By effect of the catalogue; a user's own effect and what was learnt have no place anywhere."""
+
+
+def place_of(effect: str, form: str) -> str:
+    """Place of an effect in a format; empty where it has no place."""
+    place: str = getattr(PLACES.get(effect, _NOWHERE), form)
+    return place

@@ -11,10 +11,8 @@ from proxytune.report.export.instance import Instance, xml_comment
 
 TIMESTEP_S = 0.0005
 """Short, and integrated explicitly: MuJoCo's implicit integrators push a robot with stiffly driven light wheels."""
-
 SERVO_S = 0.01
 """Time constant of the wheels' servos, with which the robot's mass follows [s]; part of the motors' lag."""
-
 MODEL = Template("""\
 <mujoco model="$name">
   <!-- $comment -->

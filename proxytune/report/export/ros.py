@@ -3,14 +3,13 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxytune.arrays import Floats
 from proxytune.driving import CameraFigures, orientation
 from proxytune.report.export.instance import Instance, header
 
 TIMEOUT_S = 0.5
 """diff_drive_controller's own default of cmd_vel_timeout; no effect says anything about it."""
-
 Rows = list[str]
 
 
@@ -83,7 +82,7 @@ def _camera_info(figures: CameraFigures) -> Rows:
     ]
 
 
-def _transform(child: str, place: tuple[float, float, float], rotation: NDArray[np.float64]) -> Rows:
+def _transform(child: str, place: tuple[float, float, float], rotation: Floats) -> Rows:
     """Parameters of tf2_ros' static_transform_publisher; base_link is the middle of the axle, on the floor."""
     x, y, z, w = _quaternion(rotation)
     rows = [f"{child}_transform:  # x forward, y left, z up, as base_link", "  ros__parameters:"]
@@ -92,8 +91,8 @@ def _transform(child: str, place: tuple[float, float, float], rotation: NDArray[
     return rows + [f"    rotation.{axis}: {_number(value)}" for axis, value in zip("xyzw", (x, y, z, w), strict=True)]
 
 
-def _quaternion(rotation: NDArray[np.float64]) -> tuple[float, float, float, float]:
-    """Of a rotation by less than half a turn, (x, y, z, w)."""
+def _quaternion(rotation: Floats) -> tuple[float, float, float, float]:
+    """Quaternion of a rotation by less than half a turn, (x, y, z, w)."""
     w = math.sqrt(max(1e-12, 1.0 + float(np.trace(rotation)))) / 2.0
     skew = rotation - rotation.T
     return float(skew[2, 1]) / 4.0 / w, float(skew[0, 2]) / 4.0 / w, float(skew[1, 0]) / 4.0 / w, w

@@ -5,8 +5,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from proxytune.arrays import Floats
 from proxytune.driving import (
     AXLES,
     add_little_mass,
@@ -19,8 +19,6 @@ from proxytune.driving import (
     sound_urdf,
 )
 from proxytune.report.export.instance import Instance, xml_comment
-
-Pose = NDArray[np.float64]
 
 
 def urdf_text(instance: Instance) -> str:
@@ -71,7 +69,7 @@ def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: flo
             geometry.set("radius", f"{gain * float(geometry.get('radius', radius_m)):.9g}")
 
 
-def _mount(root: ET.Element, link: str, mount: str, pose: Pose) -> None:
+def _mount(root: ET.Element, link: str, mount: str, pose: Floats) -> None:
     """Fix a link to the robot at a pose in the root link's frame; where there is none of that name, add it."""
     joints = [one for one in root.iter("joint") if _link(one, "child") == link]
     if joints:
@@ -89,7 +87,7 @@ def _root_link(root: ET.Element) -> str:
     return next(name for name in (link.get("name", "") for link in root.findall("link")) if name not in children)
 
 
-def _set_origin(joint: ET.Element, pose: Pose) -> None:
+def _set_origin(joint: ET.Element, pose: Floats) -> None:
     """Write a pose as xyz and rpy, unless it is the one that stands there."""
     if np.allclose(origin_of(joint), pose, atol=1e-12):
         return
@@ -111,7 +109,7 @@ def _link(joint: ET.Element, end: str) -> str:
     return "" if found is None else found.get("link", "")
 
 
-def _pose(rotation: Pose, place: tuple[float, float, float]) -> Pose:
+def _pose(rotation: Floats, place: tuple[float, float, float]) -> Floats:
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rotation, place
     return pose

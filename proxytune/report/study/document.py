@@ -1,12 +1,12 @@
-"""What `study --json` prints; its keys are promises."""
+"""JSON document of a study, as `study --json` prints it; its keys are promises."""
 
+from collections.abc import Mapping
 from typing import Any
 
-from proxytune.report.scores.document import document_of
-from proxytune.report.study.finding import finding_of
-from proxytune.report.study.knowledge_document import intervals_document, knowledge_document
-from proxytune.report.study.verdict import sentence
-from proxytune.search import Importance
+from proxytune.report.scores import score_document
+from proxytune.report.study.sentence import study_sentence
+from proxytune.report.wording import Ends
+from proxytune.search import Knowledge
 from proxytune.storage import TrialRecord
 from proxytune.study import PRPV, Confirmation, Preflight, StudyResult, as_document
 
@@ -15,13 +15,16 @@ def study_document(result: StudyResult) -> dict[str, Any]:
     """A study's result as plain JSON; None where a figure is undefined."""
     return {
         "name": result.study.settings.name,
-        "sentence": sentence(finding_of(result)),
+        "sentence": study_sentence(result),
         "best": _best(result),
         **_worth(result),
         **knowledge_document(result.knowledge),
         "truth": None if result.truth is None else dict(result.truth),
         "cautions": list(result.cautions),
-        "importance": {one.name: _importance(one) for one in result.importances},
+        "importance": {
+            one.name: {"share": one.share, "interval": list(one.interval), "alone": one.alone}
+            for one in result.importances
+        },
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
         "cut_off": {"trials": len(result.cut), "episodes": result.spared[0], "seconds": result.spared[1]},
@@ -34,7 +37,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
 
 def _best(result: StudyResult) -> dict[str, Any]:
     """The answer, what is known of it, and its measures in the trial's own episodes and in fresh ones."""
-    best, learnt, measures = result.best, result.knowledge, document_of(result.best.assessment)
+    best, learnt, measures = result.best, result.knowledge, score_document(result.best.assessment)
     shared = ("prpv", "prpv_normalised", "prpv_interval", "ppv")
     return {
         "index": best.trial.number,
@@ -52,8 +55,8 @@ def _best(result: StudyResult) -> dict[str, Any]:
 
 
 def _worth(result: StudyResult) -> dict[str, Any]:
-    """What PRPV of the answer is held against: of its fresh episodes where they were driven."""
-    measures = document_of(result.judged)
+    """Levels that PRPV of the answer is held against: of its fresh episodes where they were driven."""
+    measures = score_document(result.judged)
     levels = ("noise_floor", "noise_floor_interval", "noise_floor_kind", "at_noise_floor", "chance", "chance_deviation")
     return {
         **{key: measures[key] for key in (*levels, "p_value", "notes")},
@@ -61,15 +64,11 @@ def _worth(result: StudyResult) -> dict[str, Any]:
     }
 
 
-def _importance(one: Importance) -> dict[str, Any]:
-    return {"share": one.share, "interval": list(one.interval), "alone": one.alone}
-
-
 def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any] | None:
-    """What fresh episodes say of the answer and of its rivals."""
+    """Scores of fresh episodes of the answer and of its rivals."""
     if confirmation is None:
         return None
-    measures = document_of(confirmation.answer.assessment) if confirmation.answer.assessment else {}
+    measures = score_document(confirmation.answer.assessment) if confirmation.answer.assessment else {}
     return {
         **{key: measures.get(key) for key in ("prpv", "prpv_normalised", "prpv_interval", "ppv")},
         "optimism": confirmation.answer.optimism,
@@ -100,6 +99,7 @@ def _preflight(preflight: Preflight | None) -> dict[str, Any] | None:
 
 
 def _trial(trial: TrialRecord) -> dict[str, Any]:
+    cut = {"prpv_at_least": trial.bound, "prpv_estimate": trial.estimate, "agents": list(trial.decided)}
     return {
         "index": trial.number,
         "theta": dict(trial.theta),
@@ -108,14 +108,8 @@ def _trial(trial: TrialRecord) -> dict[str, Any]:
         "measures": dict(trial.measures),
         "failed_episodes": trial.failed_episodes,
         "failure": trial.failure or None,
-        "cut_off": _cut(trial),
+        "cut_off": cut if trial.state == "cut" else None,
     }
-
-
-def _cut(trial: TrialRecord) -> dict[str, Any] | None:
-    if trial.state != "cut":
-        return None
-    return {"prpv_at_least": trial.bound, "prpv_estimate": trial.estimate, "agents": list(trial.decided)}
 
 
 def _target(result: StudyResult) -> dict[str, Any]:
@@ -124,3 +118,31 @@ def _target(result: StudyResult) -> dict[str, Any]:
     settings = result.study.settings
     files = {"path": str(settings.target), "files": [str(path) for path in settings.targets]}
     return {**files, "agents": len(target.agents), "episodes_per_agent": counts}
+
+
+def knowledge_document(learnt: Knowledge) -> dict[str, Any]:
+    """Misfit, pairs that trade, what is as good by PRPV, and who tells what; plain numbers, texts and truth values."""
+    misfit, (share, ends) = learnt.misfit, learnt.as_good
+    return {
+        "misfit": {
+            "p_value": misfit.p_value,
+            "fits": None if misfit.fits is None else bool(misfit.fits),
+            "deviance": misfit.deviance,
+            "expected_deviance": misfit.expected,
+        },
+        "trades": [[one, other, float(correlation)] for one, other, correlation in learnt.trades],
+        "as_good": {"region_share": float(share), "theta_interval": intervals_document(ends)},
+        "information": {
+            one.name: {
+                "agents": {name: float(share) for name, share in one.agents},
+                "metrics": {name: float(share) for name, share in one.metrics},
+                "limit": one.limit,
+            }
+            for one in learnt.information
+        },
+    }
+
+
+def intervals_document(intervals: Mapping[str, Ends]) -> dict[str, list[float]]:
+    """The ends of each parameter's interval."""
+    return {name: [float(low), float(high)] for name, (low, high) in intervals.items()}

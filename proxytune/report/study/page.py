@@ -1,43 +1,82 @@
-"""A study as a page: what was found, what to do next, and all that it stands on."""
+"""Page of a study: what was found, what to do next, and all that it stands on; also while it runs."""
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
-from proxytune.report.page.foot import foot_of
-from proxytune.report.page.parts import Page, Picture, Table, Words
-from proxytune.report.study.captions import pictures
-from proxytune.report.study.finding import finding_of
-from proxytune.report.study.information_table import INFORMATION_COLUMNS, information_rows
-from proxytune.report.study.search_rows import search_rows
-from proxytune.report.study.table import INFORMATION, SEARCH, THETA, USEFULNESS
-from proxytune.report.study.theta_table import theta_columns, theta_notes, theta_rows
-from proxytune.report.study.trials_table import trials_table
-from proxytune.report.study.usefulness_table import USEFULNESS_COLUMNS, usefulness_notes, usefulness_rows
-from proxytune.report.study.verdict import answer, next_step
-from proxytune.study import StudyResult, StudySettings
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from proxytune.report.figure_style import BLUE, COLUMN, dress
+from proxytune.report.html import write_page
+from proxytune.report.study.figures import study_figures
+from proxytune.report.study.sentence import finding_of, say_answer, say_next_step
+from proxytune.report.study.tables import INFORMATION, MEASURES, SEARCH, THETA, USEFULNESS, study_tables, trials_table
+from proxytune.report.view import Foot, Paragraphs, Part, Picture, View, foot_of
+from proxytune.report.wording import short
+from proxytune.report.writing import png_of, save_figure
+from proxytune.storage import TrialRecord
+from proxytune.study import LEARNING, StudyResult, StudySettings
+
+TITLES = {
+    "profiles": "What is left of each parameter's range",
+    "convergence": "How the answer improved over the trials",
+    "importance": "Which parameters change PRPV most",
+    "evaluations": "Where the trials were, and what they leave of the box",
+}
+RENEW_S = 5
+WAIT = "wait for the end, which brings intervals and figures; `python -m proxytune plot` draws them as of now."
+CONTINUE = "run the same command to continue: everything finished is kept."
 
 
-def study_page(result: StudyResult, figures: Mapping[str, bytes], command: str = "") -> Page:
-    """A study as a page.
+def write_study_report(result: StudyResult, folder: Path, command: str = "") -> tuple[list[Path], Path]:
+    """Write a study's figures and its page; the paths of both.
+
+    Args:
+        result: What the study has found.
+        folder: Where to.
+        command: What was typed; the study's own command where nothing is given.
+
+    Raises:
+        RunError: If a file cannot be written.
+    """
+    paths, page = list[Path](), folder / "report.html"
+    for name, figure in study_figures(result).items():
+        paths.append(folder / "figures" / f"{name}.png")
+        save_figure(figure, paths[-1])
+    foot = study_foot(result.study.settings, command or None)
+    write_page(page, study_view(result, {path.stem: path.read_bytes() for path in paths}), foot)
+    return paths, page
+
+
+def study_view(result: StudyResult, figures: Mapping[str, bytes]) -> View:
+    """A study: its tables, with the figures beside what they are of.
 
     Args:
         result: What it has found.
         figures: PNG files by the name of the figure, those that there are.
-        command: What was typed; the study's own command where nothing is given.
     """
     finding, settings = finding_of(result), result.study.settings
-    foot = foot_of(command or study_command(settings), study_settings(settings))
-    return Page(settings.name, answer(finding), next_step(finding), _parts(result, figures), foot)
+    drawn, tables = study_pictures(result, figures), study_tables(result)
+    parts = (
+        tables[THETA],
+        drawn.get("profiles"),
+        tables[USEFULNESS],
+        drawn.get("convergence"),
+        tables.get(INFORMATION),
+        drawn.get("importance"),
+        drawn.get("evaluations"),
+        tables[SEARCH],
+        Paragraphs("What PRPV and the intervals are", (_say_meaning(len(settings.agents)),)),
+        trials_table(result.trials, settings.space.names),
+    )
+    present: tuple[Part, ...] = tuple(part for part in parts if part is not None)
+    return View(settings.name, say_answer(finding), say_next_step(finding), present)
 
 
-def study_command(settings: StudySettings) -> str:
-    """The command that runs a study."""
-    return f"python -m proxytune study {shlex.quote(str(settings.home))}"
-
-
-def study_settings(settings: StudySettings) -> list[tuple[str, str]]:
-    """What study.toml says, as names and values."""
-    return [
+def study_foot(settings: StudySettings, command: str | None = None) -> Foot:
+    """The foot of a page of a study: the command, that of `study` if none is given, and what study.toml says."""
+    stated = [
         ("domain family", settings.family),
         ("proxy", settings.proxy.name if settings.proxy else "the family's nominal model"),
         ("target", ", ".join(path.name for path in settings.targets)),
@@ -47,34 +86,92 @@ def study_settings(settings: StudySettings) -> list[tuple[str, str]]:
         ("engine", settings.engine),
         ("seed", str(settings.seed)),
     ]
+    own = f"python -m proxytune study {shlex.quote(str(settings.home))}"
+    return foot_of(own if command is None else command, stated)
 
 
-def _parts(result: StudyResult, figures: Mapping[str, bytes]) -> tuple[Picture | Table | Words, ...]:
-    """What the terminal shows below the sentence, under the same heads, with the figures beside what they are of."""
-    drawn, informed = pictures(result, figures), information_rows(result)
-    theta = Table(THETA, theta_columns(result), tuple(theta_rows(result)), tuple(theta_notes(result)))
-    usefulness = Table(USEFULNESS, USEFULNESS_COLUMNS, tuple(usefulness_rows(result)), tuple(usefulness_notes(result)))
-    information = Table(INFORMATION, INFORMATION_COLUMNS, tuple(informed)) if informed else None
-    parts = (
-        theta,
-        drawn.get("profiles"),
-        usefulness,
-        drawn.get("convergence"),
-        information,
-        drawn.get("importance"),
-        drawn.get("evaluations"),
-        Table(SEARCH, (), tuple(search_rows(result))),
-        Words("What PRPV and the intervals are", (_meaning(result),)),
-        trials_table(result.trials, result.study.settings.space.names),
-    )
-    return tuple(part for part in parts if part is not None)
-
-
-def _meaning(result: StudyResult) -> str:
-    agents = len(result.study.settings.agents)
+def _say_meaning(agents: int) -> str:
     return (
         "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
         f"{agents} agents proxy and target disagree which is the better. The best θ is the visited one of lowest "
         "expected PRPV, given all trials and fresh episodes. The 95 % interval holds the values that agree with every "
         "agent's every metric on the target; “by PRPV alone” those whose PRPV is as low as the best, within noise."
     )
+
+
+def study_pictures(result: StudyResult, figures: Mapping[str, bytes]) -> dict[str, Picture]:
+    """Each figure that there is, by its name, with its caption."""
+    truth = "" if result.truth is None else " The triangle is the θ that made the target."
+    nothing = " Where almost nothing is grey, the parameter is unidentified: these trials exclude almost no value."
+    unidentified = nothing if result.knowledge.unidentified else ""
+    again = result.confirmation is not None and result.confirmation.answer.assessment is not None
+    fresh = " The diamond is the answer in episodes that the search has not seen: only that is free of luck."
+    floor = " What lies within the green band is within noise." if result.floor.value is not None else ""
+    cut = any(trial.bound is not None for trial in result.trials)
+    hollow = "; open ones were stopped early, and theirs is an estimate" if cut else ""
+    captions = {
+        "profiles": "Grey values are excluded (95 %), the others remain; the higher the curve, the more probable the "
+        f"value.{unidentified} The vertical line is the answer.{truth}",
+        "convergence": "The line is the answer so far, the θ of lowest expected score, which need not be the luckiest "
+        f"point.{fresh if again else ''}{floor}",
+        "importance": "A dot is the share in the variance of PRPV over the box that a parameter takes part in; the "
+        "stroke is what it does alone. Lines are 95 % intervals: where they overlap, the order is not known. Where a "
+        "dot stands near the lower end of its line, the true share may well be larger, but hardly smaller.",
+        "evaluations": f"Darker points have lower PRPV{hollow}. The shadow is the 95 % region: where it is "
+        f"long and slanting, two parameters make up for each other. The ring is the answer.{truth}",
+    }
+    return {name: Picture(TITLES[name], image, captions[name]) for name, image in figures.items()}
+
+
+def write_live_page(
+    path: Path, settings: StudySettings, objective: str, trials: Sequence[TrialRecord], doing: str
+) -> None:
+    """Write the page of a study that has not ended, which loads itself again while something is being done.
+
+    Args:
+        path: The file.
+        settings: The study's.
+        objective: The measure that its trials are searched by.
+        trials: Those that have ended, in order.
+        doing: What is being done; "" once the study was stopped.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    view = live_view(settings, objective, trials, doing)
+    write_page(path, view, study_foot(settings), RENEW_S if doing else 0)
+
+
+def live_view(settings: StudySettings, objective: str, trials: Sequence[TrialRecord], doing: str) -> View:
+    """A study under way: the trials so far, without what takes long to compute."""
+    shown: tuple[Part, ...] = ()
+    if trials:
+        measures = tuple(dict.fromkeys((objective, *(MEASURES if objective != LEARNING else ()))))
+        caption = "Each point is a trial; trials that failed or were stopped early have none. The best may be luck."
+        image = png_of(_trials_figure(trials, objective))
+        picture = Picture(f"{objective.upper()} trial by trial", image, caption)
+        shown = (picture, trials_table(trials, tuple(trials[0].theta), measures))
+    sentence = f"{f'Under way: {doing}.' if doing else 'Stopped before its end.'} {_say_best(trials, objective)}"
+    return View(settings.name, sentence, WAIT if doing else CONTINUE, shown)
+
+
+def _say_best(trials: Sequence[TrialRecord], measure: str) -> str:
+    """The trial whose score is best so far."""
+    scored = [trial for trial in trials if trial.state == "finished" and trial.score is not None]
+    if not scored:
+        return "No trial has a score yet."
+    best = min(scored, key=lambda trial: trial.score or 0.0)
+    value = best.measures.get(measure)
+    score = "" if value is None else f", {measure.upper()} {short(value)}, which may be partly luck"
+    return f"Best of {len(trials)} trials so far: trial {best.number}{score}."
+
+
+def _trials_figure(trials: Sequence[TrialRecord], measure: str) -> Figure:
+    figure = Figure(figsize=(COLUMN, 2.2), layout="constrained")
+    axes = figure.subplots()
+    points = [(trial.number, value) for trial in trials if (value := trial.measures.get(measure)) is not None]
+    axes.plot([number for number, _ in points], [value for _, value in points], "o", color=BLUE, markersize=4)
+    axes.set_xlim(0.5, len(trials) + 0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    dress(axes, "trial", measure.upper())
+    return figure

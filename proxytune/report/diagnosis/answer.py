@@ -1,0 +1,230 @@
+"""Answer of a diagnosis, of motion and camera: headline, tables, notes, figures with captions, next step."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from rich.console import Group
+from rich.text import Text
+
+from proxytune.diagnosis import CameraDiagnosis, Diagnosis, Estimate, LogDiagnosis, PictureError
+from proxytune.report.diagnosis.camera_figures import camera_figures
+from proxytune.report.diagnosis.camera_notes import camera_headline, camera_notes
+from proxytune.report.diagnosis.document import camera_noise_floor, diagnosis_document, extended_model_text
+from proxytune.report.diagnosis.figures import motion_figures
+from proxytune.report.diagnosis.notes import motion_headline, motion_notes, next_drives
+from proxytune.report.html import write_page
+from proxytune.report.text import group_texts, table_text
+from proxytune.report.view import Paragraphs, Part, Picture, Table, View, columns_of, foot_of
+from proxytune.report.writing import save_figure, write_text
+
+MOST_TRIED = 8
+"""So many effects that were tried are in the table."""
+NEXT_STEPS = {
+    "nothing missing": "use the fitted values: name model.toml as `proxy` in study.toml, or read it with "
+    "`python -m proxytune predict`.",
+    "explained": "name model.toml as `proxy` in study.toml and tune again with `python -m proxytune study`.",
+    "partly explained": "name model.toml as `proxy` in study.toml and tune again; log more varied drives for the rest.",
+    "unexplained": "log more varied drives, or try effects of your own with --effects.",
+    "cannot be told": "drive the same commands several times, and diagnose the log with these drives in it.",
+}
+"""Steps to do after each verdict, where no manoeuvre would tell more."""
+CAPTIONS = {
+    "error": (
+        "Error of predictions before and after",
+        "Errors on drives kept aside, with 95 % intervals, on logarithmic axes. The nearer the model with the effects "
+        "added is to the green noise floor, the less is missing. Whether an effect helps at a length is told by the "
+        "ratio in the table: its interval should stay below 1.",
+    ),
+    "effect_curve": (
+        "What was added, against what was measured",
+        "Grey is what was measured beyond the declared model. The line of the model with the effects added should "
+        "follow it; the declared one does not.",
+    ),
+    "ranking": (
+        "Evidence for each effect that was tried",
+        "The farther right, the more an effect explains of drives left out. On top those added, in this order, each "
+        "with what it explains beyond those above it; below them what others explain alone: light blue ones fit these "
+        "drives as well as one that was added. At the bottom: free curves over a signal, which need be no physics.",
+    ),
+    "learnt": (
+        "What was learnt where no named effect explains it",
+        "Each curve is what is added to the motion over one signal. It describes these drives and is no physics: "
+        "use it only within the range shown.",
+    ),
+    "residual_over_time": (
+        "Where in time predictions stray",
+        "On drives, or the later part of each, that nothing was fitted to. A curve that rises within the drives is "
+        "something that changes with time, as a battery; one that is level is not.",
+    ),
+    "residual_map": (
+        "Where on the floor predictions stray",
+        "Errors that keep to one place are of the floor or of the tracker there, others of the robot. The maps share "
+        "one logarithmic scale; arrows point where the robot drove.",
+    ),
+    "camera_markings": (
+        "Markings as the model sees them",
+        "Lines are the map's markings as the model projects them. They should lie on the edges in the frame.",
+    ),
+    "camera_displacement": (
+        "How far markings lie from their places",
+        "Arrows point from where the model has the markings to where they are. A pattern that is left over is "
+        "something fixed to the camera, as its lens or its mounting.",
+    ),
+    "camera_ranking": (
+        "Evidence lost with each effect alone",
+        "The farther left, the more an effect explains alone. Those beside the dotted line of “nothing added” "
+        "explain nothing.",
+    ),
+    "camera_error": (
+        "Error of the frames before and after",
+        "On frames kept aside. The effects added help where their points lie below the declared model's.",
+    ),
+}
+"""Title and caption of each figure, in the order in which they are shown."""
+
+
+def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> list[Path]:
+    """Write diagnosis.json, model.toml, figures and page; their paths.
+
+    Args:
+        found: What the log says.
+        folder: Where to.
+        command: What the page's foot says makes it again.
+
+    Raises:
+        RunError: If a file cannot be written.
+    """
+    document, model, page = (folder / name for name in ("diagnosis.json", "model.toml", "report.html"))
+    text = json.dumps(diagnosis_document(found), indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(document, text)
+    write_text(model, extended_model_text(found))
+    figures = {folder / f"{name}.png": figure for name, figure in diagnosis_figures(found).items()}
+    for path, figure in figures.items():
+        save_figure(figure, path)
+    drawn = {path.stem: path.read_bytes() for path in figures}
+    foot = foot_of(command, [("log", found.log), ("robot", found.robot.name)])
+    write_page(page, diagnosis_view(found, drawn), foot)
+    return [document, model, *figures, page]
+
+
+def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, bytes]) -> View:
+    """A diagnosis: the figures by their names, then the tables and all notes."""
+    notes = diagnosis_notes(found)
+    paragraphs = [Paragraphs("What else is to be known", tuple(notes))] if notes else []
+    motion = [] if found.motion is None else _motion_tables(found.motion)
+    camera = [] if found.camera is None else _camera_tables(found.camera)
+    drives, part = [] if found.motion is None else next_drives(found.motion), found.motion or found.camera
+    next_step = f"{'; '.join(drives)}." if drives else NEXT_STEPS[part.verdict] if part else ""
+    parts: tuple[Part, ...] = (*diagnosis_pictures(figures), *motion, *camera, *paragraphs)
+    return View(f"{found.log}: what the model lacks", f"{diagnosis_headline(found)}.", next_step, parts)
+
+
+def diagnosis_text(found: LogDiagnosis) -> Group:
+    """The diagnosis as `diagnose` prints it: of motion, then of the camera, a verdict, tables and notes."""
+    parts: list[Group | Text] = []
+    if found.motion is not None:
+        motion, headline = map(table_text, _motion_tables(found.motion)), motion_headline(found.motion)
+        parts.append(group_texts(Text(headline, style="bold"), *motion, *motion_notes(found.motion)))
+    if found.camera is not None:
+        camera, headline = map(table_text, _camera_tables(found.camera)), camera_headline(found.log, found.camera)
+        parts += [Text("")] if parts else []
+        parts.append(group_texts(Text(headline, style="bold"), *camera, *camera_notes(found.camera)))
+    return group_texts(*parts, *_say_refusals(found))
+
+
+def diagnosis_figures(found: LogDiagnosis) -> dict[str, Figure]:
+    """Every figure that there is something to draw for, by name."""
+    motion = {} if found.motion is None else motion_figures(found.motion)
+    camera = {} if found.camera is None else camera_figures(found.camera)
+    return {**motion, **camera}
+
+
+def diagnosis_headline(found: LogDiagnosis) -> str:
+    """The verdicts and what they mean."""
+    lines = [] if found.motion is None else [motion_headline(found.motion)]
+    return "; ".join([*lines, *([] if found.camera is None else [camera_headline(found.log, found.camera)])])
+
+
+def diagnosis_notes(found: LogDiagnosis) -> list[str]:
+    """Everything that the tables do not hold, a line each."""
+    motion = [] if found.motion is None else motion_notes(found.motion)
+    camera = [] if found.camera is None else camera_notes(found.camera)
+    return [*motion, *camera, *_say_refusals(found)]
+
+
+def _say_refusals(found: LogDiagnosis) -> list[str]:
+    """Say why a part is missing, a line each."""
+    parts = (("motion", found.motion_refused), ("camera", found.camera_refused))
+    return [f"{part}: {why}" for part, why in parts if why]
+
+
+def diagnosis_pictures(figures: Mapping[str, bytes]) -> list[Picture]:
+    """The figures that there are, with captions; one without a caption comes last under its own name."""
+    known = [Picture(title, figures[name], caption) for name, (title, caption) in CAPTIONS.items() if name in figures]
+    return [*known, *(Picture(name, image, "") for name, image in figures.items() if name not in CAPTIONS)]
+
+
+def _motion_tables(diagnosis: Diagnosis) -> list[Table]:
+    """Parameters, errors by length of the window, and the effects tried, best first."""
+
+    def millimetres(value: float, interval: tuple[float, float], heading: float) -> str:
+        return f"{1e3 * value:.1f} [{1e3 * interval[0]:.1f} … {1e3 * interval[1]:.1f}] ({57.2958 * heading:.2f})"
+
+    confirmed = [(diagnosis.confirmed, ", bullet")] if diagnosis.confirmed else []
+    errors = tuple(
+        (
+            f"{error.horizon_s:g} s{plant}",
+            millimetres(error.before.value, error.before.interval, error.heading_before.value),
+            millimetres(error.after.value, error.after.interval, error.heading_after.value),
+            f"{error.ratio.value:.2f} ({error.ratio.interval[0]:.2f} … {error.ratio.interval[1]:.2f})",
+            f"{1e3 * error.floor.lower:.1f} to {1e3 * error.floor.upper:.1f} ({57.2958 * error.heading_floor:.2f})",
+        )
+        for error, plant in [*((error, "") for error in diagnosis.errors), *confirmed]
+    )
+    tried = tuple(
+        (one.effect, one.form, f"{one.gain:.1f}", f"{one.p_value:.3f}") for one in diagnosis.found.tried[:MOST_TRIED]
+    )
+    title, heads = (
+        "Error on held-out drives: RMSE of position [mm] (heading [deg])",
+        ("before", "after", "after / before"),
+    )
+    return [
+        _parameters_table("Fitted parameters", diagnosis.declared, diagnosis.theta),
+        Table(title, columns_of(("window",), (*heads, "noise floor")), errors),
+        Table("Effects tried, best first", columns_of(("effect", "form"), ("log-likelihood gain [nats]", "p")), tried),
+    ]
+
+
+def _camera_tables(diagnosis: CameraDiagnosis) -> list[Table]:
+    """Parameters, and errors on frames kept aside."""
+
+    def with_interval(error: PictureError, decimals: int) -> str:
+        low, high = error.interval
+        return f"{error.value:.{decimals}f} [{low:.{decimals}f} … {high:.{decimals}f}]"
+
+    rows = []
+    for name, error, decimals in (("markings [px]", diagnosis.pixels, 2), ("brightness [grey]", diagnosis.grey, 1)):
+        floor, frames = camera_noise_floor(error), int(np.isfinite(error.before.frames).sum())
+        both = (with_interval(one, decimals) for one in (error.before, error.after))
+        rows.append((name, *both, "" if floor is None else f"{floor:.{decimals}f}", str(frames)))
+    heads = columns_of(("error",), ("before", "after", "floor", "frames"))
+    return [
+        _parameters_table("Fitted parameters of the camera", diagnosis.declared, diagnosis.theta),
+        Table("Error on frames kept aside", heads, tuple(rows)),
+    ]
+
+
+def _parameters_table(title: str, declared: Mapping[str, Estimate], theta: Mapping[str, Estimate]) -> Table:
+    """Fitted parameters before and after effects were added, by name in θ."""
+    rows = []
+    for name, after in theta.items():
+        if name.endswith(".imbalance") and after.value == 0.0:
+            continue
+        low, high = after.interval
+        old = f"{declared[name].value:.4g}" if name in declared else ""
+        rows.append((name, old, f"{after.value:.4g}", f"{low:.4g} … {high:.4g}" if low < high else "", after.unit))
+    heads = columns_of(("parameter",), ("declared only", "effects added", "95 % interval"))
+    return Table(title, (*heads, *columns_of(("unit",))), tuple(rows))

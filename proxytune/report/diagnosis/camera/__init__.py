@@ -1,1 +1,0 @@
-"""What is said and drawn of a camera's diagnosis."""

@@ -1,0 +1,285 @@
+"""Figures of a camera's diagnosis: markings, displacements, what each effect explains alone, errors by frame."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from textwrap import fill
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from proxytune.arrays import Floats
+from proxytune.diagnosis import (
+    LEAST_NATS,
+    CameraDiagnosis,
+    CameraFit,
+    Comparison,
+    Edges,
+    ResidualField,
+    effects_of,
+    project,
+    rank_subsets,
+)
+from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, with_effects
+from proxytune.report.figure_style import BLUE, COLUMN, GREEN, GREY, LIGHT_BLUE, VERMILLION, dress, legend_below
+from proxytune.report.wording import plain
+
+LEAST_LOSS = 1.0
+"""Losses below this are all alike [nats]."""
+
+
+def camera_figures(diagnosis: CameraDiagnosis) -> Mapping[str, Figure]:
+    """Draw everything that a camera's diagnosis has to show, by the name of the figure."""
+    figures = {
+        "camera_markings": markings_figure(diagnosis),
+        "camera_displacement": displacement_figure(diagnosis),
+        "camera_ranking": _ranking_figure(diagnosis),
+        "camera_error": _errors_figure(diagnosis),
+    }
+    return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
+    """Draw what is lost with each effect alone, against all effects together; None where all are declared."""
+    tried = diagnosis.candidates
+    if not tried:
+        return None
+    nothing = loss_of_nothing(diagnosis)
+    figure = Figure(figsize=(COLUMN, 1.3 + 0.16 * len(tried)), layout="constrained")
+    axes = figure.subplots()
+    for place, one in enumerate(tried):
+        name, colour = _role(diagnosis, one.effects)
+        loss = max(one.loss, 0.0)
+        axes.plot([loss, nothing], [place, place], "-", color=colour, lw=0.9, alpha=0.6)
+        axes.plot([loss], [place], "o", color=colour, ms=4, label=name)
+    axes.axvline(max(nothing, 0.0), color=VERMILLION, lw=1.0, ls=":", label="nothing added")
+    axes.axvline(LEAST_NATS, color="0.45", lw=1.0, ls=":", label=f"least that counts, {LEAST_NATS:g} nats")
+    axes.set_yticks(range(len(tried)), [" and ".join(map(plain, one.effects)) for one in tried])
+    axes.set_ylim(len(tried) - 0.4, -0.6)
+    axes.set_xscale("symlog", linthresh=10.0 * LEAST_LOSS, linscale=0.7)
+    axes.set_xlim(-0.5, 1.5 * max(10.0 * LEAST_LOSS, nothing, *(one.loss for one in tried)))
+    label = "evidence lost if only this effect is added [nats]\n0: none against all effects"
+    axes.set_xlabel(label, fontsize=8, loc="right")
+    dress(axes)
+    legend_below(figure, axes)
+    return figure
+
+
+def loss_of_nothing(diagnosis: CameraDiagnosis) -> float:
+    """Loss with the declared effects alone, in the measure that the candidates are ranked by [nats]."""
+    named = diagnosis.named
+    return rank_subsets(named.full, effects_of(named.declared.names), 0)[0].loss
+
+
+def _role(diagnosis: CameraDiagnosis, effects: Sequence[str]) -> tuple[str, str]:
+    if set(effects) <= {effect.effect for effect in diagnosis.effects}:
+        return "added", BLUE
+    if set(effects) <= {rival for effect in diagnosis.effects for rival in effect.rivals}:
+        return "fits as well as what was added", LIGHT_BLUE
+    return "other effect", GREY
+
+
+def _errors_figure(diagnosis: CameraDiagnosis) -> Figure:
+    """Frame by frame on frames kept aside: displacement of markings, and brightness."""
+    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
+    place, grey = figure.subplots(1, 2)
+    bent = [effect.effect for effect in diagnosis.effects if effect.nats is not None]
+    every = [effect.effect for effect in diagnosis.effects]
+    _draw_frames(place, diagnosis.pixels, bent)
+    if diagnosis.pixels.floor is not None:
+        place.axhline(diagnosis.pixels.floor.value, color=GREEN, lw=1.4, label="floor: any camera, mean")
+    _draw_frames(grey, diagnosis.grey, every)
+    place.set_ylabel("displacement\nof markings [px]", fontsize=8)
+    grey.set_ylabel("difference in brightness\n[grey levels]", fontsize=8)
+    legend_below(figure, place, grey)
+    return figure
+
+
+def _draw_frames(axes: Axes, error: Comparison, effects: list[str]) -> None:
+    """Each frame's error before, and after where something was added, the largest error before last."""
+    before, after = error.before.frames, error.after.frames
+    order = np.argsort(before)[: int(np.isfinite(before).sum())]
+    spots = np.arange(1, len(order) + 1)
+    if effects:
+        axes.vlines(spots, before[order], after[order], color=GREY, lw=0.4, alpha=0.6)
+    axes.plot(spots, before[order], ".", color=VERMILLION, ms=3, label=DECLARED_MODEL)
+    if effects:
+        axes.plot(spots, after[order], ".", color=BLUE, ms=3, label="with effects added")
+    axes.set_ylim(bottom=0.0)
+    dress(axes, "frames kept aside,\nby error before")
+
+
+ACROSS = 12
+"""Arrows across the picture."""
+FEWEST = 50
+"""Edge points that an arrow needs."""
+FARTHEST_PX = 6.0
+"""Edges that lie farther off are not those of the map."""
+HELD = 0.05
+"""Part of an arrow along edges, of which nothing is seen, as a share of the points' weight: it is drawn short."""
+KEYS_PX = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+"""Lengths that the scale may show [pixel]."""
+TITLE = 28
+"""Characters in a line above a panel."""
+
+
+class Arrows(NamedTuple):
+    """Displacements (n, 2), right and down [pixel], at places (n, 2) [pixel]."""
+
+    places: Floats
+    lengths: Floats
+
+
+def displacement_figure(diagnosis: CameraDiagnosis) -> Figure:
+    """Mean displacements of the edges above, beneath them what of it is fixed to the camera, all on one scale."""
+    models = camera_models(diagnosis)
+    measured = [measured_displacements(fit) for fit in models.values()]
+    gates = diagnosis.residual_fields if len(models) > 1 else diagnosis.residual_fields[1:]
+    arrows = [*measured, *(_field(diagnosis, gate, own.places) for gate, own in zip(gates, measured, strict=True))]
+    names = [*(fill(f"markings, {name}", TITLE) for name in models), *(_say(gate) for gate in gates)]
+    rows, columns = diagnosis.gathered.pictures.shape[1:3]
+    top = max(0.0, min(float(one.places[:, 1].min(initial=rows)) for one in measured) - 2.0 * columns / ACROSS)
+    down = 2 if len(models) > 1 else 1
+    height = 0.45 + down * (0.35 + 1.45 * (rows - top) / columns)
+    figure = Figure(figsize=(COLUMN, height), layout="constrained")
+    panels = figure.subplots(down, 2, sharex=True, sharey=True, squeeze=False)
+    longest = max(float(np.hypot(*one.lengths.T).max(initial=0.0)) for one in arrows)
+    for number, (axes, one) in enumerate(zip(panels.ravel(), arrows, strict=True)):
+        axes.set(xlim=(0, columns), ylim=(rows, top), aspect="equal")
+        axes.set_title(names[number], fontsize=7)
+        _draw_arrows(axes, one, COLOURS[number % len(models)], longest, columns / ACROSS)
+    label_places(panels)
+    return figure
+
+
+def measured_displacements(fit: CameraFit) -> Arrows:
+    """Mean displacement of the edges in each square of the picture that shows enough of them.
+
+    An edge shows its displacement along its normal alone; edges of all directions together show both.
+    """
+    there, edges, optics = project(fit.views, fit.state), fit.views.edges, fit.views.optics
+    used = there.valid & (np.abs(there.residual) < FARTHEST_PX)
+    side = optics.columns / ACROSS
+    column, row = (np.floor_divide(place[used], side).astype(int) for place in (edges.column, edges.row))
+    cell, normal = row * ACROSS + column, edges.normal[used]
+    count = np.bincount(cell)
+    products = (normal[:, :, None] * normal[:, None, :]).reshape(-1, 4)
+    matrix = _sums(cell, products).reshape(-1, 2, 2) + HELD * count[:, None, None] * np.eye(2) + 1e-9 * np.eye(2)
+    right = _sums(cell, -normal * there.residual[used][:, None])
+    kept = np.flatnonzero(count >= FEWEST)
+    lengths = np.linalg.solve(matrix[kept], right[kept][..., None])[..., 0]
+    places = (np.stack((kept % ACROSS, kept // ACROSS), axis=-1) + 0.5) * side
+    return Arrows(np.asarray(places, dtype=float), np.asarray(lengths, dtype=float))
+
+
+def _sums(cell: NDArray[np.intp], values: Floats) -> Floats:
+    return np.stack([np.bincount(cell, column) for column in values.T], axis=-1)
+
+
+def _field(diagnosis: CameraDiagnosis, gate: ResidualField, places: Floats) -> Arrows:
+    rows, columns = diagnosis.gathered.pictures.shape[1:3]
+    right, down = (2.0 * places / (columns, rows) - 1.0).T
+    return Arrows(places, gate.displacement(right, down))
+
+
+def _say(gate: ResidualField) -> str:
+    share = max(0.0, 100.0 * gate.share)
+    return f"fixed to the camera:\n{gate.rms_px:.2f} px, {share:.0f} % of cost"
+
+
+def _draw_arrows(axes: Axes, arrows: Arrows, colour: str, longest: float, room: float) -> None:
+    """Arrows with one of a round length as their scale; the longest of all panels is as long as there is room."""
+    key = max((one for one in KEYS_PX if one <= longest), default=KEYS_PX[0])
+    quiver = axes.quiver(
+        *arrows.places.T,
+        *arrows.lengths.T,
+        color=colour,
+        angles="xy",
+        scale_units="xy",
+        scale=max(longest, KEYS_PX[0]) / (1.5 * room),
+        width=0.006,
+        pivot="middle",
+    )
+    axes.quiverkey(quiver, 0.88, 0.93, key, f"{key:g} px", labelpos="S", fontproperties={"size": 7})
+
+
+SHOWN = 2
+"""Frames, one of each half of the log."""
+
+
+def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
+    """The frames on which the effects that were added change most, the outlines of the map's markings over them."""
+    models, frames = list(camera_models(diagnosis).items()), telling_frames(diagnosis)
+    down, across = (SHOWN, len(models)) if len(models) > 1 else (1, SHOWN)
+    rows, columns = diagnosis.gathered.pictures.shape[1:3]
+    height = 0.35 + down * (0.2 + 1.4 * rows / columns)
+    figure = Figure(figsize=(COLUMN, height), layout="constrained")
+    panels = figure.subplots(down, across, squeeze=False)
+    shown = product(frames, zip(models, COLOURS, strict=False))
+    for axes, (frame, ((name, fit), colour)) in zip(panels.ravel(), shown, strict=True):
+        axes.imshow(diagnosis.gathered.pictures[frame], extent=(0, columns, rows, 0), interpolation="nearest")
+        draw_outlines(axes, fit, frame, colour)
+        axes.set_title(fill(f"{name}, frame {diagnosis.gathered.numbers[frame]}", TITLE), fontsize=7)
+    label_places(panels)
+    return figure
+
+
+def telling_frames(diagnosis: CameraDiagnosis) -> list[int]:
+    """Frames with many markings, one of each half of the log, on which the error changes most."""
+    before, after, views = diagnosis.pixels.before, diagnosis.pixels.after, diagnosis.named.full.views
+    points = np.bincount(views.edges.frame, minlength=views.count)
+    change = np.nan_to_num(np.abs(before.frames - after.frames)) + 1e-9
+    merit = np.where(points >= np.median(points), change * points, 0.0)
+    halves = np.array_split(np.arange(views.count), SHOWN)
+    return [int(half[np.argmax(merit[half])]) for half in halves]
+
+
+def draw_outlines(axes: Axes, fit: CameraFit, frame: int, colour: str) -> None:
+    """Draw where the model has the markings' edges, as far as edges are compared."""
+    for white in (True, False):
+        columns, rows, distance = outline_field(fit, frame, white)
+        if np.isfinite(distance).any() and np.nanmin(distance) < 0.0 < np.nanmax(distance):
+            axes.contour(columns, rows, distance, levels=[0.0], colors=colour, linewidths=0.9)
+
+
+def outline_field(fit: CameraFit, frame: int, white: bool) -> tuple[Floats, Floats, Floats]:
+    """Signed distance of every pixel from the nearest marking of a colour, NaN where it is too far off to compare.
+
+    Tape, pose and timing of the rows are those of the fit.
+    """
+    optics = fit.views.optics
+    columns, rows = np.meshgrid(np.arange(optics.columns) + 0.5, np.arange(optics.rows) + 0.5)
+    count = columns.size
+    sideways = np.tile((1.0, 0.0), (count, 1))
+    every = Edges(np.full(count, frame), np.full(count, white), columns.ravel(), rows.ravel(), sideways)
+    there = project(replace(fit.views, edges=every), fit.state)
+    distance = np.where(there.near, there.residual, np.nan)
+    return columns, rows, distance.reshape(columns.shape)
+
+
+COLOURS = (VERMILLION, BLUE)
+"""Colours of the declared model, and of the one with effects added."""
+
+
+def camera_models(diagnosis: CameraDiagnosis) -> Mapping[str, CameraFit]:
+    """The declared camera, and the one with what bends it added; one model where only the pictures' look changed.
+
+    Both look at the map as the second one has it, from the same poses: the declared one bends these to hide its faults.
+    """
+    bent = [effect.effect for effect in diagnosis.effects if effect.nats is not None]
+    declared, model = diagnosis.named.declared, diagnosis.named.model
+    before = replace(declared, state=replace(model.state, theta=declared.theta))
+    return {DECLARED_MODEL: before} | ({with_effects(bent): model} if bent else {})
+
+
+def label_places(panels: NDArray[np.object_]) -> None:
+    """Say once along each side of a grid of pictures what its axes are."""
+    for axes in panels.ravel():
+        axes.tick_params(labelsize=7)
+    for axes in panels[-1]:
+        axes.set_xlabel("column [px]", fontsize=8)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("row [px]", fontsize=8)

@@ -1,0 +1,262 @@
+"""Figures of how far predictions stray from what was measured: by length, over time, over the floor."""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import Collection, LineCollection
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from proxytune.diagnosis import Diagnosis, Drives, Floats, Rmse, Whole, cut, pose_errors
+from proxytune.report.figure_style import BLUE, COLUMN, GREEN, GREY, VERMILLION, dress, legend_below, write_plain
+from proxytune.report.wording import plain
+from proxytune.space import Theta
+
+DECLARED_MODEL = "declared model"
+LONGEST = 45
+"""Characters of added effects that are named one by one."""
+
+
+def extended_name(diagnosis: Diagnosis) -> str:
+    """The extended model's name in a legend."""
+    return with_effects([effect.effect for effect in diagnosis.effects])
+
+
+def with_effects(effects: Sequence[str]) -> str:
+    """The name of a model with these effects added."""
+    names = ", ".join(map(plain, effects))
+    return f"with {names}" if len(names) < LONGEST else f"with {len(effects)} effects added"
+
+
+def error_figure(diagnosis: Diagnosis) -> Figure:
+    """Draw errors of position and heading by horizon with 95 % intervals, on logarithmic axes, over the noise floor."""
+    figure = Figure(figsize=(COLUMN, 2.6), layout="constrained")
+    place, heading = figure.subplots(1, 2)
+    errors, spots = diagnosis.errors, np.arange(len(diagnosis.errors))
+    positions = [[error.before for error in errors], [error.after for error in errors]]
+    headings = [[error.heading_before for error in errors], [error.heading_after for error in errors]]
+    brackets = [(1e3 * error.floor.lower, 1e3 * error.floor.upper) for error in errors]
+    level = [(np.degrees(error.heading_floor),) * 2 for error in errors]
+    models = [(DECLARED_MODEL, VERMILLION, "o", -0.1), (extended_name(diagnosis), BLUE, "s", 0.1)]
+    for axes, factor, both, floors in ((place, 1e3, positions, brackets), (heading, 180.0 / np.pi, headings, level)):
+        for rms_errors, model in zip(both, models[: 2 if diagnosis.effects else 1], strict=False):
+            _draw_errors(axes, rms_errors, factor, model)
+        # A bar from the lower to the upper end, a line at the lower.
+        lower, heights = [low for low, _ in floors], [high - low for low, high in floors]
+        axes.bar(spots, heights, 0.5, lower, color=GREEN, alpha=0.2, zorder=0)
+        name = "noise floor: poses alone, to upper end"
+        axes.hlines(lower, spots - 0.25, spots + 0.25, color=GREEN, lw=1.4, label=name)
+        # Small errors are seen beside large ones, and the floor off the axis' end.
+        axes.use_sticky_edges = False
+        axes.margins(y=0.08)
+        axes.set_yscale("log", nonpositive="clip")
+        write_plain(axes.yaxis)
+        axes.set_xticks(range(len(errors)), [f"{error.horizon_s:g}" for error in errors])
+        axes.set_xlim(-0.5, len(errors) - 0.5)
+        dress(axes, "prediction length [s]")
+    place.set_ylabel("position error, RMS [mm]", fontsize=8)
+    heading.set_ylabel("heading error, RMS [deg]", fontsize=8)
+    legend_below(figure, place)
+    return figure
+
+
+def _draw_errors(axes: Axes, rms_errors: Sequence[Rmse], factor: float, model: tuple[str, str, str, float]) -> None:
+    """Values with their intervals, where those are finite, in the name, colour, marker and place of a model."""
+    name, colour, marker, shift = model
+    values = factor * np.array([one.value for one in rms_errors])
+    ends = factor * np.array([one.interval for one in rms_errors])
+    ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True), ends, values[:, None])
+    arms = np.maximum(0.0, np.stack((values - ends[:, 0], ends[:, 1] - values)))
+    look: dict[str, Any] = {"fmt": marker, "color": colour, "ms": 4, "capsize": 2, "lw": 1.0}
+    axes.errorbar(np.arange(len(rms_errors)) + shift, values, yerr=arms, label=name, **look)
+
+
+HORIZON_S = 2.0
+"""Length of the windows [s], where drives last so long; else the nearest at which an error is told."""
+FEW_WINDOWS = 3
+"""With fewer windows at a time than this, each episode has a line of its own."""
+TIMES = 60
+"""No more times than this along a curve of medians."""
+SHORT_TIMES = 10
+"""Times within episodes that are hardly longer than a window."""
+MANY_WINDOWS = 400
+"""More windows than this would hide each other on a map: the floor is cut into squares."""
+WIDE = 1.6
+"""Floors longer in x than so many times their length in y are drawn above each other."""
+TITLE = 26
+"""Characters in a line above a map."""
+TALLEST = 3.0
+"""Height of a map at most [inch]."""
+TINIEST_MM = 1e-3
+"""Distances below this are drawn as this."""
+BEFORE_END = 4
+"""The direction at the end of a path is that of so many poses."""
+SQUARES = 60
+"""So many squares along the longer side of the floor."""
+
+
+class Strayed(NamedTuple):
+    """Distances of predictions in windows (W,) and at the poses (M,) in them.
+
+    Attributes:
+        horizon_s: How long the windows are [s].
+        window: The window of each pose (M,).
+        increment: The increment that ends with it (M,).
+        distance: From the predicted pose to the measured one (M,) [mm].
+        rms: Its root mean square over each window (W,) [mm].
+    """
+
+    horizon_s: float
+    window: Whole
+    increment: Whole
+    distance: Floats
+    rms: Floats
+
+
+def strayed(diagnosis: Diagnosis) -> dict[str, Strayed]:
+    """Distances of models' predictions on the tested drives, by name in a legend; one model if nothing is added."""
+    tested, found = diagnosis.parts.tested, diagnosis.found
+    models = {DECLARED_MODEL: found.declared.theta}
+    if diagnosis.effects:
+        models[extended_name(diagnosis)] = found.model.theta
+    horizon = min((error.horizon_s for error in diagnosis.errors), key=lambda length: abs(length - HORIZON_S))
+    return {name: _strayed(tested, theta, horizon) for name, theta in models.items()}
+
+
+def _strayed(drives: Drives, theta: Theta, horizon_s: float) -> Strayed:
+    windows = cut(drives, horizon_s)
+    distance = 1e3 * pose_errors(drives, dict(theta), windows)[:, 0]
+    rms = np.sqrt(np.bincount(windows.window, distance**2) / np.bincount(windows.window))
+    return Strayed(horizon_s, windows.window, windows.increment, distance, rms)
+
+
+def residual_over_time(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
+    """Median and band where there are enough windows at a time, else a line per episode."""
+    figure = Figure(figsize=(COLUMN, 2.4), layout="constrained")
+    axes = figure.subplots()
+    for (name, one), colour, width in zip(both.items(), (VERMILLION, BLUE), (2.0, 1.2), strict=False):
+        for number, (times, distance) in enumerate(_lines(axes, drives, one, colour)):
+            axes.plot(times, distance, color=colour, lw=width, label=name if number == 0 else None)
+    axes.set_ylim(bottom=0.0)
+    # Why the axis does not begin at the start, where no drive is measured in the first quarter of the time.
+    begins_late = drives.first.min() > 0.25 * drives.last.max()
+    late = "\nlater part of each drive: the first was fitted" if begins_late else ""
+    dress(axes, f"time in the episode [s]{late}", f"distance to prediction\nin {one.horizon_s:g}-s windows [mm]")
+    legend_below(figure, axes)
+    return figure
+
+
+def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tuple[Floats, Floats]]:
+    """Times and distances: the median after its band is drawn, or those of each episode."""
+    times, distance, episode = _in_time(drives, strayed)
+    edges = _edges(times, strayed.horizon_s)
+    place = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(edges) - 2)
+    if np.median(np.bincount(place)) < FEW_WINDOWS:
+        return [(times[episode == own], distance[episode == own]) for own in np.unique(episode)]
+    taken = np.unique(place)
+    low, middle, high = np.transpose([np.quantile(distance[place == one], (0.1, 0.5, 0.9)) for one in taken])
+    centres = ((edges[:-1] + edges[1:]) / 2.0)[taken]
+    axes.fill_between(centres, low, high, color=colour, alpha=0.18, linewidth=0)
+    if not axes.get_legend_handles_labels()[1]:
+        axes.fill_between([], [], color=GREY, alpha=0.3, linewidth=0, label="10 to 90 % round the median")
+    return [(centres, middle)]
+
+
+def _in_time(drives: Drives, strayed: Strayed) -> tuple[Floats, Floats, Whole]:
+    """Time [s], distance [mm] and episode: of windows, or of poses where episodes last hardly longer than a window."""
+    ends = drives.last[strayed.increment] / drives.tick_hz
+    if ends.max() < 2.0 * strayed.horizon_s:
+        return ends, strayed.distance, drives.episode[strayed.increment]
+    first = np.flatnonzero(np.diff(strayed.window, prepend=-1))
+    middle = (drives.first[strayed.increment][first] / drives.tick_hz + np.maximum.reduceat(ends, first)) / 2.0
+    return middle, strayed.rms, drives.episode[strayed.increment][first]
+
+
+def _edges(times: Floats, horizon_s: float) -> Floats:
+    """Steps of time of a window's length, longer where that were too many, shorter where all is within two windows."""
+    span = float(np.ptp(times))
+    step = max(horizon_s, span / TIMES) if span > 2.0 * horizon_s else max(span / SHORT_TIMES, 1e-3)
+    return np.arange(times.min() - step / 2.0, times.max() + step, step)
+
+
+def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
+    """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap.
+
+    All maps share one logarithmic scale. Arrows say in which direction the paths were driven.
+    """
+    before = next(iter(both.values()))
+    extent = np.ptp(drives.poses[before.increment, 1, :2], axis=0)
+    figure, panels = _panels(len(both), extent)
+    scale = _colour_scale(both)
+    for axes, (name, one) in zip(panels, both.items(), strict=True):
+        colours = (_paths if len(one.rms) <= MANY_WINDOWS else _floor)(axes, drives, one, scale)
+        axes.set_title(textwrap.fill(name, TITLE), fontsize=7)
+        axes.set_aspect("equal")
+        dress(axes)
+    bar = figure.colorbar(colours, ax=list(panels), location="bottom", extend="both", aspect=30)
+    write_plain(bar.ax.xaxis)
+    bar.set_label(f"distance to prediction in {before.horizon_s:g}-s windows [mm]", fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    return figure
+
+
+def _colour_scale(both: Mapping[str, Strayed]) -> LogNorm:
+    """From the smallest distances of any model to the largest of all, but for a few; at least a factor of ten."""
+    every = np.concatenate([one.rms for one in both.values()])
+    low, high = np.quantile(every, (0.02, 0.98))
+    high = max(float(high), TINIEST_MM)
+    return LogNorm(max(min(float(low), high / 10.0), high / 1000.0), high)
+
+
+def _panels(count: int, extent: Floats) -> tuple[Figure, list[Axes]]:
+    """Maps above each other, where the floor is long, or side by side."""
+    stacked = count > 1 and extent[0] > WIDE * extent[1]
+    across = 1 if stacked else count
+    tall = float(np.clip(extent[1] / max(extent[0], 1e-9), 0.4, 1.6)) * (COLUMN - 0.5) / across
+    figure = Figure(figsize=(COLUMN, min(tall, TALLEST) * (count // across) + 1.2), layout="constrained")
+    grid = figure.subplots(count // across, across, sharex=True, sharey=True, squeeze=False)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("y [m]", fontsize=8)
+    for axes in grid[-1]:
+        axes.set_xlabel("x [m]", fontsize=8)
+    return figure, list(grid.ravel())
+
+
+def _paths(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> LineCollection:
+    rows = np.split(strayed.increment, np.flatnonzero(np.diff(strayed.window)) + 1)
+    lines = [np.concatenate((drives.poses[own[:1], 0, :2], drives.poses[own, 1, :2])) for own in rows]
+    paths = LineCollection(lines, array=strayed.rms, cmap="viridis", norm=scale, linewidths=1.2, capstyle="round")
+    axes.add_collection(paths)
+    axes.autoscale_view()
+    _arrows(axes, lines)
+    return paths
+
+
+def _arrows(axes: Axes, lines: Sequence[Floats]) -> None:
+    """A small arrow at the end of every path that leads somewhere."""
+    last = np.array([line[-1] for line in lines])
+    along = np.array([line[-1] - line[max(0, len(line) - BEFORE_END)] for line in lines])
+    length = np.hypot(*along.T)
+    if length.max() > 0.0:
+        ahead = along / np.where(length > 0.0, length, 1.0)[:, None]
+        axes.quiver(
+            *last.T, *ahead.T, pivot="mid", angles="xy", scale=40.0, width=0.004,
+            headwidth=9.0, headlength=9.0, headaxislength=8.0, minlength=0.0, color="0.25", zorder=3,
+        )  # fmt: skip
+
+
+def _floor(axes: Axes, drives: Drives, strayed: Strayed, scale: LogNorm) -> Collection:
+    """The mean over squares of the floor."""
+    places = drives.poses[strayed.increment, 1, :2]
+    side = float(np.ptp(places, axis=0).max()) / SQUARES
+    edges = [np.arange(along.min(), along.max() + 2.0 * side, side) for along in places.T]
+    place, shape = np.zeros(len(places), dtype=int), [len(edge) - 1 for edge in edges]
+    for along, edge, cells in zip(places.T, edges, shape, strict=True):
+        place = place * cells + np.clip(np.searchsorted(edge, along, side="right") - 1, 0, cells - 1)
+    count = np.bincount(place, minlength=shape[0] * shape[1])
+    total = np.bincount(place, strayed.rms[strayed.window], minlength=len(count))
+    mean = np.ma.masked_array(total / np.maximum(1, count), count == 0).reshape(shape)
+    return axes.pcolormesh(*edges, mean.T, cmap="viridis", norm=scale, rasterized=True)

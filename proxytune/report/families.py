@@ -1,0 +1,440 @@
+"""Several domain families compared: sentence, tables, figure, page and JSON document."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, NullFormatter
+from rich.console import Group
+
+from proxytune.report.figure_style import BLUE, COLUMN, VERMILLION, dress, legend_below
+from proxytune.report.html import write_page
+from proxytune.report.scores import differences_document, ends_document
+from proxytune.report.study.document import intervals_document
+from proxytune.report.study.page import study_foot
+from proxytune.report.study.sentence import KnownParameter, known_parameters
+from proxytune.report.teaching import UNKNOWN, count, estimate_document
+from proxytune.report.text import file_texts, group_texts, note_texts, section_text
+from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
+from proxytune.report.wording import fixed, listed, short, span, with_span
+from proxytune.report.writing import save_figure
+from proxytune.study import Choice, ComparedFamilies, Lesson, TunedFamily, as_document
+from proxytune.usefulness import Assessment, Difference
+
+Row = tuple[str, ...]
+Spread = tuple[float, float | None, float | None]
+"""A value and the ends of its interval; None where an end is not known."""
+USES, THETA = "Which simulator, and for what (95 % intervals)", "Best θ of each"
+NOT_APART = "cannot be told from it"
+CAPTION = (
+    "A row per family, each at the best θ that was found in the same time; lines are 95 % intervals, without an end "
+    "that is not known. Filled circles are best, open ones cannot be told from them, squares are worse. Differences "
+    "are judged episode by episode (PRPV, time) or draw by draw of the learning curves (PLV), so that they can be told "
+    "though the lines overlap."
+)
+BEST, ALIKE, WORSE = "best", NOT_APART, "worse"
+LOOKS = {BEST: ("o", BLUE, BLUE), ALIKE: ("o", BLUE, "white"), WORSE: ("s", VERMILLION, VERMILLION)}
+"""Marker, colour of its edge and of its face: told apart without colours too."""
+LONGEST = 16
+"""Characters of a name in one line."""
+
+
+def families_sentence(compared: ComparedFamilies) -> str:
+    """Say what to use to predict, to teach and where time is short, and what to do next."""
+    return f"{families_answer(compared)} Next: {families_next_step(compared)}"
+
+
+def families_answer(compared: ComparedFamilies) -> str:
+    """Say what to use to predict, to teach and where time is short."""
+    teach = [f"To teach: {_say_teaching(compared)}."] if compared.settings.teaching else []
+    return " ".join([f"To predict: {_say_predicting(compared)}.", *teach, f"Cheapest: {_say_cost(compared)}."])
+
+
+def families_next_step(compared: ComparedFamilies) -> str:
+    """The step that brings most."""
+    choice, fresh = compared.predicts, {one.name: one.fresh for one in compared.families}
+    best = fresh.get(choice.best or "")
+    if best is None:
+        return "run the study again, to drive every family's best θ afresh."
+    if best.chance.explains:
+        return f"raise stop.wall_time_s (now {compared.settings.stop.wall_time_s:g}), or add agents that differ more."
+    told = "raise starts and measure the target from them too"
+    if not choice.alike:
+        home = next(one.result.study.settings.home for one in compared.families if one.name == choice.best)
+        return f"use {choice.best} to predict; its page: {home / 'report.html'}."
+    cheap = _cheaper(compared)
+    if cheap:
+        return f"use {cheap} to predict, which costs least of those; to tell them apart, {told}."
+    return f"to tell {listed([choice.best or '', *choice.alike])} apart, {told}."
+
+
+def prpv_text(fresh: Assessment) -> str:
+    """PRPV with its interval."""
+    return with_span(str(fresh.prpv.value), fresh.prpv_interval.low, fresh.prpv_interval.high)
+
+
+def difference_text(one: Difference) -> str:
+    """Difference of one PRPV above another, with its interval."""
+    ends = "" if one.low is None or one.high is None else f" ({fixed(one.low, 0)} to {fixed(one.high, 0)})"
+    return f"+{one.value}{ends}"
+
+
+def seconds_text(value: float, low: float, high: float) -> str:
+    """Seconds, or a ratio, with its interval."""
+    return f"{_rounded(value)} ({_rounded(low)} to {_rounded(high)})"
+
+
+def _rounded(value: float) -> str:
+    """Two significant figures."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def more_text(lesson: Lesson) -> str:
+    """Target samples that it takes more, with the interval; why that is not known."""
+    if lesson.failure:
+        return "cannot teach"
+    return "" if lesson.more is None else count(lesson.more, UNKNOWN)
+
+
+def differences(compared: ComparedFamilies) -> dict[str, Difference]:
+    """Differences of the PRPV of each family above the lowest, by name."""
+    found = compared.selection.differences if compared.selection else ()
+    return {one.worse: one for one in found if one.better == compared.predicts.best}
+
+
+def _say_predicting(compared: ComparedFamilies) -> str:
+    choice = compared.predicts
+    fresh = next((one.fresh for one in compared.families if one.name == choice.best), None)
+    if fresh is None or compared.selection is None:
+        return "not known, since no family has fresh episodes"
+    score = f"fresh PRPV (proxy relative predictivity value) {prpv_text(fresh)}"
+    if fresh.chance.explains:
+        return f"none is shown to be better than chance; lowest is {choice.best}, {score}"
+    if compared.selection.reason:
+        return f"{choice.best}, {score}; by how much is not known: {compared.selection.reason}"
+    more = differences(compared)
+    alike = [f"{name} {difference_text(more[name])}" for name in choice.alike]
+    worse = [f"{name} {difference_text(one)}" for name, one in more.items() if name not in choice.alike]
+    return _join_clauses(f"{choice.best}, {score}", "worse", worse, alike)
+
+
+def _say_teaching(compared: ComparedFamilies) -> str:
+    choice, lessons = compared.teaches, compared.lessons
+    if choice.best is None:
+        why = "nothing was taught yet" if not lessons else "learners have not converged; raise teaching.target_samples"
+        return f"PLV (proxy learning value) is not known, {why}"
+    highest = lessons[choice.best].plv
+    saved = UNKNOWN if highest is None else count(highest, UNKNOWN)
+    worth = f"PLV (proxy learning value) {saved} target samples saved"
+    if highest is None or not highest.above_zero:
+        return f"none is shown to save target samples; highest is {choice.best}, {worth}"
+    others = [name for name in lessons if name not in (choice.best, *choice.alike)]
+    alike = [f"{name}, {more_text(lessons[name])} more samples" for name in choice.alike]
+    worse = [f"{name}, {_behind(lessons[name])}" for name in others]
+    return _join_clauses(f"{choice.best}, {worth}", "worse", worse, alike)
+
+
+def _behind(lesson: Lesson) -> str:
+    if lesson.failure:
+        return "which cannot teach"
+    return "not converged" if lesson.more is None else f"{more_text(lesson)} more samples"
+
+
+def _say_cost(compared: ComparedFamilies) -> str:
+    choice = compared.cheapest
+    assert choice.best is not None
+    value, *ends = compared.seconds_per_episode()[choice.best]
+    times = {name: seconds_text(*one) for name, one in compared.times_cheapest(choice.best).items()}
+    alike = [f"{name} {times[name]}" for name in choice.alike]
+    worse = [f"{name} {time}" for name, time in times.items() if name not in (choice.best, *choice.alike)]
+    seconds = f"{_rounded(value)} s per episode ({_rounded(ends[0])} to {_rounded(ends[1])})"
+    return _join_clauses(f"{choice.best}, {seconds}", "times as long", worse, alike)
+
+
+def _join_clauses(best: str, how: str, worse: list[str], alike: list[str]) -> str:
+    """The best, how others are worse, and which cannot be told from it."""
+    others = ((how, worse), (NOT_APART, alike))
+    return "; ".join([best, *(f"{head}: {'; '.join(names)}" for head, names in others if names)])
+
+
+def _cheaper(compared: ComparedFamilies) -> str:
+    """Name of the one of those that predict alike whose episodes are shown to take the shortest; empty if none is."""
+    choice = compared.predicts
+    names = [choice.best or "", *choice.alike]
+    means = {name: one[0] for name, one in compared.seconds_per_episode().items() if name in names}
+    cheap = min(means, key=means.__getitem__)
+    others = [one for name, one in compared.times_cheapest(cheap).items() if name in names and name != cheap]
+    return cheap if all(low > 1.0 for _, low, _ in others) else ""
+
+
+def families_text(compared: ComparedFamilies, files: Mapping[str, Any]) -> Group:
+    """Several families as `study` prints them.
+
+    Args:
+        compared: The tuned families.
+        files: What was written.
+    """
+    uses, theta = families_tables(compared)
+    tables = [*section_text(replace(uses, notes=())), *section_text(theta)]
+    return group_texts(families_sentence(compared), *tables, *note_texts(uses.notes), *file_texts(files))
+
+
+def families_tables(compared: ComparedFamilies) -> tuple[Table, Table]:
+    """A column per family: what it predicts, teaches and costs, and its best θ with 95 % intervals."""
+    columns = columns_of(("",), [one.name for one in compared.families])
+    known = [{one.name: one for one in known_parameters(family.result)} for family in compared.families]
+    names = dict.fromkeys(name for one in known for name in one)
+    theta = tuple((name, *(_theta_cell(one.get(name)) for one in known)) for name in names)
+    return Table(USES, columns, tuple(_use_rows(compared)), tuple(use_notes(compared))), Table(THETA, columns, theta)
+
+
+def _use_rows(compared: ComparedFamilies) -> list[Row]:
+    """Rows of what each family predicts, teaches (where that was asked for) and costs, a fact a row."""
+    more, families = differences(compared), compared.families
+    lessons, costs = [compared.lessons.get(one.name) for one in families], compared.seconds_per_episode()
+    taught: list[Row] = []
+    if compared.settings.teaching:
+        behind = ["" if one is None or one.failure else more_text(one) for one in lessons]
+        taught = [("PLV", *map(_plv_cell, lessons)), ("  more than highest", *behind)]
+    return [
+        ("fresh PRPV", *(prpv_text(one.fresh) if one.fresh else UNKNOWN for one in families)),
+        ("  more than lowest", *(difference_text(more[one.name]) if one.name in more else "" for one in families)),
+        *taught,
+        ("seconds per episode", *(seconds_text(*costs[one.name]) for one in families)),
+        ("seconds of tuning", *(short(one.seconds) for one in families)),
+        ("trials", *(str(len(one.result.trials)) for one in families)),
+    ]
+
+
+def _plv_cell(lesson: Lesson | None) -> str:
+    if lesson is None or lesson.plv is None:
+        return more_text(lesson) if lesson and lesson.failure else UNKNOWN
+    return count(lesson.plv, UNKNOWN)
+
+
+def _theta_cell(parameter: KnownParameter | None) -> str:
+    if parameter is None:
+        return ""
+    interval = span(parameter.interval) if parameter.identified else "unidentified"
+    return f"{short(parameter.best, 4)} {parameter.unit}".strip() + f" ({interval})"
+
+
+def use_notes(compared: ComparedFamilies) -> list[str]:
+    """Notes on what the numbers are, and what a family's own study had to say of it."""
+    lines = ["PRPV is of fresh episodes at the best θ, from the same starts and under the same seeds in every family"]
+    lines += [f"{one.name}: {line}" for one in compared.families for line in _say_family(one)]
+    lines += [f"{name}: {one.failure}" for name, one in compared.lessons.items() if one.failure]
+    return lines
+
+
+def _say_family(one: TunedFamily) -> list[str]:
+    """Notes of a family's own study: a misfit, a perfect one, too few trials, and a time that was not spent."""
+    result, settings = one.result, one.result.study.settings
+    time, trials = settings.stop.wall_time_s or 0.0, len(result.trials)
+    lines = ["no θ explains the target's scores: it lacks something"] if result.knowledge.misfit.fits is False else []
+    lines += ["no difference from the target can be seen"] if result.perfect else []
+    few = f"{trials} of the {settings.initial} trials of the design were run in its time: its θ is hardly tuned"
+    lines += [few] if trials < settings.initial else []
+    early = f"{short(one.seconds)} of {time:g} s were spent: {result.stopped or 'its trials have not ended'}"
+    return lines + ([early] if one.seconds < time else [])
+
+
+def write_families_report(compared: ComparedFamilies) -> tuple[Path, Path]:
+    """Draw the figure, and write the page, beside study.toml; the paths of both.
+
+    Raises:
+        RunError: If a file cannot be written.
+    """
+    settings = compared.settings
+    figure, page = settings.home / "figures" / "families.png", settings.home / "report.html"
+    save_figure(families_figure(compared), figure)
+    write_page(page, families_view(compared, figure.read_bytes()), study_foot(settings))
+    return figure, page
+
+
+def families_view(compared: ComparedFamilies, figure: bytes) -> View:
+    """Several families: the figure, both tables, and where each family's own page is.
+
+    Args:
+        compared: The tuned families.
+        figure: The PNG.
+    """
+    settings = compared.settings
+    taught = (
+        "PLV, the proxy learning value, counts the target samples that a learner saves by learning in the family at "
+        "its best θ first.",
+    )
+    meanings = (
+        f"Each family was tuned until the episodes of its trials had taken {settings.stop.wall_time_s:g} s: the last "
+        "trial may take it beyond. Pre-flight and fresh episodes come on top, and so does the search itself. Intervals "
+        "are of the θ found: another seed may find another.",
+        "PRPV, the proxy relative predictivity value, counts on how many ordered pairs of the "
+        f"{len(settings.agents)} agents family and target disagree which is the better, in episodes that no search has "
+        "seen. The intervals of its differences hold for all pairs of families at once.",
+        *(taught if settings.teaching else ()),
+        "Time per episode is of the episodes at the best θ, every agent from every start, on this machine as busy as "
+        "it was then.",
+    )
+    pages = tuple(f"{one.name}: {one.result.study.settings.home / 'report.html'}" for one in compared.families)
+    parts = (
+        Picture("What each family predicts, teaches and costs", figure, CAPTION),
+        *families_tables(compared),
+        Paragraphs("What the numbers are", meanings),
+        Paragraphs("The page of each family", pages),
+    )
+    return View(settings.name, families_answer(compared), families_next_step(compared), parts)
+
+
+def families_document(compared: ComparedFamilies) -> dict[str, Any]:
+    """Several tuned families as plain JSON; None where a figure is undefined."""
+    costs = compared.seconds_per_episode()
+    return {
+        "name": compared.settings.name,
+        "sentence": families_sentence(compared),
+        "best": {
+            "predict": _choice_document(compared.predicts),
+            "teach": _choice_document(compared.teaches) if compared.settings.teaching else None,
+            "cheapest": _choice_document(compared.cheapest),
+        },
+        "seconds_per_family": compared.settings.stop.wall_time_s,
+        "families": {
+            one.name: {**_family_document(one, costs[one.name]), **_lesson_document(compared.lessons.get(one.name))}
+            for one in compared.families
+        },
+        "differences": differences_document(compared.selection),
+        "settings": dict(as_document(compared.settings)),
+    }
+
+
+def _choice_document(choice: Choice) -> dict[str, Any]:
+    return {"family": choice.best, "cannot_be_told_from": list(choice.alike)}
+
+
+def _family_document(one: TunedFamily, cost: tuple[float, float, float]) -> dict[str, Any]:
+    result = one.result
+    settings = result.study.settings
+    return {
+        "family": settings.family,
+        "domain": dict(settings.domain.values),
+        "theta": dict(one.theta),
+        "theta_interval": intervals_document(result.knowledge.intervals),
+        "prpv": round(result.best.trial.prpv or 0.0),
+        "fresh": _fresh_document(one),
+        "seconds_per_episode": cost[0],
+        "seconds_per_episode_interval": list(cost[1:]),
+        "trials": len(result.trials),
+        "seconds": one.seconds,
+        "stopped": result.stopped or None,
+        "cannot_be_told_from_perfect": bool(result.perfect),
+        "fits": result.knowledge.misfit.fits,
+        "folder": str(settings.home),
+    }
+
+
+def _fresh_document(one: TunedFamily) -> dict[str, Any]:
+    fresh = one.fresh
+    if fresh is None:
+        return {"prpv": None, "prpv_interval": None, "noise_floor": None, "chance": None}
+    inner = fresh.prpv_interval
+    return {
+        "prpv": fresh.prpv.value,
+        "prpv_interval": ends_document(inner.low, inner.high),
+        "noise_floor": fresh.noise_floor.value,
+        "chance": fresh.chance.mean,
+    }
+
+
+def _lesson_document(lesson: Lesson | None) -> dict[str, Any]:
+    if lesson is None:
+        return dict.fromkeys(("plv", "plv_interval", "needed", "more", "zero_shot", "cannot_teach"))
+    return {
+        "plv": lesson.plv.value if lesson.plv else None,
+        "plv_interval": [lesson.plv.low, lesson.plv.high] if lesson.plv else None,
+        "needed": estimate_document(lesson.needed),
+        "more": estimate_document(lesson.more),
+        "zero_shot": lesson.zero_shot,
+        "cannot_teach": lesson.failure or None,
+    }
+
+
+class Panel(NamedTuple):
+    """One of the figure's panels.
+
+    Attributes:
+        title: What its axis says.
+        values: Of each family the value and the ends of its interval; None where an end or all of it is not known.
+        choice: Which is best.
+        ratios: Whether ratios count, not differences.
+    """
+
+    title: str
+    values: Mapping[str, Spread | None]
+    choice: Choice
+    ratios: bool = False
+
+
+def families_figure(compared: ComparedFamilies) -> Figure:
+    """Draw each family's fresh PRPV, PLV where there is [teaching], and seconds per episode, with 95 % intervals."""
+    panels, names = _panels(compared), [one.name for one in compared.families]
+    short_names = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in names]
+    figure = Figure(figsize=(COLUMN, 1.0 + 0.24 * len(names)), layout="constrained")
+    drawn = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for axes, panel in zip(drawn, panels, strict=True):
+        _draw(axes, panel, names)
+    drawn[0].set_yticks(range(len(names)), short_names)
+    drawn[0].set_ylim(len(names) - 0.5, -0.5)
+    shown = {_standing(panel, name) for panel in panels for name in names if panel.values.get(name)}
+    for label, (marker, edge, face) in LOOKS.items():
+        if label in shown:
+            drawn[0].plot([], [], marker, color=edge, markerfacecolor=face, markersize=4.5, label=label)
+    legend_below(figure, *drawn)
+    return figure
+
+
+def _panels(compared: ComparedFamilies) -> list[Panel]:
+    prpv: dict[str, Spread | None] = {
+        one.name: (one.fresh.prpv.value, one.fresh.prpv_interval.low, one.fresh.prpv_interval.high)
+        if one.fresh
+        else None
+        for one in compared.families
+    }
+    known = {name: one.plv for name, one in compared.lessons.items() if one.plv and one.plv.value is not None}
+    plv: dict[str, Spread | None] = {name: (one.value or 0.0, one.low, one.high) for name, one in known.items()}
+    taught = [Panel("PLV\n[samples saved]", plv, compared.teaches)] if compared.lessons else []
+    costs = Panel("time per\nepisode [s]", dict(compared.seconds_per_episode()), compared.cheapest, ratios=True)
+    return [Panel("fresh PRPV\n[ordered pairs]", prpv, compared.predicts), *taught, costs]
+
+
+def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
+    for place, name in enumerate(names):
+        value = panel.values.get(name)
+        if value is None:
+            axes.annotate(
+                "not known", (0.5, place), xycoords=("axes fraction", "data"), fontsize=6.5, ha="center", va="center",
+                color="0.3",
+            )  # fmt: skip
+            continue
+        middle, low, high = value
+        marker, edge, face = LOOKS[_standing(panel, name)]
+        ends = [middle if end is None else end for end in (low, high)]
+        axes.plot(ends, [place, place], color=edge, linewidth=1.2)
+        axes.plot([middle], [place], marker, color=edge, markerfacecolor=face, markersize=4.5)
+    dress(axes, panel.title)
+    axes.margins(x=0.15)
+    if panel.ratios:
+        axes.set_xscale("log")
+        # Exponents would be smaller than can be read.
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        return
+    axes.xaxis.set_major_locator(MaxNLocator(3))
+    if not any(end is not None and end < 0.0 for value in panel.values.values() for end in value or ()):
+        axes.set_xlim(left=0.0)
+
+
+def _standing(panel: Panel, name: str) -> str:
+    """Standing of a family in a panel."""
+    return BEST if name == panel.choice.best else ALIKE if name in panel.choice.alike else WORSE

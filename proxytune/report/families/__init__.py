@@ -1,1 +1,0 @@
-"""Several domain families compared: JSON, tables, the figure and the page."""

@@ -1,0 +1,114 @@
+"""Style that figures share: colours, axes, legends, and names of lines beside their ends."""
+
+from collections.abc import Collection, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from proxytune.usefulness import NoiseFloor
+
+BLUE, LIGHT_BLUE, GREEN = "#0072B2", "#56B4E9", "#009E73"  # Okabe and Ito, safe for the colour-blind
+ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
+GREY, LIGHT_GREY = "0.55", "0.9"
+COLUMN = 85.0 / 25.4
+"""Width in inches of a figure that is to be read at 85 mm, one column of a paper."""
+CHARACTERS_PER_INCH, HANDLE = 19, 8
+"""Characters of a legend that fit into an inch, and the space that a line beside them takes, in characters."""
+
+
+def floor_name(floor: NoiseFloor) -> str:
+    """Name of the noise floor in a legend; halves of the target are no noise floor, and are not called so."""
+    return "target's halves" if floor.kind == "halves" else floor.title
+
+
+def dress(axes: Axes, across: str = "", up: str = "") -> None:
+    """Small ticks, no frame, and labels of the axes where they are given."""
+    axes.tick_params(labelsize=7)
+    axes.spines[["top", "right"]].set_visible(False)
+    if across:
+        axes.set_xlabel(across, fontsize=8)
+    if up:
+        axes.set_ylabel(up, fontsize=8)
+
+
+def mark_truth(axes: Axes, value: float) -> None:
+    """A triangle at the top at the value of the θ that made the target."""
+    (mark,) = axes.plot(value, 1.0, "v", color="black", transform=axes.get_xaxis_transform(), label="truth")
+    mark.set(markersize=5, clip_on=False, zorder=4)
+
+
+def write_plain(axis: Axis) -> None:
+    """Ticks of a logarithmic axis at 1, 2 and 5, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def named_handles(panels: Iterable[Axes]) -> dict[str, Any]:
+    """Everything in panels that has a name, each name once."""
+    return {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+
+
+def legend_below(figure: Figure, *panels: Axes, without: Collection[str] = ()) -> None:
+    """One legend under the figure with everything that has a name, each name once, in the columns that fit.
+
+    Args:
+        figure: What it goes under.
+        panels: Whose names are listed.
+        without: Names that stand beside their lines already.
+    """
+    named = {label: handle for label, handle in named_handles(panels).items() if label not in without}
+    longest = max((len(name) for name in named), default=0) + HANDLE
+    columns = max(1, min(3, int(figure.get_figwidth() * CHARACTERS_PER_INCH / longest)))
+    if named:
+        figure.legend(
+            list(named.values()), list(named), loc="outside lower center", ncols=columns, fontsize=7, frameon=False
+        )
+
+
+ONE_LINE = 0.05
+"""Least distance between names of one line, as a share of the panel's height; two lines take more."""
+
+
+class LineName(NamedTuple):
+    """The name of a line, its colour, and the value at which the line ends."""
+
+    text: str
+    colour: str
+    end: float
+
+    @property
+    def words(self) -> str:
+        """The name on one line."""
+        return self.text.replace("\n", " ")
+
+
+def name_lines(axes: Axes, names: Sequence[LineName], apart: float = ONE_LINE) -> None:
+    """Write names right of a panel whose limits are final, moved apart where lines end together."""
+    bottom, top = axes.get_ylim()
+    places = spread_places([(min(max(name.end, bottom), top) - bottom) / (top - bottom) for name in names], apart)
+    for name, place in zip(names, places, strict=True):
+        axes.text(
+            1.02, place, name.text, transform=axes.transAxes, fontsize=7, color=name.colour, va="center", ha="left"
+        )
+
+
+def spread_places(places: Sequence[float], apart: float) -> list[float]:
+    """Places moved as little as it takes to be so far apart, in the same order, from 0 to 1 where they fit there."""
+    order = sorted(range(len(places)), key=lambda row: places[row])
+    moved = np.array([places[row] for row in order])
+    steps = apart * np.arange(len(moved))
+    # Least squares with the order kept: pools of places that touch share their mean.
+    pools: list[list[float]] = []
+    for value in moved - steps:
+        pools.append([float(value)])
+        while len(pools) > 1 and np.mean(pools[-2]) > np.mean(pools[-1]):
+            last = pools.pop()
+            pools[-1] += last
+    most = max(0.0, 1.0 - apart * (len(moved) - 1))
+    found = np.concatenate([np.full(len(pool), np.clip(np.mean(pool), 0.0, most)) for pool in pools]) + steps
+    return [float(found[order.index(row)]) for row in range(len(places))]

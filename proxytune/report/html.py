@@ -1,0 +1,220 @@
+"""Views as one HTML file that needs nothing else: on a desk, on a phone, in the dark and in print."""
+
+import base64
+import html
+import re
+from io import BytesIO
+from pathlib import Path
+from string import Template
+
+from PIL import Image
+
+from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View
+from proxytune.report.writing import write_text
+
+MANY = 12
+"""A page of more parts than this has a table of contents."""
+SMALLEST = 0.47
+"""A picture is made no smaller than this share of its width, so that it can be read; beyond that it scrolls."""
+ENLARGED = 144.0
+"""Pixels of the page to an inch of a figure: 1.5 times its printed size, where 8 pt are the page's 16 pixels."""
+PROSE = 28
+"""A cell of more characters than this is wrapped, and kept wide enough to be read."""
+STYLE = """
+:root { color-scheme: light dark; --paper: #fff; --ink: #1d2126; --soft: #5a626c; --line: #d9dde2; --tint: #f1f5f9;
+  --accent: #0072b2; }
+@media (prefers-color-scheme: dark) {
+  :root { --paper: #15181c; --ink: #e6e8ea; --soft: #a3abb4; --line: #3a414a; --tint: #20262d; --accent: #6cc0f0; }
+}
+* { box-sizing: border-box; }
+html { -webkit-text-size-adjust: 100%; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 52rem; margin: 0 auto; padding: 1.5rem 1rem 3rem;
+  color: var(--ink); background: var(--paper); overflow-wrap: anywhere; }
+h1 { font-size: 1.6rem; line-height: 1.25; margin: 0 0 1rem; }
+h2 { font-size: 1.15rem; margin: 2.5rem 0 .5rem; }
+.answer { font-size: 1.15rem; margin: 0 0 1rem; }
+.following, .under-way { padding: .6rem .9rem; border-left: .25rem solid var(--accent); background: var(--tint); }
+.under-way { border-left-color: #e69f00; }
+figure { margin: 0; }
+figcaption, .notes, footer { color: var(--soft); font-size: .93rem; }
+.notes { padding-left: 1.2rem; }
+.scroll { overflow-x: auto; }
+.scroll:focus-visible { outline: 2px solid var(--accent); }
+.card { display: block; width: fit-content; max-width: 100%; min-width: min-content; background: #fff; padding: .5rem;
+  border: 1px solid var(--line); border-radius: .4rem; }
+img { display: block; max-width: 100%; height: auto; }
+table { border-collapse: collapse; font-size: .93rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; vertical-align: top; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid var(--line);
+  overflow-wrap: normal; }
+thead th { color: var(--soft); vertical-align: bottom; }
+tbody th { font-weight: 600; white-space: pre-wrap; }
+td.prose { min-width: 11rem; }
+table:not(:has(thead)) td { overflow-wrap: anywhere; }
+.number { text-align: right; white-space: nowrap; }
+thead .number { white-space: normal; }
+.unseen { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); white-space: nowrap; }
+pre { background: var(--tint); padding: .6rem .9rem; overflow-x: auto; }
+code { font: .92em/1.5 ui-monospace, monospace; }
+pre code { white-space: pre-wrap; }
+nav ol { columns: 16rem; column-gap: 3rem; padding-left: 1.8rem; }
+nav li { break-inside: avoid; }
+a { color: var(--accent); }
+footer { margin-top: 3rem; border-top: 1px solid var(--line); }
+@media print {
+  :root { color-scheme: light; --paper: #fff; --ink: #000; --soft: #333; --line: #bbb; --tint: #f4f4f4; }
+  body { max-width: none; padding: 0; font-size: 10pt; }
+  .scroll { overflow: visible; }
+  table { font-size: 8.5pt; }
+  th, td { padding-right: .6rem; }
+  td.prose { min-width: 0; }
+  .number { white-space: normal; }
+  img { max-height: 7.5cm; width: auto; min-width: 0 !important; }
+  section, figure, tr, .following { break-inside: avoid; }
+  h2 { break-after: avoid; }
+  thead { display: table-header-group; }
+  nav, .under-way { display: none; }
+}
+"""
+PAGE = Template("""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'">
+$renew<link rel="icon" href="data:,">
+<title>$title</title>
+<style>$style</style>
+</head>
+<body>
+<header>
+<h1>$title</h1>
+$under_way<p class="answer">$answer</p>
+$following</header>
+$contents<main>
+$parts
+</main>
+<footer>
+$foot
+</footer>
+</body>
+</html>
+""")
+
+
+def write_page(path: Path, view: View, foot: Foot, renew_s: int = 0) -> None:
+    """Write a view as a page.
+
+    Args:
+        path: The file.
+        view: What is shown.
+        foot: How to come by it again.
+        renew_s: The page loads itself again so often while the work is under way [s]; 0 once it has ended.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    write_text(path, page_html(view, foot, renew_s))
+
+
+def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:
+    """A view as HTML; every text in it is escaped, and its policy forbids scripts and all that is elsewhere.
+
+    Raises:
+        ValueError: If a picture is no PNG, GIF or SVG.
+    """
+    renews = f"Under way: this page loads itself again every {renew_s} s."
+    following = f'<p class="following"><strong>Next:</strong> {_text(view.next_step)}</p>\n'
+    return PAGE.substitute(
+        title=html.escape(view.title),
+        style=STYLE,
+        renew=f'<meta http-equiv="refresh" content="{renew_s}">\n' if renew_s else "",
+        under_way=f'<p class="under-way" role="status">{renews}</p>\n' if renew_s else "",
+        answer=_text(view.sentence),
+        following=following if view.next_step else "",
+        contents=_contents(view) if len(view.parts) > MANY else "",
+        parts="\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1)),
+        foot=_foot(foot),
+    )
+
+
+def _contents(view: View) -> str:
+    items = (f'<li><a href="#part-{n}">{html.escape(one.title)}</a></li>' for n, one in enumerate(view.parts, start=1))
+    return f'<nav aria-label="Contents"><ol>{"".join(items)}</ol></nav>\n'
+
+
+def _part(part: Part, place: str) -> str:
+    heading = f'<h2 id="{place}">{html.escape(part.title)}</h2>'
+    match part:
+        case Picture():
+            return f"<section>{heading}{_picture(part, place)}</section>"
+        case Table():
+            notes = "".join(f"<li>{_text(note)}</li>" for note in part.notes)
+            below = f'<ul class="notes">{notes}</ul>' if notes else ""
+            return f"<section>{heading}{_table(part, place)}{below}</section>"
+        case Paragraphs():
+            return f"<section>{heading}{''.join(f'<p>{_text(text)}</p>' for text in part.paragraphs)}</section>"
+
+
+def _picture(part: Picture, place: str) -> str:
+    source, width = _data_image(part.image)
+    size = f' width="{width}" style="min-width:{SMALLEST * width:.0f}px"' if width else ""
+    alt = html.escape(f"{part.title}. {part.caption}".strip())
+    card = f'<div class="scroll" role="region" tabindex="0" aria-labelledby="{place}"><span class="card">'
+    # The alternative text says the same, so that it is not read twice.
+    caption = f'<figcaption aria-hidden="true">{_text(part.caption)}</figcaption>' if part.caption else ""
+    return f'<figure>{card}<img alt="{alt}" src="{source}"{size}></span></div>{caption}</figure>'
+
+
+def _data_image(image: bytes) -> tuple[str, int]:
+    """A picture as a data URI, and how wide it is drawn where there is room [pixel]; 0 as wide as it likes.
+
+    A figure, which states how many pixels make an inch, is drawn at 1.5 times its printed size.
+    """
+    data = base64.b64encode(image).decode("ascii")
+    if b"<svg" in image[:1000]:
+        return f"data:image/svg+xml;base64,{data}", 0
+    kind = "png" if image.startswith(b"\x89PNG\r\n") else "gif" if image.startswith(b"GIF8") else ""
+    if not kind:
+        raise ValueError("the picture is no PNG, GIF or SVG")
+    with Image.open(BytesIO(image)) as opened:
+        dots = opened.info.get("dpi")
+        width = round(opened.width * ENLARGED / dots[0]) if dots and dots[0] else opened.width
+    return f"data:image/{kind};base64,{data}", width
+
+
+def _table(table: Table, label: str) -> str:
+    """A table in a region of its own that scrolls; the first cell of each row names the row."""
+    heads = "".join(
+        f'<th scope="col"{_class(one)}>{html.escape(one.name).replace(chr(10), " ")}</th>' for one in table.columns
+    )
+    head = f"<thead><tr>{heads}</tr></thead>" if any(one.name for one in table.columns) else ""
+    caption = f'<caption class="unseen">{html.escape(table.title)}</caption>'
+    rows = "".join(f"<tr>{_row(row, table.columns)}</tr>" for row in table.rows)
+    region = f'<div class="scroll" role="region" tabindex="0" aria-labelledby="{label}">'
+    return f"{region}<table>{caption}{head}<tbody>{rows}</tbody></table></div>"
+
+
+def _row(row: tuple[str, ...], columns: tuple[Column, ...]) -> str:
+    first, *others = zip(row, columns, strict=True)
+    name = f'<th scope="row"{_class(first[1])}>{html.escape(first[0])}</th>'
+    return name + "".join(f"<td{_class(one, len(cell))}>{html.escape(cell)}</td>" for cell, one in others)
+
+
+def _class(column: Column, length: int = 0) -> str:
+    return ' class="prose"' if length > PROSE else ' class="number"' if column.numbers else ""
+
+
+def _foot(foot: Foot) -> str:
+    settings = Table("Settings", (Column(""), Column("")), foot.settings)
+    versions = ", ".join(f"{name} {version}" for name, version in foot.versions)
+    parts = [_part(settings, "settings")] if foot.settings else []
+    if foot.command:
+        command = f"<pre><code>{html.escape(foot.command)}</code></pre>"
+        parts.append(f'<section><h2 id="again">The command that makes this page</h2>{command}</section>')
+    written = [f"Written {foot.date}"] * bool(foot.date) + [f"with {versions}"] * bool(versions)
+    return "\n".join([*parts, f"<p>{html.escape(' '.join(written))}.</p>" if written else ""])
+
+
+def _text(text: str) -> str:
+    """A text with what is between backticks as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))

@@ -1,0 +1,224 @@
+"""Search for the proxy of highest PLV: sentence, tables, figure, page and JSON document."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from rich.console import Group
+from rich.text import Text
+
+from proxytune.learning import Distribution, describe
+from proxytune.report.figure_style import BLUE, COLUMN, VERMILLION, LineName, dress, legend_below, name_lines
+from proxytune.report.html import write_page
+from proxytune.report.study.page import study_foot
+from proxytune.report.teaching import (
+    CONVERGED,
+    PLV_MEANING,
+    UNKNOWN,
+    count,
+    distribution_document,
+    estimate_document,
+    one_decimal,
+    say_more_of_it,
+)
+from proxytune.report.text import file_texts, group_texts, table_text
+from proxytune.report.view import Paragraphs, Picture, Table, View, columns_of
+from proxytune.report.wording import listed, short
+from proxytune.report.writing import save_figure
+from proxytune.study import as_document
+from proxytune.teaching import Experiment, PlvStudy, PlvTrial, best_teacher, plv_or_worst, saves_more, why_unknown
+
+MORE_PROXIES = "raise teaching.budget, or widen [parameters], so that other proxies are tried"
+CONFIRMED = "Finalists, taught anew with fresh lessons, learners and examinations"
+SCORES = ("zero-shot score", "samples needed", "PLV")
+TRIALS = (
+    "PLV of each proxy tried, with its 95 % interval; crosses have not converged. Above 0 samples are saved. Where "
+    "intervals overlap, the order of the proxies is not known."
+)
+HIGHEST = LineName("highest\nso far", VERMILLION, 0.0)
+
+
+def plv_answer(study: PlvStudy) -> str:
+    """The finalist of highest PLV, whether it is shown to save anything, and which others may be as good."""
+    experiment, best = study.confirmed, best_teacher(study.confirmed)
+    if best is None or best.worth is None:
+        return f"Of {len(study.trials)} proxies tried, no finalist is known to save target samples."
+    others = [one.name for one in experiment.teachers if one is not best]
+    behind = [name for name in others if saves_more(experiment, best.name, name).above_zero]
+    alike = [name for name in others if name not in behind]
+    plv, judged = best.worth.plv, "that it saves any is not shown: the interval holds 0"
+    if plv.above_zero or plv.at_most_zero:
+        judged = "it saves target samples" if plv.above_zero else "it saves none"
+    sentences = [
+        f"After {len(study.trials)} proxies tried, {best.name} ({describe(best.proxy)}) has the highest PLV (proxy "
+        f"learning value): {count(plv, UNKNOWN)} target samples saved; {judged}.",
+        f"It saves more than {listed(behind)}." if behind else "",
+        f"That it saves more than {listed(alike)} is not shown." if alike else "",
+    ]
+    return " ".join(filter(None, sentences))
+
+
+def plv_next_step(study: PlvStudy) -> str:
+    """The step that brings most."""
+    best = best_teacher(study.confirmed)
+    if best is None or best.worth is None:
+        unknown = why_unknown(study.confirmed.needs)
+        return f"{unknown.remedy}: {unknown.reason}." if unknown else f"{MORE_PROXIES}."
+    if best.worth.plv.at_most_zero:
+        return f"train without a proxy, or {MORE_PROXIES}."
+    if best.worth.plv.above_zero:
+        return f"train in {best.name}: {describe(best.proxy)}, then on target samples."
+    return (
+        f"{say_more_of_it(study.confirmed)}, which narrows the intervals, or teaching.budget, which tries more proxies."
+    )
+
+
+def plv_text(study: PlvStudy, files: Mapping[str, Any]) -> Group:
+    """The trials as `study` prints them, the best one first, what was searched, and the finalists."""
+    finals, tried = (table_text(replace(table, title="")) for table in _tables(study))
+    head = f"{study.settings.name}: {len(study.trials)} proxies tried, the one of highest PLV first"
+    box = ", ".join(f"{interval.name} [{interval.low:.4g}, {interval.high:.4g}]" for interval in study.space.intervals)
+    by = " (narrowed to the θ whose PRPV is as low as the best, within noise)" if study.narrowed else ""
+    lines: list[str | Text] = [
+        f"searched: {box}{by}",
+        f"stopped: {study.stopped}",
+        PLV_MEANING,
+        CONVERGED.format(f"{study.when.threshold:.1f}"),
+        *file_texts(files),
+    ]
+    return group_texts(f"{plv_answer(study)}\n", head, tried, *lines, f"\n{CONFIRMED}:", finals, *study.unable.values())
+
+
+def write_plv_report(study: PlvStudy, folder: Path) -> tuple[Path, Path]:
+    """Draw PLV of every trial, and write the page; the paths of both.
+
+    Raises:
+        RunError: If a file cannot be written.
+    """
+    figure, page = folder / "figures" / "plv.png", folder / "report.html"
+    save_figure(plv_figure(study), figure)
+    write_page(page, plv_view(study, figure.read_bytes()), study_foot(study.settings))
+    return figure, page
+
+
+def plv_view(study: PlvStudy, figure: bytes) -> View:
+    """A search by PLV: the finalists, PLV of every trial, and the trials."""
+    finals, tried = _tables(study)
+    stopped = Paragraphs("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
+    picture = Picture("PLV of the proxies tried", figure, TRIALS)
+    finalists = replace(finals, notes=(PLV_MEANING, *study.unable.values()))
+    return View(study.settings.name, plv_answer(study), plv_next_step(study), (finalists, picture, tried, stopped))
+
+
+def _tables(study: PlvStudy) -> tuple[Table, Table]:
+    """The finalists, and all trials, the best one first: p(θ) by parameter, and what each is worth."""
+
+    def spans(proxy: Distribution) -> list[str]:
+        bounds = [proxy.bounds[name] for name in names]
+        return [short(low) if low == high else f"{short(low)} to {short(high)}" for low, high in bounds]
+
+    experiment, best, names = study.confirmed, best_teacher(study.confirmed), study.settings.space.names
+    ordered = sorted(study.trials, key=lambda trial: (trial is not study.best, trial.number))
+    trials = tuple(
+        (
+            str(trial.number),
+            *spans(trial.proxy),
+            one_decimal(trial.zero_shot),
+            count(trial.worth.needed),
+            count(trial.worth.plv, UNKNOWN),
+        )
+        for trial in ordered
+    )
+    finals = tuple(
+        (
+            one.name,
+            *spans(one.proxy),
+            one_decimal(one.zero_shot),
+            count(one.worth.needed) if one.worth else "",
+            count(one.worth.plv, UNKNOWN) if one.worth else UNKNOWN,
+            count(saves_more(experiment, best.name, one.name), UNKNOWN) if best and best is not one else "",
+        )
+        for one in experiment.teachers
+    )
+    heads = (*names, *SCORES)
+    return (
+        Table(CONFIRMED, columns_of(("finalist",), (*heads, "the best saves more by")), finals),
+        Table("Proxies tried, the best first", columns_of(("trial",), heads), trials),
+    )
+
+
+def plv_document(study: PlvStudy) -> dict[str, Any]:
+    """A search by PLV as plain JSON; its keys are promises."""
+    return {
+        "name": study.settings.name,
+        "objective": "plv",
+        "best": _trial_document(study.best),
+        "confirmed": {**_confirmed_document(study.confirmed), "cannot_teach": dict(study.unable)},
+        "trials": [_trial_document(trial) for trial in study.trials],
+        "searched": {interval.name: [interval.low, interval.high] for interval in study.space.intervals},
+        "narrowed_by_prpv": study.narrowed,
+        "stopped": study.stopped,
+        "convergence": {"level": study.when.level, "threshold": study.when.threshold},
+        "settings": dict(as_document(study.settings)),
+    }
+
+
+def _trial_document(trial: PlvTrial) -> dict[str, Any]:
+    return {
+        "index": trial.number,
+        "theta": dict(trial.theta),
+        "plv": estimate_document(trial.worth.plv),
+        "needed": estimate_document(trial.worth.needed),
+        "zero_shot": trial.zero_shot.value,
+    }
+
+
+def _confirmed_document(experiment: Experiment) -> dict[str, Any]:
+    """The finalists, taught anew: what each is worth, and how much the best saves more than each."""
+    best = best_teacher(experiment)
+    return {
+        "best": best.name if best else None,
+        "settled": experiment.settled,
+        "finalists": {
+            one.name: {
+                "theta": distribution_document(one.proxy),
+                "zero_shot": one.zero_shot.value,
+                "plv": estimate_document(one.worth.plv if one.worth else None),
+                "plv_cost": estimate_document(one.cost),
+                "needed": estimate_document(one.worth.needed if one.worth else None),
+                "best_saves_more": estimate_document(saves_more(experiment, best.name, one.name)) if best else None,
+            }
+            for one in experiment.teachers
+        },
+    }
+
+
+def plv_figure(study: PlvStudy) -> Figure:
+    """Draw PLV with its 95 % interval trial by trial, and the highest so far; crosses did not converge."""
+    figure = Figure(figsize=(COLUMN, 2.7), layout="constrained")
+    axes = figure.subplots()
+    grid = study.without.counts[-1]
+    for trial in study.trials:
+        figures = trial.worth.plv
+        if figures.value is None:
+            axes.plot(trial.number, 0.0, "x", color="black", markersize=5, label="not converged")
+            continue
+        low, high = (end if end is not None else far for end, far in ((figures.low, -grid), (figures.high, grid)))
+        axes.plot((trial.number, trial.number), (low, high), color=BLUE, linewidth=1.0, alpha=0.6)
+        axes.plot(trial.number, figures.value, "o", color=BLUE, markersize=4, label="PLV")
+    values = np.array([plv_or_worst(trial) for trial in study.trials])
+    numbers = np.arange(1, len(values) + 1)
+    highest = np.maximum.accumulate(values)
+    reached = np.isfinite(highest)
+    axes.step(numbers[reached], highest[reached], where="post", color=VERMILLION, linewidth=1.5, label=HIGHEST.words)
+    axes.axhline(0.0, color="0.6", linewidth=0.8)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    dress(axes, "trial", "PLV [target samples saved]")
+    if reached.any():
+        name_lines(axes, [HIGHEST._replace(end=float(highest[-1]))])
+    legend_below(figure, axes, without=[HIGHEST.words])
+    return figure

@@ -1,0 +1,148 @@
+"""Figures of `score`: proxy against target per metric, and which pairs of agents the proxy flips."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from scipy.stats import rankdata
+
+from proxytune.arrays import Floats
+from proxytune.report.figure_style import BLUE, COLUMN, LIGHT_BLUE, LIGHT_GREY, ORANGE, VERMILLION, dress, spread_places
+from proxytune.report.wording import plain
+from proxytune.scores import ScoreTable
+from proxytune.usefulness import Assessment, Comparison, Prpv
+
+PANEL = 2.2
+"""Height of a metric's panel, where names do not need more [inch]."""
+MOST = 28
+"""Agents that can be named at 85 mm. Of more, the scatter names those whose rank in the proxy is farthest from that on
+the target, and pairs are drawn over ranks on the target."""
+LINE = 0.1
+"""Height of a name [inch]."""
+LONGEST = 24
+"""Characters of a name; of a longer one its end is shown, which tells agents of one module apart."""
+FLIP_COLOURS = {"same": LIGHT_GREY, "lost": BLUE, "invented": ORANGE, "reversed": VERMILLION}
+
+
+def scatter_figure(assessment: Assessment) -> Figure:
+    """Draw each agent's mean score in the proxy against that on the target, one panel per metric.
+
+    Names stand on the right, highest score in the proxy on top. Error bars are standard errors over episodes; on the
+    dashed line, proxy and target agree.
+    """
+    metrics, agents = assessment.inputs.metrics, assessment.inputs.agents
+    height = max(PANEL, LINE * min(MOST, len(agents)) + 0.6)
+    figure = Figure(figsize=(COLUMN, height * len(metrics)), layout="constrained")
+    for column, axes in enumerate(figure.subplots(len(metrics), 1, squeeze=False)[:, 0]):
+        _scatter_panel(axes, assessment.inputs, column)
+        _name_points(axes, assessment.inputs, column, LINE / (height - 0.6))
+        r = assessment.srcc.value[metrics[column].name]
+        axes.set_title("SRCC undefined" if r is None else f"SRCC {r:.2f}".replace("-", "−"), fontsize=8)
+    return figure
+
+
+def flipped_pairs_figure(prpv: Prpv) -> Figure:
+    """Draw which pairs of agents the proxy ranks unlike the target, agents in the target's order, best first."""
+    order = _target_order(prpv.inputs)
+    place = {agent: row for row, agent in enumerate(order)}
+    kinds = list(FLIP_COLOURS)
+    cells = np.full((len(order), len(order)), np.nan)
+    cells[np.tril_indices(len(order), -1)] = kinds.index("same")
+    for pair in prpv.pairs:
+        high, low = sorted((place[pair.better], place[pair.worse]))
+        cells[low, high] = kinds.index(pair.flip)
+    figure = Figure(figsize=(COLUMN, COLUMN), layout="constrained")
+    axes = figure.subplots()
+    _draw_pairs(axes, cells, named=len(order) <= MOST)
+    _name_agents(axes, [_short(agent) for agent in order])
+    axes.set_title(f"PRPV {prpv.value} of at most {prpv.range[1]}", fontsize=8)
+    axes.legend(handles=_legend(prpv), loc="upper right", fontsize=7, frameon=False)
+    return figure
+
+
+def _draw_pairs(axes: Axes, cells: Floats, *, named: bool) -> None:
+    """Squares with gaps between them, or a picture where there are more than can be named."""
+    colours, ends = ListedColormap(list(FLIP_COLOURS.values())), (-0.5, len(FLIP_COLOURS) - 0.5)
+    if named:
+        axes.pcolormesh(cells, cmap=colours, vmin=ends[0], vmax=ends[1], edgecolor="white", linewidth=0.8)
+        return
+    # Colours are mixed where squares are smaller than a pixel: none is lost.
+    axes.imshow(
+        cells, cmap=colours, vmin=ends[0], vmax=ends[1], extent=(0, len(cells), 0, len(cells)), origin="lower",
+        interpolation="antialiased", interpolation_stage="rgba",
+    )  # fmt: skip
+
+
+def _scatter_panel(axes: Axes, inputs: Comparison, column: int) -> None:
+    proxy, target = (means[:, column] for means in inputs.means)
+    errors = (_standard_errors(inputs.target)[:, column], _standard_errors(inputs.proxy)[:, column])
+    axes.errorbar(target, proxy, xerr=errors[0], yerr=errors[1], fmt="none", ecolor="0.7", elinewidth=0.8, zorder=1)
+    axes.plot(target, proxy, "o", color=BLUE, markersize=4, zorder=2)
+    axes.margins(0.1)
+    limits = axes.axis()
+    axes.axline((0, 0), slope=1, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
+    axes.axis(limits)
+    name = plain(inputs.metrics[column].name)
+    dress(axes, f"{name} on the target", f"{name} in the proxy")
+
+
+def _standard_errors(table: ScoreTable) -> Floats:
+    """Standard error of each agent's mean, shape (agents, metrics); zero for a single episode."""
+    squares = np.nansum((table.values - table.means[:, None, :]) ** 2, axis=1)
+    counts = table.counts[:, None]
+    return np.asarray(np.sqrt(squares / np.maximum(counts - 1, 1) / counts), dtype=np.float64)
+
+
+def _name_points(axes: Axes, inputs: Comparison, column: int, apart: float) -> None:
+    """Name points right of the panel, each with a thin line to its point."""
+    proxy, target = (means[:, column] for means in inputs.means)
+    shown = _to_name(proxy, target)
+    bottom, top = axes.get_ylim()
+    # Points of one score in the proxy: those farther right on top, so that their lines cross less.
+    shown = sorted(shown, key=lambda row: (proxy[row], target[row]))
+    look = {"arrowstyle": "-", "lw": 0.4, "color": LIGHT_BLUE, "shrinkA": 0, "shrinkB": 2, "relpos": (0, 0.5)}
+    places = spread_places([(proxy[row] - bottom) / (top - bottom) for row in shown], apart)
+    for row, place in zip(shown, places, strict=True):
+        axes.annotate(
+            _short(inputs.agents[row]), (target[row], proxy[row]), (1.04, place), textcoords="axes fraction",
+            ha="left", va="center", fontsize=6, annotation_clip=False, arrowprops=look,
+        )  # fmt: skip
+
+
+def _to_name(proxy: Floats, target: Floats) -> list[int]:
+    """The agents to name: all, or of many those whose ranks in proxy and target differ most."""
+    moved = np.abs(rankdata(proxy) - rankdata(target))
+    return [int(row) for row in np.argsort(-moved, kind="stable")[:MOST]]
+
+
+def _short(agent: str) -> str:
+    return agent if len(agent) <= LONGEST else f"…{agent[1 - LONGEST :]}"
+
+
+def _target_order(inputs: Comparison) -> list[str]:
+    """Agents by their mean rank over the metrics on the target, best first."""
+    merits = [metric.merits(inputs.target.means[:, column])[0] for column, metric in enumerate(inputs.metrics)]
+    ranks = np.mean([(merit[:, None] < merit).sum(axis=1) for merit in merits], axis=0)
+    return [inputs.agents[row] for row in np.argsort(ranks, kind="stable")]
+
+
+def _name_agents(axes: Axes, order: list[str]) -> None:
+    """Names beside the pairs, or ranks on the target where they are too many."""
+    if len(order) <= MOST:
+        ticks = np.arange(len(order)) + 0.5
+        axes.set_xticks(ticks[:-1], order[:-1], rotation=90, fontsize=6)
+        axes.set_yticks(ticks[1:], order[1:], fontsize=6)
+    axes.invert_yaxis()
+    axes.set_aspect("equal")
+    axes.tick_params(length=0, labelsize=6)
+    axes.spines[:].set_visible(False)
+    axes.set_xlabel("agent (best on the target first)", fontsize=8)
+    axes.set_ylabel("agent", fontsize=8)
+
+
+def _legend(prpv: Prpv) -> list[Patch]:
+    agents = len(prpv.inputs.agents)
+    counts = {kind: sum(pair.flip == kind for pair in prpv.pairs) for kind in FLIP_COLOURS}
+    counts["same"] = agents * (agents - 1) // 2 - len(prpv.pairs)
+    return [Patch(color=colour, label=f"{kind}: {counts[kind]}") for kind, colour in FLIP_COLOURS.items()]

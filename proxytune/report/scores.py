@@ -1,0 +1,357 @@
+"""Scores of proxies: sentence, tables, page, JSON document and table file of `score`."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group
+
+from proxytune.report.html import write_page
+from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
+from proxytune.report.table_files import write_csv, write_latex
+from proxytune.report.text import group_texts, note_texts, table_text
+from proxytune.report.view import Column, Foot, Picture, Table, View, columns_of
+from proxytune.report.wording import listed, short, short_span, with_span
+from proxytune.report.writing import file_names, save_figure
+from proxytune.usefulness import ALL, MEASURES, PPV, PRPV, Assessment, Measure, Measured, Selection, SuccessRates
+
+Row = tuple[str, str, str, str, str]
+Assessments = Mapping[str, Assessment]
+BESIDE_PRPV = tuple(measure for measure in MEASURES if measure is not PRPV)
+SCATTER = (
+    "A point is an agent: its mean score on the target (across) and in the proxy (up), with standard errors. On the "
+    "dashed line both agree; two points that fall from left to right are a pair ranked wrongly. Names are in the "
+    f"proxy's order, highest score on top; of more than {MOST} agents those whose rank differs most are named."
+)
+FLIPPED = (
+    "A square is a pair of agents, in the target's order, best first. Grey pairs are ranked as on the target; coloured "
+    "ones are what PRPV counts: reversed, lost (a tie in the proxy alone) or invented (a tie on the target alone). "
+    f"Of more than {MOST} agents the axes are ranks on the target."
+)
+
+
+def score_sentence(assessments: Assessments, selection: Selection | None, *, target: str) -> str:
+    """Say how low PRPV is and what that is worth; of several proxies which is best, and than which beyond noise."""
+    if selection is None:
+        ((proxy, assessment),) = assessments.items()
+        return _say_prpv(assessment, proxy, target)
+    best = selection.ranking[0][0]
+    worse = [pair.worse for pair in selection.differences if pair.better == best and pair.beyond_noise]
+    beyond = f"beyond noise better than {listed(worse)}" if worse else "not beyond noise better than any other"
+    return f"{best} ranks the agents most like {target}, {beyond}. {_say_prpv(assessments[best], best, target)}"
+
+
+def _say_prpv(assessment: Assessment, proxy: str, target: str) -> str:
+    """Say how low PRPV is, and what that is worth."""
+    prpv, inner, random = assessment.prpv, assessment.prpv_interval, assessment.chance
+    floor, chance = (
+        assessment.noise_floor,
+        f"{short(random.mean)} ± {short(random.deviation)}, p = {random.p_value:.2g}",
+    )
+    known = None not in (floor.value, floor.low, floor.high)
+    level = with_span(floor.value, floor.low, floor.high) if known and floor.value is not None else ""
+    if random.explains:
+        worth = f"no better than chance ({chance})"
+    elif assessment.at_noise_floor:
+        worth = f"no difference from the target can be seen (noise floor {level})"
+    else:
+        perfect = f"; a perfect proxy scores {level}" if floor.kind == "same starts" and level else ""
+        worth = f"better than chance ({chance}){perfect}"
+    value = with_span(str(prpv.value), inner.low, inner.high)
+    score = f"has a PRPV (proxy relative predictivity value) of {value}, of at most {prpv.range[1]}"
+    return f"As a proxy of {target}, {proxy} {score}: {worth}."
+
+
+def score_next_step(assessments: Assessments, selection: Selection | None) -> str:
+    """The step that brings most."""
+    if selection is not None:
+        best = selection.ranking[0][0]
+        if all(pair.beyond_noise for pair in selection.differences if pair.better == best):
+            return f"use {best}, or tune its parameters with `python -m proxytune study`."
+        return "score more agents or more episodes, to tell the best proxies apart."
+    (assessment,) = assessments.values()
+    if assessment.prpv_interval.low is None:
+        return "score every agent in at least two episodes on both sides, which gives intervals."
+    if assessment.chance.explains:
+        return "score more agents, or agents whose scores differ more, until chance can be excluded."
+    if assessment.at_noise_floor:
+        return "use this proxy; to see a difference from the target, score more starts."
+    return "see below which pairs it ranks wrongly; tune its parameters with `python -m proxytune study`."
+
+
+def score_text(
+    assessments: Assessments, selection: Selection | None, left_out: Sequence[str] = (), *, target: str
+) -> Group:
+    """The scores as `score` prints them: the sentence, every measure of one proxy or several ranked, and notes.
+
+    Args:
+        assessments: Of each proxy, by name.
+        selection: The proxies ranked; None where there is one.
+        left_out: Notes on agents that were left out.
+        target: Name of the target.
+    """
+    said: dict[str, list[str]] = {}
+    for name, assessment in assessments.items():
+        for note in assessment.notes:
+            said.setdefault(note, []).append(name)
+    whose = {note: "" if len(names) == len(assessments) else f" ({', '.join(names)})" for note, names in said.items()}
+    notes = [f"note{names}: {note}" for note, names in whose.items()]
+    noise, floor = next(iter(assessments.values())).noise_floor, []
+    if selection is not None and noise.value is not None:
+        ends = short_span(noise.low, noise.high)
+        floor = [f"{noise.title} {short(noise.value)}, 95 % interval {ends}: {noise.meaning}"]
+    tables = map(table_text, _tables(assessments, selection, target))
+    sentence = score_sentence(assessments, selection, target=target)
+    return group_texts(f"{sentence}\n", *tables, *floor, *notes, *note_texts(left_out))
+
+
+def score_view(
+    assessments: Assessments,
+    selection: Selection | None,
+    figures: Sequence[Picture],
+    *,
+    target: str,
+) -> View:
+    """One proxy, or several ranked.
+
+    Args:
+        assessments: Of each proxy, by name.
+        selection: The proxies ranked; None where there is one.
+        figures: What was drawn.
+        target: Name of the target.
+    """
+    tables = _tables(assessments, selection, target)
+    names = f"{next(iter(assessments))} as a proxy" if selection is None else f"{len(assessments)} proxies"
+    return View(
+        f"{names} of {target}",
+        score_sentence(assessments, selection, target=target),
+        score_next_step(assessments, selection),
+        (*figures, *tables) if selection is None else (*tables, *figures),
+    )
+
+
+def write_score_report(
+    assessments: Assessments, selection: Selection | None, folder: Path, foot: Foot, *, target: str
+) -> tuple[list[Path], Path]:
+    """Draw the figures of every proxy, and write the page; the paths of both.
+
+    Raises:
+        RunError: If a file cannot be written.
+    """
+    paths, pictures, files = list[Path](), list[Picture](), file_names(assessments)
+    for name, assessment in assessments.items():
+        file, title = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
+        for kind, figure, head, caption in (
+            ("scatter", scatter_figure(assessment), "Scores in the proxy and on the target", SCATTER),
+            (
+                "flipped_pairs",
+                flipped_pairs_figure(assessment.prpv),
+                "Pairs of agents that the proxy ranks wrongly",
+                FLIPPED,
+            ),
+        ):
+            paths.append(folder / f"{kind}{file}.png")
+            save_figure(figure, paths[-1])
+            pictures.append(Picture(f"{head}{title}", paths[-1].read_bytes(), caption))
+    page = folder / "report.html"
+    write_page(page, score_view(assessments, selection, pictures, target=target), foot)
+    return paths, page
+
+
+def _tables(assessments: Assessments, selection: Selection | None, target: str) -> list[Table]:
+    """Every measure of one proxy with success rates below, or proxies ranked; with all notes, each once."""
+    notes = tuple(dict.fromkeys(note for assessment in assessments.values() for note in assessment.notes))
+    if selection is not None:
+        return [_ranking(assessments, selection, target, notes)]
+    ((proxy, assessment),) = assessments.items()
+    beside = [row for measure in BESIDE_PRPV for row in _rows(measure, assessment)]
+    columns = (*columns_of(("measure",), ("value", "95 % interval")), *columns_of(("better", "what it says")))
+    title = f"{proxy} as a proxy of {target}: {_sizes(assessment)}"
+    return [
+        Table(title, columns, (*_prpv_rows(assessment), *beside), notes),
+        *map(_rates, assessment.success_rates),
+    ]
+
+
+def _rates(rates: SuccessRates) -> Table:
+    """The success rate of each agent on both sides."""
+    rows = []
+    for agent, target in rates.target.items():
+        sides = [
+            cell
+            for one in (rates.proxy[agent], target)
+            for cell in (f"{one.value:.2f} ({one.low:.2f} to {one.high:.2f})", str(one.episodes))
+        ]
+        rows.append((agent, *sides))
+    title = f"{rates.metric}: success rates with their own 95 % intervals (Wilson)"
+    heads = ("in the proxy", "episodes", "on the target", "episodes")
+    return Table(title, columns_of(("agent",), heads), tuple(rows))
+
+
+def _ranking(assessments: Assessments, selection: Selection, target: str, notes: tuple[str, ...]) -> Table:
+    """Proxies best first, each with those that are worse beyond noise."""
+    first = next(iter(assessments.values()))
+    beside = [measure for measure in BESIDE_PRPV if measure.in_paper]
+    titles = [row[0] for measure in beside for row in _rows(measure, first)]
+    heads = columns_of((), (PRPV.name, "95 % interval", "chance", "p", *titles))
+    columns = (Column("", numbers=True), Column("proxy"), *heads, Column("better beyond noise than"))
+    rows = []
+    for rank, (name, value) in enumerate(selection.ranking, 1):
+        found = assessments[name]
+        inner = short_span(found.prpv_interval.low, found.prpv_interval.high)
+        random = (short(found.chance.mean), f"{found.chance.p_value:.2g}")
+        others = [row[1] for measure in beside for row in _rows(measure, found)]
+        worse = [pair.worse for pair in selection.differences if pair.better == name and pair.beyond_noise]
+        rows.append((str(rank), name, str(value), inner, *random, *others, ", ".join(worse)))
+    return Table(f"{len(assessments)} proxies of {target}: {_sizes(first)}", columns, tuple(rows), notes)
+
+
+def _sizes(assessment: Assessment) -> str:
+    inputs = assessment.inputs
+    sides = (("proxy", inputs.proxy_episodes), ("target", inputs.target_episodes))
+    counts = [
+        f"{low if low == high else f'{low} to {high}'} {side} episode{'' if high == 1 else 's'}"
+        for side, (low, high) in sides
+    ]
+    return f"{len(inputs.agents)} agents, {counts[0]} and {counts[1]} each"
+
+
+def _prpv_rows(assessment: Assessment) -> list[Row]:
+    prpv, inner, noise = assessment.prpv, assessment.prpv_interval, assessment.noise_floor
+    flips = [f"{sum(pair.flip == flip for pair in prpv.pairs)} {flip}" for flip in ("reversed", "lost", "invented")]
+    random, better, span = assessment.chance, PRPV.better, short_span(inner.low, inner.high)
+    by_chance = f"as low by chance: p = {random.p_value:.2g}"
+    return [
+        (PRPV.name, str(prpv.value), span, better, f"{PRPV.meaning} to {prpv.range[1]}"),
+        ("  normalised", _number(prpv.normalised), "", better, "0 to 1"),
+        ("  flipped pairs", str(len(prpv.pairs)), "", better, ", ".join(flips)),
+        ("  expected", _number(inner.expected), "", better, "mean over resampled episodes"),
+        (f"  {noise.title}", _number(noise.value), short_span(noise.low, noise.high), "", noise.meaning),
+        ("  chance", _number(random.mean), f"± {random.deviation:.3g}", "", by_chance),
+    ]
+
+
+def _rows(measure: Measure, assessment: Assessment) -> list[Row]:
+    """One row, or one per metric."""
+    return [
+        (measure.name_for(metric), _number(value), short_span(*(ends or (None, None))), measure.better, measure.meaning)
+        for metric, (value, ends) in measure.measured(assessment).items()
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else short(value)
+
+
+def write_score_table(assessments: Assessments, path: Path) -> None:
+    """Write every measure of every proxy: as CSV a row for each, as LaTeX a row per measure and a column per proxy.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    measured = {
+        name: [(measure, *one) for measure in MEASURES for one in measure.measured(assessment).items()]
+        for name, assessment in assessments.items()
+    }
+    if path.suffix == ".csv":
+        rows = [
+            (name, measure.key_for(metric), found.value, *(found.interval or (None, None)), measure.better)
+            for name, all_found in measured.items()
+            for measure, metric, found in all_found
+        ]
+        write_csv(path, ("proxy", "measure", "value", "low", "high", "better"), rows)
+        return
+    cells = {
+        name: {
+            measure.name_for(metric): with_span(_number(found.value), *(found.interval or (None, None)))
+            for measure, metric, found in all_found
+        }
+        for name, all_found in measured.items()
+    }
+    titles = next(iter(cells.values()))
+    write_latex(path, ("measure", *cells), [(title, *(texts[title] for texts in cells.values())) for title in titles])
+
+
+def score_document(assessment: Assessment) -> dict[str, Any]:
+    """Every figure of one proxy as plain JSON, whose keys are promises; None where undefined, and a note says why."""
+    inner, noise, random, inputs = (
+        assessment.prpv_interval,
+        assessment.noise_floor,
+        assessment.chance,
+        assessment.inputs,
+    )
+    found = {measure: measure.measured(assessment) for measure in MEASURES}
+    values = {measure.key: _per_metric(measure, one, lambda it: it.value) for measure, one in found.items()}
+    intervals = {
+        measure.key: _per_metric(measure, one, lambda it: it.interval and list(it.interval))
+        for measure, one in found.items()
+        if measure is not PRPV  # which has keys of its own
+    }
+    return {
+        PRPV.key: values[PRPV.key],
+        "prpv_normalised": assessment.prpv.normalised,
+        "prpv_interval": ends_document(inner.low, inner.high),
+        "expected_prpv": inner.expected,
+        "noise_floor": noise.value,
+        "noise_floor_interval": ends_document(noise.low, noise.high),
+        "noise_floor_kind": noise.kind,
+        "at_noise_floor": assessment.at_noise_floor,
+        "chance": random.mean,
+        "chance_deviation": random.deviation,
+        "p_value": random.p_value,
+        PPV.key: values[PPV.key],
+        "beta": dict(assessment.ppv.beta),
+        **values,
+        "intervals": intervals if assessment.intervals else None,
+        "pairs": [{"better": pair.better, "worse": pair.worse, "flip": pair.flip} for pair in assessment.prpv.pairs],
+        "success_rates": {
+            rates.metric: {
+                agent: {"proxy": vars(rates.proxy[agent]), "target": vars(rates.target[agent])}
+                for agent in inputs.agents
+            }
+            for rates in assessment.success_rates
+        },
+        "agents": list(inputs.agents),
+        "metrics": [str(metric) for metric in inputs.metrics],
+        "episodes": {
+            "proxy": list(inputs.proxy_episodes),
+            "target": list(inputs.target_episodes),
+            "paired": inputs.paired,
+            "resamples": inner.resamples,
+        },
+        "notes": list(assessment.notes),
+    }
+
+
+def ranking_document(assessments: Assessments, selection: Selection) -> dict[str, Any]:
+    """Every figure of several proxies, best first, and of the differences between them."""
+    ranked = enumerate(selection.ranking, start=1)
+    return {
+        "proxies": [{"proxy": name, "rank": rank, **score_document(assessments[name])} for rank, (name, _) in ranked],
+        "differences": differences_document(selection),
+        "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
+    }
+
+
+def differences_document(selection: Selection | None) -> list[dict[str, Any]]:
+    """Differences of every two, the better first; the intervals hold for all at once."""
+    return [
+        {
+            "better": pair.better,
+            "worse": pair.worse,
+            "difference": pair.value,
+            "interval": ends_document(pair.low, pair.high),
+            "beyond_noise": pair.beyond_noise,
+        }
+        for pair in (selection.differences if selection else ())
+    ]
+
+
+def ends_document(low: float | None, high: float | None) -> list[float] | None:
+    """The ends of an interval; None where one is not known."""
+    return None if low is None or high is None else [low, high]
+
+
+def _per_metric(measure: Measure, found: Mapping[str, Measured], plain: Callable[[Measured], Any]) -> Any:
+    """One plain value, or one for each metric by its name."""
+    return {metric: plain(one) for metric, one in found.items()} if measure.per_metric else plain(found[ALL])

@@ -1,1 +1,0 @@
-"""Usefulness from two tables of scores: JSON, table and figures."""

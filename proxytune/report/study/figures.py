@@ -1,0 +1,362 @@
+"""Figures of a study: how the answer improved, what is left of each parameter, where the trials were, what matters."""
+
+from collections.abc import Sequence
+from math import ceil
+from textwrap import fill
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+from scipy.ndimage import gaussian_filter, gaussian_filter1d
+
+from proxytune.arrays import Floats
+from proxytune.report.figure_style import (
+    BLUE,
+    COLUMN,
+    GREEN,
+    LIGHT_BLUE,
+    VERMILLION,
+    LineName,
+    dress,
+    floor_name,
+    legend_below,
+    mark_truth,
+    name_lines,
+    named_handles,
+)
+from proxytune.report.wording import plain, span, with_unit
+from proxytune.study import PRPV, StudyResult
+
+TWO_LINES = 0.14
+"""Distance between names of two lines, as a share of the panel's height."""
+
+
+def convergence_figure(result: StudyResult) -> Figure:
+    """Draw every trial's PRPV, that of the answer so far, and at the end the answer's on fresh episodes.
+
+    Where the objective is another measure, that is drawn in its place.
+
+    The answer so far is the visited θ of lowest expected PRPV, which need not be the luckiest trial. Filled points were
+    proposed by the surrogate, open ones come from the quasi-random design; crosses are trials that failed, triangles
+    what PRPV of those cut off cannot be below. The diamond with its 95 % interval, right of the last trial, is
+    the answer in episodes that the search has not seen.
+    """
+    figure = Figure(figsize=(COLUMN, 2.9), layout="constrained")
+    axes = figure.subplots()
+    _draw_trials(axes, result)
+    named, label = [_draw_answer(axes, result)], result.study.objective.label
+    if result.study.objective == PRPV:
+        label = "PRPV [ordered pairs]"
+        _draw_fresh(axes, result)
+        named += _draw_levels(axes, result)
+        axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    dress(axes, "trial", label)
+    name_lines(axes, named, TWO_LINES)
+    legend_below(figure, axes, without=[name.words for name in named])
+    return figure
+
+
+def _draw_levels(axes: Axes, result: StudyResult) -> list[LineName]:
+    """Chance, and the noise floor that a perfect proxy would score; with their names."""
+    chance, floor = result.judged.chance, result.floor
+    named = [LineName(f"chance\n{chance.mean:.1f}", "0.45", chance.mean)]
+    axes.axhline(chance.mean, color="0.45", linewidth=1.0, linestyle=":", label=named[0].words)
+    if floor.value is not None and floor.low is not None and floor.high is not None:
+        axes.axhspan(floor.low, floor.high, color=GREEN, alpha=0.15, linewidth=0)
+        named.append(LineName(f"{floor_name(floor)}\n{floor.value:.1f}", GREEN, floor.value))
+        axes.axhline(floor.value, color=GREEN, linewidth=1.0, linestyle="--", label=named[-1].words)
+    return named
+
+
+def _draw_trials(axes: Axes, result: StudyResult) -> None:
+    scored = [(trial.number, value) for trial in result.trials if (value := result.value_of(trial)) is not None]
+    failed = [trial.number for trial in result.trials if trial.state == "failed"]
+    bounds = [(trial.number, trial.bound) for trial in result.trials if trial.bound is not None]
+    initial = result.study.settings.initial
+    _draw_points(axes, [point for point in scored if point[0] <= initial], "white", "design")
+    _draw_points(axes, [point for point in scored if point[0] > initial], BLUE, "proposed")
+    if failed:
+        axes.plot(failed, np.zeros(len(failed)), "x", color="black", markersize=4, label="failed")
+    if bounds:
+        axes.plot(*zip(*bounds, strict=True), "^", color="0.45", markersize=4, label="stopped early, at least")
+
+
+def _draw_points(axes: Axes, points: list[tuple[int, float]], face: str, label: str) -> None:
+    if points:
+        numbers, scores = zip(*points, strict=True)
+        axes.plot(numbers, scores, "o", color=BLUE, markerfacecolor=face, markersize=4, zorder=3, label=label)
+
+
+def _draw_answer(axes: Axes, result: StudyResult) -> LineName:
+    """PRPV of the answer so far; where fresh episodes chose another in the end, the line ends at that one's.
+
+    Returns:
+        The line's name.
+    """
+    pairs = zip(result.trials, result.answers, strict=True)
+    answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
+    ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
+    named = LineName("answer\nso far", VERMILLION, ends[-1][1] or 0.0)
+    axes.step(*zip(*ends, strict=True), where="post", color=VERMILLION, linewidth=1.5, label=named.words)
+    return named
+
+
+def _draw_fresh(axes: Axes, result: StudyResult) -> None:
+    fresh = result.confirmation.answer.assessment if result.confirmation else None
+    if fresh is None:
+        return
+    score, inner = fresh.prpv.value, fresh.prpv_interval
+    reach = None if inner.low is None or inner.high is None else [[score - inner.low], [inner.high - score]]
+    place, label = result.trials[-1].number + 1, "answer, fresh episodes"
+    bars = np.maximum(0.0, reach) if reach else None
+    axes.errorbar(
+        [place], [score], yerr=bars, fmt="D", color=VERMILLION, markersize=5, capsize=2, zorder=4, label=label
+    )
+
+
+COLUMNS = 2
+BINS = 60
+"""Bins of a parameter's histogram, over the part of its range that counts."""
+SMOOTH_PROFILE = 0.5
+"""Share of its standard deviation, divided by the fifth root of the points that count, that smooths a histogram."""
+
+
+def profiles_figure(result: StudyResult) -> Figure:
+    """Draw how probable each value of each parameter is, given the target's scores, over the box that was searched.
+
+    Grey is excluded: outside the 95 % interval, which is written above. The vertical line is the answer; the triangle
+    is the θ that made the target, where that is known.
+    """
+    intervals = result.study.settings.space.intervals
+    columns = min(COLUMNS, len(intervals))
+    rows = ceil(len(intervals) / columns)
+    figure = Figure(figsize=(COLUMN, 1.3 * rows + 0.45), layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False)
+    for place in range(len(intervals)):
+        _draw_profile(panels.ravel()[place], result, place)
+    for axes in panels.ravel()[len(intervals) :]:
+        axes.set_visible(False)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("probability", fontsize=8)
+    legend_below(figure, *panels.ravel()[: len(intervals)])
+    return figure
+
+
+def _draw_profile(axes: Axes, result: StudyResult, place: int) -> None:
+    box, learnt = result.study.settings.space.intervals[place], result.knowledge
+    low, high = learnt.intervals[box.name]
+    for ends in ((box.low, low), (high, box.high)):
+        axes.axvspan(*ends, color="0.88", linewidth=0, label="excluded (95 %)")
+    values, density = density_of(result, place)
+    axes.fill_between(values, density, color=BLUE, alpha=0.35, linewidth=0)
+    axes.plot(values, density, color=BLUE, linewidth=1.2)
+    axes.axvline(result.best.trial.theta[box.name], color=VERMILLION, linewidth=1.2, label="answer")
+    if result.truth is not None and box.name in result.truth:
+        mark_truth(axes, result.truth[box.name])
+    left = span((low, high))
+    axes.set_title(f"unidentified: {left}" if box.name in learnt.unidentified else f"{left} remain", fontsize=7)
+    axes.set_xlim(box.low, box.high)
+    axes.set_ylim(0.0, 1.08 * density.max())
+    axes.xaxis.set_major_locator(MaxNLocator(3))
+    axes.set_yticks([])
+    dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit))
+
+
+def density_of(result: StudyResult, place: int) -> tuple[Floats, Floats]:
+    """Values of a parameter, and the density there: a smoothed histogram of the posterior's points.
+
+    The density is per unit of the parameter; it is 0 where the posterior has no points at all.
+    """
+    box, posterior = result.study.settings.space.intervals[place], result.knowledge.posterior
+    values = box.low + (box.high - box.low) * posterior.points[:, place]
+    heights, edges = np.histogram(values, bins=BINS, weights=posterior.weights, density=True)
+    # Mirrored at its ends: at an end of the box nothing leaks out of it.
+    smooth = gaussian_filter1d(heights, _reach(values, posterior.weights) / (edges[1] - edges[0]), mode="reflect")
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    places = np.concatenate([[box.low, edges[0]], centres, [edges[-1], box.high]])
+    return places, np.concatenate([[0.0, smooth[0]], smooth, [smooth[-1], 0.0]])
+
+
+def _reach(values: Floats, weights: Floats) -> float:
+    """Part of its range over which a parameter's histogram is smoothed: the less, the more points count."""
+    deviation = np.sqrt(weights @ (values - weights @ values) ** 2)
+    return float(SMOOTH_PROFILE * deviation * (weights**2).sum() ** 0.2)
+
+
+PANEL = 0.92
+"""Width in inches of a pair's panel, at least."""
+COLOURS = "viridis"
+CELLS, SMOOTH_SHADOW, EDGE, RIM = (6, 30), 1.0, 0.2, 0.2
+"""The region's shadow: fewest and most cells across it, how many it is smoothed over, the level at which its edge is
+drawn, and how much of its width is left free round it."""
+WIDEST = 18
+"""Characters of a parameter's name that fit beside a panel; a longer one is broken."""
+REGION = "95 % region"
+MARKS = {"answer": (VERMILLION, "o", 8.0, "none"), "truth": ("black", "v", 4.5, "black")}
+"""Colour, marker, size and filling."""
+
+
+def evaluations_figure(result: StudyResult) -> Figure:
+    """Draw where the trials went, each pair of parameters in a panel, on the shadow of the 95 % region.
+
+    A long, slanting shadow is a pair that makes up for each other. The darker a point, the lower its PRPV; an open one
+    was cut off, and its PRPV is an estimate; crosses are trials that failed; the ring is the answer, the triangle the θ
+    that made the target, where that is known. Of a single parameter, PRPV is drawn over its range.
+    """
+    count = len(result.study.settings.space.intervals)
+    cells = max(1, count - 1)
+    columns = max(2, cells)
+    width = max(COLUMN, PANEL * columns + 0.5)
+    figure = Figure(figsize=(width, 0.9 * width * cells / columns + 0.25), layout="constrained")
+    grid = figure.add_gridspec(cells, columns)
+    scores = [trial.score for trial in result.trials if trial.score is not None]
+    norm = Normalize(min(scores), max(scores))
+    pairs = [(column, row) for row in range(1, count) for column in range(row)]
+    for column, row in pairs:
+        _pair(figure.add_subplot(grid[row - 1, column]), result, (column, row), norm)
+    if not pairs:
+        _alone(figure.add_subplot(grid[0, 0]), result, norm)
+    floor = "" if result.floor.value is None else f"\n{floor_name(result.floor)} {result.floor.value:.1f}"
+    _key(figure.add_subplot(grid[0, 1:]), figure.axes[: len(pairs) or 1], norm, f"PRPV [ordered pairs]{floor}")
+    return figure
+
+
+def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normalize) -> None:
+    """The shadow of the region, the trials on it, then the answer and the truth; limits of the box."""
+    intervals = result.study.settings.space.intervals
+    _shadow(axes, result, places)
+    points = np.array([[trial.theta[intervals[place].name] for place in places] for trial in result.trials])
+    _scatter_trials(axes, result, points, norm)
+    _mark(axes, [result.best.trial.theta[intervals[place].name] for place in places], "answer")
+    if result.truth is not None and {intervals[place].name for place in places} <= set(result.truth):
+        _mark(axes, [result.truth[intervals[place].name] for place in places], "truth")
+    across, up = (intervals[place] for place in places)
+    axes.set_xlim(across.low, across.high)
+    axes.set_ylim(up.low, up.high)
+    _name(axes, result, places)
+
+
+def _alone(axes: Axes, result: StudyResult, norm: Normalize) -> None:
+    """PRPV of the trials over the range of a single parameter, on its 95 % interval."""
+    (box,) = result.study.settings.space.intervals
+    axes.axvspan(*result.knowledge.intervals[box.name], color=LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
+    points = np.array([[trial.theta[box.name], trial.score or 0.0] for trial in result.trials])
+    _scatter_trials(axes, result, points, norm)
+    _mark(axes, [result.best.trial.theta[box.name], result.best.assessment.prpv.value], "answer")
+    if result.truth is not None and box.name in result.truth:
+        _mark(axes, [result.truth[box.name], 0.0], "truth")
+    axes.set_xlim(box.low, box.high)
+    dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), "PRPV [ordered pairs]")
+
+
+def _scatter_trials(axes: Axes, result: StudyResult, points: Floats, norm: Normalize) -> None:
+    scored = np.array([trial.score is not None for trial in result.trials])
+    scores = [trial.score for trial in result.trials if trial.score is not None]
+    across, up = points[scored].T
+    axes.scatter(across, up, c=scores, cmap=COLOURS, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
+    cut = np.array([trial.state == "cut" for trial in result.trials])
+    if cut.any():
+        # Hollow: their colour is an estimate.
+        across, up = points[cut & scored].T
+        axes.scatter(across, up, color="white", s=4, linewidths=0, clip_on=False, zorder=3)
+        axes.scatter([], [], facecolors="white", edgecolors="0.4", s=10, linewidths=1.2, label="stopped early")
+    if not scored.all():
+        across, up = points[~scored].T
+        axes.scatter(across, up, marker="x", color="black", s=12, linewidths=0.8, clip_on=False, label="failed")
+
+
+def _mark(axes: Axes, place: list[float], label: str) -> None:
+    colour, marker, size, face = MARKS[label]
+    axes.plot(*place, marker, color=colour, markersize=size, markerfacecolor=face, linestyle="none", label=label,
+              clip_on=False, zorder=4)  # fmt: skip
+
+
+def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
+    """Draw where the 95 % region lies, whatever the other parameters are."""
+    intervals, posterior = result.study.settings.space.intervals, result.knowledge.posterior
+    inside = posterior.points[posterior.inside][:, places]
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    rim = RIM * (high - low) + 0.01
+    low, high = np.maximum(0.0, low - rim), np.minimum(1.0, high + rim)
+    cells = int(np.clip(1.5 * np.sqrt(len(inside)), *CELLS))
+    edges = [np.linspace(low[side], high[side], cells + 1) for side in (0, 1)]
+    counts, _, _ = np.histogram2d(inside[:, 0], inside[:, 1], bins=edges)
+    smooth = np.pad(gaussian_filter(np.minimum(counts, 1.0), SMOOTH_SHADOW, mode="nearest"), 1, mode="edge")
+    smooth /= smooth.max()
+    across, up = (
+        intervals[place].low
+        + (intervals[place].high - intervals[place].low) * np.concatenate([e[:1], 0.5 * (e[1:] + e[:-1]), e[-1:]])
+        for place, e in zip(places, edges, strict=True)
+    )
+    axes.contourf(across, up, smooth.T, levels=[EDGE, 2.0], colors=[LIGHT_BLUE], alpha=0.35, zorder=0)
+    axes.fill_between([], [], color=LIGHT_BLUE, alpha=0.35, linewidth=0, label=REGION)
+
+
+def _name(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
+    """Names and figures only at the left and the bottom; three figures a side, which is what fits."""
+    intervals, units = result.study.settings.space.intervals, result.study.family.parameters
+    dress(axes)
+    axes.xaxis.set_major_locator(MaxNLocator(2))
+    axes.yaxis.set_major_locator(MaxNLocator(3))
+    if places[1] == len(intervals) - 1:
+        name = intervals[places[0]].name
+        axes.set_xlabel(fill(with_unit(name, units[name].unit), WIDEST), fontsize=7)
+    else:
+        axes.set_xticklabels([])
+    if places[0] == 0:
+        name = intervals[places[1]].name
+        axes.set_ylabel(fill(with_unit(name, units[name].unit), WIDEST), fontsize=7)
+    else:
+        axes.set_yticklabels([])
+
+
+def _key(axes: Axes, panels: Sequence[Axes], norm: Normalize, title: str) -> None:
+    """The colours of PRPV and what the marks are, in the corner that the pairs leave free."""
+    axes.set_axis_off()
+    bar = axes.figure.colorbar(
+        ScalarMappable(norm, COLOURS), cax=axes.inset_axes((0.15, 0.8, 0.8, 0.08)), orientation="horizontal"
+    )
+    bar.ax.set_title(title, fontsize=7)
+    bar.ax.tick_params(labelsize=7)
+    named = named_handles(panels)
+    axes.legend(
+        list(named.values()), list(named), loc="upper center", bbox_to_anchor=(0.55, 0.62), fontsize=7, frameon=False
+    )
+
+
+def importance_figure(result: StudyResult) -> Figure:
+    """Draw each parameter's share in PRPV's variance over the box, most important first, with its 95 % interval.
+
+    The dot is what it takes part in, alone or together with others; the stroke is what it does alone.
+    """
+    ordered = sorted(result.importances, key=lambda one: one.share)
+    figure = Figure(figsize=(COLUMN, 1.1 + 0.25 * len(ordered)), layout="constrained")
+    axes = figure.subplots()
+    places = np.arange(len(ordered))
+    shares, alone = (np.array([getattr(one, name) for one in ordered]) for name in ("share", "alone"))
+    reach = np.abs(np.array([one.interval for one in ordered]).T - shares)
+    axes.errorbar(shares, places, xerr=reach, fmt="none", ecolor=BLUE, lw=1.0, capsize=2, label="95 % interval")
+    axes.plot(shares, places, "o", color=BLUE, markersize=5, label="alone or with others")
+    axes.plot(alone, places, "|", color="black", markersize=9, markeredgewidth=1.4, label="alone")
+    axes.set_yticks(places, [plain(one.name) for one in ordered])
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(-0.6, len(ordered) - 0.4)
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    dress(axes, "share in the variance of PRPV over the box")
+    legend_below(figure, axes)
+    return figure
+
+
+def study_figures(result: StudyResult) -> dict[str, Figure]:
+    """Convergence, profiles, evaluations and importance, by name."""
+    return {
+        "convergence": convergence_figure(result),
+        "profiles": profiles_figure(result),
+        "evaluations": evaluations_figure(result),
+        "importance": importance_figure(result),
+    }

@@ -1,0 +1,236 @@
+"""Tables of a study: parameters, usefulness, information, search, trials; on the terminal and as files."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.console import Group
+
+from proxytune.report.study.sentence import known_parameters, study_sentence
+from proxytune.report.table_files import write_latex
+from proxytune.report.text import file_texts, group_texts, section_text
+from proxytune.report.view import Column, Table, columns_of
+from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, short, short_span, span
+from proxytune.report.writing import write_text
+from proxytune.storage import TrialRecord
+from proxytune.study import PRPV, StudyResult
+from proxytune.usefulness import PAIRED, PERFECT, Assessment
+
+Rows = list[tuple[str, ...]]
+THETA, USEFULNESS, INFORMATION, SEARCH = (
+    "Parameters",
+    "Usefulness at the best θ (lower is better; 95 % intervals)",
+    "What informs each parameter",
+    "Search",
+)
+IN_SEARCH, MISFIT = "  in search", "misfit (p)"
+AGENTS, METRICS = 2, 1
+"""Numbers of agents and metrics that are named of those that inform a parameter most."""
+MEASURES = ("prpv", "ppv")
+
+
+def study_text(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Group:
+    """The result of a study as `study` prints it: one sentence, then one table per subject, a fact a row.
+
+    Args:
+        result: What it has found.
+        spent: Episodes and seconds of this run.
+        files: What was written.
+    """
+    sections = [part for table in study_tables(result, spent).values() for part in section_text(table)]
+    return group_texts(study_sentence(result), *sections, *file_texts(files))
+
+
+def study_tables(result: StudyResult, spent: str = "") -> dict[str, Table]:
+    """Tables by title: what is known of θ, how useful the proxy is there, what informs each parameter, the search.
+
+    Args:
+        result: What the study has found.
+        spent: Episodes and seconds of this run, if it is told.
+    """
+    informed = information_table(result)
+    tables = (theta_table(result), usefulness_table(result), informed, search_table(result, spent))
+    return {table.title: table for table in tables if table.rows}
+
+
+def theta_table(result: StudyResult) -> Table:
+    """A row per parameter, then the shares of the box that are left; the truth has a column only where it is known."""
+    share, as_good = result.knowledge.as_good
+    truth, rows = result.truth, Rows()
+    for known, box in zip(known_parameters(result), result.study.settings.space.intervals, strict=True):
+        low, high = known.interval
+        true = None if truth is None else truth.get(known.name)
+        outside = "" if true is None or low <= true <= high else " (outside)"
+        rows.append(
+            (
+                known.name,
+                f"{short(known.best, 4)} {known.unit}".strip(),
+                span(known.interval) if known.identified else "unidentified",
+                *(() if truth is None else ("" if true is None else f"{short(true, 4)}{outside}",)),
+                span(as_good[known.name], digits(as_good[known.name])),
+                f"{short(box.low)} to {short(box.high)}",
+            )
+        )
+    left = percent(result.knowledge.posterior.share)
+    rows.append(("share of the box", "", left, *(() if truth is None else ("",)), percent(share), ""))
+    heads = ("best", "95 % interval", *(() if truth is None else ("truth",)), "by PRPV alone", "box")
+    return Table(THETA, columns_of(("parameter",), heads), tuple(rows), tuple(_theta_notes(result)))
+
+
+def _theta_notes(result: StudyResult) -> list[str]:
+    """Notes on what the table of θ does not hold, most needed first."""
+    space, learnt = result.study.settings.space, result.knowledge
+    notes = []
+    if learnt.unidentified:
+        few = f"{len(result.trials)} trials exclude almost no value of {listed(list(map(plain, learnt.unidentified)))}"
+        notes.append(f"{few}; unidentified: the interval fills more than 0.9 of the range")
+    if not result.inside:
+        notes.append("the best θ by PRPV is outside the 95 % region, which uses every metric of every agent")
+    if result.truth is not None and set(space.names) <= set(result.truth):
+        holds = learnt.holds(space.values(result.truth))
+        notes.append(f"the 95 % region {'contains' if holds else 'does not contain'} the truth")
+    notes += [
+        f"{plain(one)} and {plain(other)} trade off: a change of one makes up for the other "
+        f"(correlation {fixed(correlation, 1)})"
+        for one, other, correlation in sorted(learnt.trades, key=lambda pair: -abs(pair[2]))
+    ]
+    return [*notes, *result.cautions]
+
+
+def usefulness_table(result: StudyResult) -> Table:
+    """PRPV on fresh episodes and in the search, the noise floor, chance, PPV, and whether the model fits.
+
+    Its notes are not what the sentence says already, nor advice on the options of `score`.
+    """
+    own, floor, chance = result.best.assessment, result.floor, result.judged.chance
+    rows = [*_objective_rows(result), *_prpv_rows(result)]
+    if floor.value is not None and (ends := short_span(floor.low, floor.high)):
+        meaning = floor.meaning if result.judged is own else "what a perfect proxy scores (this one re-run)"
+        rows.append((f"  {floor.title}", short(floor.value), ends, meaning))
+    as_low = f"a random ranking; as low: {probability(chance.p_value)}"
+    rows.append(("  chance", fixed(chance.mean, 1), f"± {fixed(chance.deviation, 1)}", as_low))
+    if own.ppv.value is not None:
+        rows.append(("PPV", f"{own.ppv.value:.3g}", "", "proxy predictivity value: error of the scores"))
+    misfit = result.knowledge.misfit
+    if misfit.p_value is None:
+        few = "too few complete trials to test whether any θ explains the target's scores"
+        rows.append((MISFIT, "–", "", few))
+    else:
+        fits = "some θ may explain" if misfit.fits else "no θ explains"
+        rows.append((MISFIT, f"{misfit.p_value:.2g}", "", f"{fits} the target's scores"))
+    columns = (*columns_of(("measure",), ("value", "interval")), Column("meaning"))
+    notes = tuple(note for note in result.judged.notes if note not in (PAIRED, PERFECT))
+    return Table(USEFULNESS, columns, tuple(rows), notes)
+
+
+def _objective_rows(result: StudyResult) -> Rows:
+    """The study's objective at the best θ, in the search and on fresh episodes; nothing where it is PRPV."""
+    objective, value = result.study.objective, result.value_of(result.best.trial)
+    if objective == PRPV or value is None:
+        return []
+    rows: Rows = [(objective.label, f"{value:.4g}", "", "the objective, in the search's own episodes")]
+    scores = result.confirmation.answer.scores if result.confirmation else ()
+    fresh = [objective.sign * score for score in scores if score is not None]
+    return [*rows, ("  fresh", f"{sum(fresh) / len(fresh):.4g}", "", "on fresh episodes")] if fresh else rows
+
+
+def _prpv_rows(result: StudyResult) -> Rows:
+    """PRPV of the best θ, first on fresh episodes where there are any, then on those that the search chose it by."""
+
+    def measured(assessment: Assessment) -> tuple[str, str]:
+        inner = assessment.prpv_interval
+        return str(assessment.prpv.value), short_span(inner.low, inner.high)
+
+    own, confirmation = result.best.assessment, result.confirmation
+    pairs = f"wrongly ordered pairs, 0 to {own.prpv.range[1]}"
+    if confirmation is None:
+        return [("PRPV", *measured(own), f"{pairs}; the search's own episodes")]
+    fresh = confirmation.answer.assessment
+    if fresh is None:
+        failed = "none on fresh episodes: an agent failed in all of them"
+        return [("PRPV", "–", "", failed), (IN_SEARCH, *measured(own), pairs)]
+    optimism, others = confirmation.answer.optimism or 0.0, len(confirmation.candidates) - 1
+    luck = f"{optimism:.3g} lower by luck" if optimism > 0.0 else "no optimism"
+    rivals = f"; {others} runner{'' if others == 1 else 's'}-up re-run as well" if others else ""
+    return [
+        ("PRPV", *measured(fresh), f"{pairs}; fresh episodes"),
+        (IN_SEARCH, *measured(own), f"{luck}{rivals}"),
+    ]
+
+
+def information_table(result: StudyResult) -> Table:
+    """A row for every parameter of which the scores hold information, with shares of Fisher's information."""
+
+    def largest(shares: Sequence[tuple[str, float]], count: int) -> str:
+        return ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares[:count] if share >= 0.005)
+
+    rows = tuple(
+        (one.name, agents, largest(one.metrics, METRICS), one.limit)
+        for one in result.knowledge.information
+        if (agents := largest(one.agents, AGENTS))
+    )
+    return Table(INFORMATION, columns_of(("parameter", "most informative agents", "metric", "limited by")), rows)
+
+
+def search_table(result: StudyResult, spent: str = "") -> Table:
+    """Trials and why they ended, the pre-flight, trials stopped early, what PRPV depends on, what failed."""
+    count, budget = len(result.trials), result.study.settings.budget
+    number = f"{count} (budget {budget})" if count > budget else f"{count} of {budget}"
+    ended = f"; ended: {result.stopped}" if result.stopped else ""
+    rows: Rows = [("trials", f"{number}; best: trial {result.best.trial.number}{ended}")]
+    if result.preflight is not None:
+        warnings = [line.removeprefix("pre-flight: ") for line in result.preflight.warnings]
+        every = ["every parameter changes some metric beyond noise"]
+        rows += [("pre-flight", line) for line in warnings or every]
+    if result.cut:
+        episodes, seconds = result.spared
+        trials = f"{len(result.cut)} trial{'' if len(result.cut) == 1 else 's'} that could not be the best"
+        rows.append(("stopped early", f"{trials}; saved {episodes} episodes ({seconds:.3g} s)"))
+    ordered = sorted(result.importances, key=lambda one: -one.share)
+    shares = [f"{one.name} {one.share:.2f} ({one.interval[0]:.2f} to {one.interval[1]:.2f})" for one in ordered]
+    rows.append(("Sobol index", f"total, of PRPV over the box: {', '.join(shares)}"))
+    if result.failed_episodes:
+        failed = sum(trial.state == "failed" for trial in result.trials)
+        lost = f", and with them {failed} of {count} trials" if failed else ""
+        head = f"{result.failed_episodes} of {result.episodes} episodes{lost}; the first:"
+        rows += [("failed", head), *(("", line) for line in result.failures)]
+    if spent:
+        rows.append(("episodes", spent))
+    return Table(SEARCH, columns_of(("", "")), tuple(rows))
+
+
+def trials_table(trials: Sequence[TrialRecord], names: Sequence[str], measures: Sequence[str] = MEASURES) -> Table:
+    """Every trial that has ended: its θ, in the order of these names, and its measures, the first of which counts."""
+    rows = Rows()
+    for trial in trials:
+        first, *others = (trial.measures.get(name) for name in measures)
+        counts = "failed" if first is None else f"{first:g}"
+        if trial.bound is not None:
+            counts = f"stopped early, at least {trial.bound:g}"
+        theta = (f"{trial.theta[name]:.4g}" for name in names)
+        beside = ("" if value is None else f"{value:.3g}" for value in others)
+        rows.append((str(trial.number), *theta, counts, *beside, str(trial.failed_episodes)))
+    heads = ("trial", *names, *(name.upper() for name in measures), "failed episodes")
+    return Table("Trials", columns_of((), heads), tuple(rows))
+
+
+def write_study_tables(result: StudyResult, trials: pd.DataFrame, folder: Path) -> list[Path]:
+    """Write trials.csv, and as LaTeX parameters.tex and usefulness.tex; their paths.
+
+    Args:
+        result: What the study has found.
+        trials: One row per trial.
+        folder: Where to.
+
+    Raises:
+        RunError: If one cannot be written.
+    """
+    write_text(folder / "trials.csv", trials.to_csv(lineterminator="\n"))
+    for name, table, width in (
+        ("parameters.tex", theta_table(result), None),
+        ("usefulness.tex", usefulness_table(result), 3),
+    ):
+        heads = [one.name for one in table.columns]
+        write_latex(folder / name, heads[:width], [row[:width] for row in table.rows])
+    return [folder / name for name in ("trials.csv", "parameters.tex", "usefulness.tex")]

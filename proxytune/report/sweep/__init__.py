@@ -1,1 +1,0 @@
-"""A sweep: JSON, CSV, tables and figures."""

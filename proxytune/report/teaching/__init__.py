@@ -1,1 +1,0 @@
-"""Learning value: JSON, tables and figures."""

@@ -1,0 +1,121 @@
+"""One view model of everything that finds something: sentence, next step, tables, figures and notes.
+
+A subject builds its view once from results; `text` shows it on a terminal, `html` as a page.
+"""
+
+import platform
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from proxytune.identity import versions_of
+
+PACKAGES = ("proxytune", "numpy", "scipy", "pybullet")
+"""Packages that results may depend on."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        name: Its head, with the unit; a line break is where the terminal breaks it.
+        numbers: Whether its cells are numbers, with or without intervals and units; else they are texts.
+    """
+
+    name: str
+    numbers: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes:
+        title: Its heading.
+        columns: Its columns; of a table without a head they have no names.
+        rows: Its cells as people read them; the first names the row, and what it is indented by tells what it is of.
+        notes: Sentences below it.
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure with what to see in it.
+
+    Attributes:
+        title: What it is of, in a few words.
+        image: The bytes of a PNG, GIF or SVG file.
+        caption: What to see in it, a sentence or two.
+    """
+
+    title: str
+    image: bytes
+    caption: str
+
+
+@dataclass(frozen=True)
+class Paragraphs:
+    """A heading with paragraphs.
+
+    Attributes:
+        title: The heading.
+        paragraphs: Each a sentence or more.
+    """
+
+    title: str
+    paragraphs: tuple[str, ...]
+
+
+Part = Picture | Table | Paragraphs
+
+
+@dataclass(frozen=True)
+class View:
+    """Result of anything, for people.
+
+    Attributes:
+        title: What it is about.
+        sentence: What was found, in a sentence.
+        next_step: What to do next, in a sentence; "" where there is nothing to do.
+        parts: Pictures, tables and paragraphs, in their order.
+    """
+
+    title: str
+    sentence: str
+    next_step: str
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True)
+class Foot:
+    """Facts that it takes to come by a page again.
+
+    Attributes:
+        command: The command that makes it, as typed in a shell.
+        settings: Names and values.
+        versions: Packages and their versions.
+        date: When it was written.
+    """
+
+    command: str
+    settings: tuple[tuple[str, str], ...]
+    versions: tuple[tuple[str, str], ...]
+    date: str
+
+
+def columns_of(texts: Sequence[str], numbers: Sequence[str] = ()) -> tuple[Column, ...]:
+    """Columns of texts, then columns of numbers."""
+    return (*map(Column, texts), *(Column(name, numbers=True) for name in numbers))
+
+
+def foot_of(command: str, settings: Iterable[tuple[str, str]] = ()) -> Foot:
+    """The foot of a page that is written now."""
+    known = [(name, version) for name, version in versions_of(PACKAGES).items() if version != "unknown"]
+    versions = (("Python", platform.python_version()), *known)
+    return Foot(command, tuple(settings), versions, f"{datetime.now().astimezone():%Y-%m-%d %H:%M %Z}")

@@ -1,0 +1,66 @@
+"""Numbers and names as people read them: no more digits than are known, with a true minus sign."""
+
+import math
+
+Ends = tuple[float, float]
+
+
+def digits(ends: Ends) -> int:
+    """Decimals that give the width of an interval two significant figures."""
+    width = abs(ends[1] - ends[0])
+    return max(0, 1 - math.floor(math.log10(width))) if width > 0.0 else 3
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals, to tens where these are −1; one that rounds to zero has no sign."""
+    text = f"{round(value, decimals):.{max(0, decimals)}f}"
+    return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
+
+
+def short(value: float, figures: int = 3) -> str:
+    """A number of three significant figures; of four where it is to be used again."""
+    return f"{value:.{figures}g}".replace("-", "−")
+
+
+def span(ends: Ends, decimals: int | None = None) -> str:
+    """An interval with the decimals that its width allows, as "0.108 to 0.146"."""
+    places = digits(ends) if decimals is None else decimals
+    return f"{fixed(ends[0], places)} to {fixed(ends[1], places)}"
+
+
+def short_span(low: float | None, high: float | None) -> str:
+    """An interval of three significant figures; empty where an end is not known."""
+    return "" if low is None or high is None else f"{short(low)} to {short(high)}"
+
+
+def with_span(value: float | str, low: float | None, high: float | None) -> str:
+    """A number with its interval in brackets, where that is known; a text is taken as the number stands."""
+    ends, text = short_span(low, high), value if isinstance(value, str) else short(value)
+    return f"{text} ({ends})" if ends else text
+
+
+def percent(share: float) -> str:
+    """A share of the box in per cent, of two significant figures."""
+    if share <= 0.0:
+        return "0 %"
+    return "under 0.001 %" if share < 1e-5 else f"{float(f'{100.0 * share:.2g}'):g} %"
+
+
+def probability(p_value: float) -> str:
+    """A p-value, as "p = 0.36" or "p < 0.001"."""
+    return "p < 0.001" if p_value < 0.001 else f"p = {p_value:.2g}"
+
+
+def listed(names: list[str]) -> str:
+    """Names as a list in a sentence: "a", "a and b", "a, b and c"."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]])) if names else ""
+
+
+def plain(name: str) -> str:
+    """The name of an effect as words."""
+    return name.replace("_", " ")
+
+
+def with_unit(name: str, unit: str) -> str:
+    """The name of a parameter or measure for an axis, with its unit in brackets."""
+    return f"{plain(name)} [{unit}]" if unit else plain(name)

@@ -1,0 +1,228 @@
+"""Exported files drive, look and say as was found."""
+
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pybullet
+import pytest
+from export_truth import ROBOT, instance
+
+from proxytune.cli.export import WRITERS
+from proxytune.driving import AXLES, drivetrain, orientation, read_body
+from proxytune.driving.plants import PlanarPlant
+from proxytune.effects import CATALOGUE, Setting, effects_from, theta_names
+from proxytune.errors import InputError, SettingsError
+from proxytune.report.export.instance import FORMATS, PLACES, export_lines, place_of
+from proxytune.report.export.mjcf import mjcf_text
+from proxytune.report.export.ros import ros_text
+from proxytune.report.export.urdf import urdf_text
+
+DUTIES = np.repeat([[0.5, 0.5], [0.3, 0.6], [0.9, 0.9], [-0.2, 0.3]], 60, axis=0)
+FOUND = {
+    "as it is": {},
+    "pulls to one side": {"trim": 0.1, "wheel_gain__left": 0.9},
+    "late and lazy": {"delay": 0.3, "motor_lag__time_constant": 0.4, "motor_lag__imbalance": 0.3},
+    "weak, and turns easily": {"saturation__limit": 0.5, "saturation__imbalance": 0.2, "yaw_scrub": 0.12},
+}
+
+
+def planar(found):
+    robot = found.robot
+    train = drivetrain(robot, effects_from(found.theta, robot.figures))
+    twists, _ = train.apply(DUTIES, train.begin(Setting(60.0, np.zeros(2), robot.figures)))
+    return PlanarPlant(np.zeros(3), 1.0 / 60.0).move(twists)[0]
+
+
+@pytest.mark.parametrize("case", FOUND)
+def test_mujoco_drives_the_exported_model_as_the_planar_plant_drives_the_instance(case):
+    mujoco = pytest.importorskip("mujoco")
+    found = instance(**FOUND[case])
+    model = mujoco.MjModel.from_xml_string(mjcf_text(found))
+    data, poses = mujoco.MjData(model), []
+    for tick, duties in enumerate(DUTIES, start=1):
+        data.ctrl[:] = duties
+        while data.time < tick / 60.0 - 1e-9:
+            mujoco.mj_step(model, data)
+        w, _, _, z = data.qpos[3:7]
+        poses.append((*data.qpos[:2], 2.0 * np.arctan2(z, w)))
+    poses, expected = np.array(poses), planar(found)
+    driven = np.linalg.norm(np.diff(expected[:, :2], axis=0), axis=1).sum()
+    assert np.linalg.norm(poses[:, :2] - expected[:, :2], axis=1).max() < 0.015 * driven
+    assert abs(np.arctan2(*(f(poses[-1, 2] - expected[-1, 2]) for f in (np.sin, np.cos)))) < 0.03
+
+
+def test_mujocos_camera_stands_and_looks_as_was_found():
+    mujoco = pytest.importorskip("mujoco")
+    found = instance(camera_pitch=30.0, camera_yaw=5.0, camera_roll=-3.0, camera_height=0.12, field_of_view=80.0)
+    model = mujoco.MjModel.from_xml_string(mjcf_text(found))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    axes = data.cam_xmat[0].reshape(3, 3)
+    turned = orientation(found.camera)
+    assert np.column_stack((-axes[:, 2], -axes[:, 0], axes[:, 1])) == pytest.approx(turned, abs=1e-6)
+    assert data.cam_xpos[0] == pytest.approx((0.066, 0.0, 0.12))
+    assert model.cam_fovy[0] == pytest.approx(80.0)
+
+
+def test_the_exported_urdf_has_wheels_that_turn_and_pull_as_was_found():
+    found = instance(trim=0.1, wheel_gain__left=0.9, yaw_scrub=0.2)
+    body = read_body(ET.fromstring(urdf_text(found)), Path("exported.urdf"))
+    assert (body.left.joint, body.right.joint) == AXLES
+    assert (body.left.radius_m, body.right.radius_m) == pytest.approx((0.0318 * 0.9 * 0.9, 0.0318 * 1.1))
+    assert [wheel.centre[2] for wheel in (body.left, body.right)] == pytest.approx(
+        [body.left.radius_m, body.right.radius_m]
+    )
+    assert body.wheel_distance == pytest.approx(0.2)
+
+
+def test_pybullet_loads_the_exported_urdf_and_finds_camera_and_tracked_point_where_they_are(tmp_path):
+    found = instance(camera_pitch=30.0, camera_yaw=5.0, marker_offset__forward=0.05, heading_offset=30.0)
+    path = tmp_path / "found.urdf"
+    path.write_text(urdf_text(found), encoding="utf-8")
+    world = pybullet.connect(pybullet.DIRECT)
+    try:
+        body = pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=world)
+        base, _ = pybullet.getBasePositionAndOrientation(body, physicsClientId=world)
+        offset = np.array(pybullet.getDynamicsInfo(body, -1, physicsClientId=world)[3])
+        links = {
+            pybullet.getJointInfo(body, number, physicsClientId=world)[12].decode(): pybullet.getLinkState(
+                body, number, physicsClientId=world
+            )[4:6]
+            for number in range(pybullet.getNumJoints(body, physicsClientId=world))
+        }
+    finally:
+        pybullet.disconnect(world)
+    root = np.array(base) - offset
+    place, turn = links["camera"]
+    matrix = np.array(pybullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
+    assert np.array(place) - root == pytest.approx((0.066, 0.0, 0.108), abs=1e-6)
+    assert matrix == pytest.approx(orientation(found.camera), abs=1e-6)
+    place, turn = links["tracked_point"]
+    assert np.array(place) - root == pytest.approx((0.05, 0.0, 0.0), abs=1e-6)
+    assert pybullet.getEulerFromQuaternion(turn)[2] == pytest.approx(np.pi / 6.0)
+
+
+def test_ros_parameters_are_those_that_make_the_robot_go_as_told():
+    yaml = pytest.importorskip("yaml")
+    found = instance(trim=0.1, yaw_scrub=0.2, saturation__limit=0.5, slew_rate=0.5, lens_distortion=-0.2)
+    nodes = yaml.safe_load(ros_text(found))
+    assert all(set(node) == {"ros__parameters"} for node in nodes.values())
+    wheels, camera = (nodes[name]["ros__parameters"] for name in ("diff_drive_controller", "camera"))
+    assert wheels["wheel_separation"] * wheels["wheel_separation_multiplier"] == pytest.approx(0.2)
+    assert (wheels["left_wheel_radius_multiplier"], wheels["right_wheel_radius_multiplier"]) == (0.9, 1.1)
+    assert wheels["linear.x.max_velocity"] == pytest.approx(0.6 * 0.5 * 0.9)
+    # A duty rises at the same rate whatever it is cut off at.
+    assert wheels["linear.x.max_acceleration"] == pytest.approx(0.6 * 0.9 / 0.5)
+    assert wheels["angular.z.max_acceleration"] == pytest.approx(2.0 / 0.2 * 0.6 * 0.9 / 0.5)
+    assert camera["camera_info.d"] == [-0.2, 0.0, 0.0, 0.0, 0.0]
+    assert nodes["camera_transform"]["ros__parameters"]["translation.z"] == pytest.approx(0.108)
+
+
+def with_urdf(folder, *changes):
+    """The Duckiebot with changes of its URDF."""
+    text = ROBOT.urdf.read_text()
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after)
+    (folder / "changed.urdf").write_text(text)
+    return replace(ROBOT, urdf=folder / "changed.urdf")
+
+
+def test_a_link_may_have_a_quote_in_its_name(tmp_path):
+    robot = with_urdf(tmp_path, ('"wheel_left"', '"wheel\'s"'))
+    root = ET.fromstring(urdf_text(instance(robot, wheel_gain__left=0.9)))
+    assert read_body(root, Path("exported.urdf")).left.radius_m == pytest.approx(0.0318 * 0.9)
+
+
+def test_a_urdf_with_a_number_that_is_none_is_one_line(tmp_path):
+    joint = (
+        '<joint name="spot" type="fixed"><parent link="p"/><child link="tracked_point"/><origin xyz="a b c"/></joint>'
+    )
+    robot = with_urdf(tmp_path, ("</robot>", f"{joint}</robot>"))
+    with pytest.raises(SettingsError, match="changed.urdf: is no sound URDF .*; correct it"):
+        urdf_text(instance(robot, marker_offset__forward=0.05))
+
+
+@pytest.mark.parametrize("form", [urdf_text, mjcf_text])
+def test_names_with_signs_of_xml_give_a_file_that_can_be_read(form):
+    named = replace(instance(replace(ROBOT, name='R&D "<b>"')), source="a----b -")
+    root = ET.fromstring(form(named))
+    assert root.tag in ("robot", "mujoco")
+    assert form is urdf_text or root.get("model") == 'R&D "<b>"'
+
+
+def test_a_robot_that_lacks_what_a_format_needs_is_refused_by_name():
+    with pytest.raises(SettingsError, match="robot 'duckiebot' has no body"):
+        urdf_text(instance(replace(ROBOT, urdf=None)))
+    lighter = {name: value for name, value in ROBOT.figures.items() if name != "mass"}
+    with pytest.raises(InputError, match="states no mass; add it to its robot.toml"):
+        mjcf_text(instance(replace(ROBOT, figures=lighter)))
+
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "exporting.md"
+NEEDED = {
+    "floor_slope.push": {"floor_slope.x": 0.1},
+    **{f"{effect}.imbalance": {} for effect in ("dead_band", "stiction", "saturation", "motor_lag", "backlash")},
+    "saturation.imbalance": {"saturation.limit": 0.7},
+}
+
+
+def without_comments(text):
+    return re.sub(r"<!--.*?-->|#.*", "", text, flags=re.DOTALL if "<!--" in text else 0)
+
+
+def parameters():
+    for effect in CATALOGUE.values():
+        yield from ((effect.name, name, one) for name, one in zip(theta_names(effect), effect.parameters, strict=True))
+
+
+def test_every_effect_of_the_catalogue_is_there():
+    assert list(PLACES) == list(CATALOGUE)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize(("effect", "name", "parameter"), list(parameters()), ids=lambda value: str(value)[:30])
+def test_a_value_changes_the_file_where_it_has_a_place_and_nowhere_else(form, effect, name, parameter):
+    beside = NEEDED.get(name, {})
+    values = [parameter.low + share * (parameter.high - parameter.low) for share in (0.4, 0.7)]
+    texts = [
+        without_comments(
+            WRITERS[form](instance(**{key.replace(".", "__"): one for key, one in {**beside, name: value}.items()}))
+        )
+        for value in values
+    ]
+    assert (texts[0] != texts[1]) == bool(place_of(effect, form))
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_what_has_no_place_stands_at_the_head_of_the_file_with_value_and_interval(form):
+    found = instance(intervals={"dead_band.width": (0.05, 0.07)}, dead_band__width=0.06)
+    head = WRITERS[form](found)
+    assert "dead_band.width 0.06 duty (0.05 to 0.07): NO PLACE, not in this file" in head
+    assert "delay 0.15 s" in head
+    assert "dead_band.width" in [line.name for line in export_lines(found, form) if not line.place]
+
+
+def test_neutral_values_that_have_no_place_are_not_told():
+    names = [line.name for line in export_lines(instance(dead_band__width=0.0, turn_slip=0.0), "urdf")]
+    assert not {"dead_band.width", "turn_slip"} & set(names)
+
+
+def test_what_was_learnt_and_a_users_own_have_no_place():
+    assert [place_of(name, form) for name in ("learnt", "weak_reverse:WeakReverse") for form in FORMATS] == [""] * 6
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_effect_is_in_the_table_of_the_page(name):
+    row = f"| `{name}` | " + " | ".join(place or "no place" for place in PLACES[name]) + " |"
+    assert row in PAGE.read_text(encoding="utf-8").splitlines()
+
+
+def test_the_duckiebot_as_it_is_keeps_its_wheels_and_camera():
+    from proxytune.driving import parse_urdf, read_body
+
+    before = read_body(parse_urdf(ROBOT.urdf), ROBOT.urdf)
+    assert WRITERS["urdf"](instance()).count(f'radius="{before.left.radius_m:g}"') == 4

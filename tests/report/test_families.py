@@ -1,0 +1,114 @@
+"""Sentence, figure and page of several families."""
+
+from dataclasses import replace
+
+import pytest
+from matplotlib.text import Text
+from several_tuned import compared, family, lesson
+
+from proxytune.learning import Estimate
+from proxytune.report.families import families_answer, families_figure, families_next_step
+from proxytune.report.figure_style import COLUMN
+from proxytune.study import Lesson
+
+DEAR, CHEAP = (2.0, 2.2, 1.8, 2.0), (1.0, 1.1, 0.9, 1.0)
+BOTH = (family("bullet", 0, DEAR, noise=8.0), family("planar", 0, CHEAP, noise=8.0))
+
+
+def test_a_clear_winner_is_said_to_predict_best_and_to_be_used():
+    found = compared(family("bullet", 0, DEAR), family("planar", 4, CHEAP))
+    answer = families_answer(found)
+    assert answer.startswith("To predict: bullet, fresh PRPV (proxy relative predictivity value) 0 (0 to 0); worse: ")
+    assert "worse: planar +8 (" in answer
+    assert answer.endswith("Cheapest: planar, 1 s per episode (0.93 to 1.1); times as long: bullet 2 (2 to 2).")
+    assert "To teach" not in answer
+    assert families_next_step(found) == "use bullet to predict; its page: study/families/bullet/report.html."
+
+
+def test_of_those_that_cannot_be_told_apart_the_one_that_costs_least_is_to_be_used():
+    found = compared(*BOTH)
+    assert "; cannot be told from it: planar +0 (" in families_answer(found)
+    assert families_next_step(found).startswith(
+        "use planar to predict, which costs least of those; to tell them apart, "
+    )
+
+
+def test_where_they_cost_alike_too_what_would_tell_them_apart_is_said():
+    found = compared(family("a", 0, CHEAP, noise=8.0), family("b", 0, CHEAP, noise=8.0))
+    assert families_next_step(found) == "to tell a and b apart, raise starts and measure the target from them too."
+    assert "cannot be told from it: b 1 (1 to 1)." in families_answer(found)
+
+
+def test_a_ratio_of_hundreds_is_written_out():
+    found = compared(family("a", 0, CHEAP), family("b", 1, tuple(131.0 * one for one in CHEAP)))
+    assert "times as long: b 130 (130 to 130)." in families_answer(found)
+
+
+def test_no_better_than_chance_is_said():
+    found = compared(family("a", 4, noise=0.1), family("b", 4, noise=0.1))
+    for one in found.families:
+        object.__setattr__(one.fresh.chance, "p_value", 0.4)
+    assert found.families[0].fresh.chance.explains
+    assert "To predict: none is shown to be better than chance; lowest is a, fresh PRPV" in families_answer(found)
+    assert families_next_step(found).startswith("raise stop.wall_time_s (now 60)")
+
+
+def test_without_fresh_episodes_nothing_is_claimed():
+    found = compared(family("a", fresh=False), family("b", fresh=False))
+    assert "To predict: not known, since no family has fresh episodes." in families_answer(found)
+    assert families_next_step(found).startswith("run the study again")
+
+
+@pytest.mark.parametrize(
+    ("lessons", "says"),
+    [
+        (
+            {"bullet": lesson(300.0), "planar": lesson(100.0, (200.0, 50.0, 300.0))},
+            "To teach: bullet, PLV (proxy learning value) 300 (290 to 310) target samples saved; "
+            "worse: planar, 200 (50 to 300) more samples.",
+        ),
+        (
+            {"bullet": lesson(300.0), "planar": lesson(290.0, (10.0, -50.0, 30.0))},
+            "target samples saved; cannot be told from it: planar, 10 (−50 to 30) more samples.",
+        ),
+        (
+            {"bullet": lesson(5.0), "planar": Lesson({}, failure="no")},
+            "To teach: none is shown to save target samples; ",
+        ),
+        ({"bullet": lesson(50.0), "planar": Lesson({}, failure="no")}, "worse: planar, which cannot teach."),
+        ({"bullet": Lesson({}, 1.0), "planar": Lesson({}, 1.0)}, "is not known, learners have not converged; raise "),
+        ({}, "To teach: PLV (proxy learning value) is not known, nothing was taught yet."),
+    ],
+)
+def test_who_teaches_best_is_said_with_the_samples_saved(lessons, says):
+    assert says in families_answer(compared(*BOTH, lessons=lessons))
+
+
+def labels(figure):
+    return {text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]}
+
+
+def test_the_figure_has_a_panel_per_use_and_tells_best_alike_and_worse_apart():
+    families = (family("good", 0, DEAR), family("bad", 4, DEAR), family("poor", 3, CHEAP))
+    lessons = {"good": lesson(-20.0), "bad": Lesson({}, failure="no"), "poor": lesson(-30.0, (10.0, -50.0, 30.0))}
+    figure = families_figure(compared(*families, lessons=lessons))
+    assert [axes.get_xlabel().split("\n")[0] for axes in figure.axes] == ["fresh PRPV", "PLV", "time per"]
+    assert figure.get_figwidth() == COLUMN
+    assert labels(figure) == {"best", "cannot be told from it", "worse"}
+    assert [text.get_text() for text in figure.axes[1].texts] == ["not known"]
+    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["good", "bad", "poor"]
+    assert figure.axes[1].get_xlim()[0] < -40.0
+    figure.canvas.draw()
+    assert all(text.get_fontsize() >= 6.0 for text in figure.findobj(Text) if text.get_text())
+
+
+def test_an_interval_of_which_one_end_is_not_known_is_drawn_to_the_other():
+    lessons = {"a": lesson(-20.0), "b": replace(lesson(-30.0), plv=Estimate(-30.0, None, 5.0))}
+    plv = families_figure(compared(family("a"), family("b"), lessons=lessons)).axes[1]
+    assert [-30.0, 5.0] in [list(line.get_xdata()) for line in plv.lines]
+
+
+def test_without_teaching_the_figure_has_no_panel_of_it_and_a_long_name_is_shortened():
+    figure = families_figure(compared(family("a" * 40), family("b", 2)))
+    assert len(figure.axes) == 2
+    assert figure.axes[0].get_yticklabels()[0].get_text() == f"{'a' * 15}…"

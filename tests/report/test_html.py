@@ -1,0 +1,198 @@
+"""Pages as HTML: nothing from elsewhere, everything escaped, for every screen and reader."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from io import BytesIO
+
+import pytest
+from hypothesis import given, strategies as st
+from PIL import Image
+
+from proxytune.report.html import MANY, page_html, write_page
+from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of, foot_of
+
+VOID = {"meta", "link", "img", "br"}
+EVIL = "<script>alert('\"&')</script>"
+
+
+def png(width=20, **more):
+    image = BytesIO()
+    Image.new("RGB", (width, 10)).save(image, format="png", **more)
+    return image.getvalue()
+
+
+FOOT = Foot("python -m proxytune study a", (("seed", "1"),), (("numpy", "2"),), "2026-01-01")
+TABLE = Table(
+    "Numbers", columns_of(("name",), ("value",)), (("a", "1.5"), ("b", "−2 (−3 to 1)"), ("c", "")), ("a note",)
+)
+VIEW = View(
+    "title", "An answer.", "do this", (Picture("Curve", png(), "See."), TABLE, Paragraphs("Words", ("One.", "Two.")))
+)
+
+
+def html_of(view):
+    return page_html(view, FOOT)
+
+
+class Reader(HTMLParser):
+    """Keeps every element with its attributes, and checks that all are closed in order."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.elements, self.open = [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def all(self, *tags):
+        return [attrs for tag, attrs in self.elements if tag in tags]
+
+
+def test_every_text_of_every_field_is_escaped():
+    evil = View(
+        EVIL,
+        EVIL,
+        EVIL,
+        (
+            Picture(EVIL, png(), EVIL),
+            Table(EVIL, (Column(EVIL), Column(EVIL, numbers=True)), ((EVIL, EVIL),), (EVIL,)),
+            Table(EVIL, (Column(""), Column("")), ((EVIL, EVIL),)),
+            Paragraphs(EVIL, (EVIL, f"`{EVIL}`")),
+        ),
+    )
+    text = page_html(evil, Foot(EVIL, ((EVIL, EVIL),), ((EVIL, EVIL),), EVIL), 5)
+    elements = Reader(text)
+    assert elements.all("script") == []
+    assert text.count("alert(") >= 20
+    (image,) = elements.all("img")
+    assert EVIL in image["alt"]
+
+
+@given(st.text(max_size=40))
+def test_no_text_breaks_the_page(text):
+    tags = [tag for tag, _ in Reader(html_of(VIEW)).elements]
+    view = replace(VIEW, title=text, sentence=text.replace("`", ""), next_step="do " + text.replace("`", ""))
+    assert [tag for tag, _ in Reader(html_of(view)).elements] == tags
+
+
+def test_nothing_is_loaded_from_elsewhere_and_no_script_may_run():
+    text = html_of(replace(VIEW, next_step="see https://example.org"))
+    elements = Reader(text)
+    for attrs in elements.all(*{tag for tag, _ in elements.elements}):
+        for key in {"src", "href", "srcset", "action", "data"} & attrs.keys():
+            assert attrs[key].startswith(("data:", "#"))
+    assert "url(" not in text
+    assert "@import" not in text
+    (policy,) = [one["content"] for one in elements.all("meta") if "Policy" in one.get("http-equiv", "")]
+    assert policy.startswith("default-src 'none'; img-src data:;")
+    assert "script-src" not in policy
+
+
+def test_headings_come_in_order_one_of_them_the_first():
+    tags = [tag for tag, _ in Reader(html_of(VIEW)).elements if re.fullmatch(r"h\d", tag)]
+    assert tags[0] == "h1"
+    assert tags.count("h1") == 1
+    assert set(tags[1:]) == {"h2"}
+
+
+def test_tables_have_scopes_and_captions_and_scroll_in_a_region_that_the_keyboard_reaches():
+    elements = Reader(html_of(VIEW))
+    assert {attrs.get("scope") for attrs in elements.all("th")} == {"row", "col"}
+    assert len(elements.all("caption")) == len(elements.all("table")) == 2
+    regions = [attrs for attrs in elements.all("div") if attrs.get("class") == "scroll"]
+    ids = {attrs["id"] for attrs in elements.all("h2")}
+    assert len(regions) == 3
+    assert all(one["tabindex"] == "0" and one["role"] == "region" and one["aria-labelledby"] in ids for one in regions)
+
+
+def test_columns_of_numbers_end_together_and_texts_begin_together():
+    columns = (Column("value", numbers=True), Column("text"))
+    text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("1", "2"), ("2", "x"))),)))
+    assert '<th scope="col" class="number">value</th><th scope="col">text</th>' in text
+    assert '<th scope="row" class="number">1</th><td>2</td>' in text
+    assert '<td class="number">−2 (−3 to 1)</td>' in html_of(VIEW)
+
+
+def test_a_long_cell_is_wrapped_also_among_numbers_and_a_head_is_one_line():
+    columns = columns_of(("a\nb",), ("value",))
+    text = html_of(replace(VIEW, parts=(replace(TABLE, columns=columns, rows=(("x", "w" * 29),)),)))
+    assert '<td class="prose">www' in text
+    assert '<th scope="col">a b</th>' in text
+
+
+def test_a_table_of_contents_is_there_only_for_many_parts_and_leads_to_each():
+    assert "<nav" not in html_of(replace(VIEW, parts=(TABLE,) * MANY))
+    elements = Reader(html_of(replace(VIEW, parts=(TABLE,) * (MANY + 1))))
+    ids = {attrs["id"] for attrs in elements.all("h2")}
+    links = [attrs["href"] for attrs in elements.all("a")]
+    assert len(links) == MANY + 1
+    assert {link.removeprefix("#") for link in links} <= ids
+
+
+def test_only_a_page_under_way_renews_itself():
+    assert 'http-equiv="refresh"' not in html_of(VIEW)
+    text = page_html(VIEW, FOOT, 7)
+    assert '<meta http-equiv="refresh" content="7">' in text
+    assert "loads itself again every 7 s" in text
+
+
+def test_without_anything_to_do_next_nothing_is_said():
+    assert "Next:" in html_of(VIEW)
+    assert "Next:" not in html_of(replace(VIEW, next_step=""))
+
+
+def test_commands_between_backticks_are_code():
+    text = html_of(replace(VIEW, next_step="run `a < b`"))
+    assert "run <code>a &lt; b</code>" in text
+
+
+def test_the_page_fits_phones_paper_and_the_dark():
+    text = html_of(VIEW)
+    assert 'name="viewport" content="width=device-width' in text
+    for words in ("@media print", "@media (prefers-color-scheme: dark)", ".card { display: block;", "background: #fff"):
+        assert words in text
+
+
+def test_the_foot_says_how_to_come_by_it_again():
+    foot = html_of(VIEW).split("<footer>")[1]
+    for words in ("python -m proxytune study a", "seed", "numpy 2", "Written 2026-01-01"):
+        assert words in foot
+    written = foot_of("a command", [("seed", "1")])
+    assert dict(written.versions).keys() >= {"Python", "numpy", "scipy"}
+    assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d", written.date)
+
+
+@pytest.mark.parametrize(("dpi", "width"), [(None, 400), ((200, 200), 288)])
+def test_figures_are_drawn_at_one_and_a_half_times_their_printed_size(dpi, width):
+    image = png(400, **({"dpi": dpi} if dpi else {}))
+    (attrs,) = Reader(html_of(replace(VIEW, parts=(Picture("P", image, "C"),)))).all("img")
+    assert attrs["width"] == str(width)
+
+
+@pytest.mark.parametrize(
+    ("image", "kind"), [(b"GIF89a", "gif"), (b'<?xml version="1.0"?><svg xmlns="x"></svg>', "svg+xml"), (png(), "png")]
+)
+def test_pictures_are_data_of_their_own_kind(image, kind):
+    if kind == "gif":
+        file = BytesIO()
+        Image.new("P", (4, 4)).save(file, format="gif")
+        image = file.getvalue()
+    assert f'src="data:image/{kind};base64,' in html_of(replace(VIEW, parts=(Picture("P", image, "C"),)))
+
+
+def test_what_is_no_picture_is_refused():
+    with pytest.raises(ValueError, match="no PNG, GIF or SVG"):
+        html_of(replace(VIEW, parts=(Picture("P", b"MZ", "C"),)))
+
+
+def test_a_page_is_written_as_it_is_shown(tmp_path):
+    write_page(tmp_path / "new" / "report.html", VIEW, FOOT)
+    assert (tmp_path / "new" / "report.html").read_text(encoding="utf-8") == html_of(VIEW)

@@ -1,0 +1,200 @@
+"""Page and figures of `score`."""
+
+import numpy as np
+import pytest
+
+from proxytune.errors import RunError
+from proxytune.report.score_figures import FLIP_COLOURS, LONGEST, MOST, flipped_pairs_figure, scatter_figure
+from proxytune.report.scores import score_next_step, score_sentence, write_score_report
+from proxytune.report.view import foot_of
+from proxytune.report.writing import save_figure
+from proxytune.scores import Metric, ScoreTable
+from proxytune.usefulness import assess, select_proxy
+
+M = (Metric("distance"),)
+EVIL = "<script>alert(1)</script>"
+
+
+def table(order, episodes=4):
+    """Scores of agents A, B, … that differ as the numbers of the order do."""
+    rng = np.random.default_rng(1)
+    values = np.array(order, dtype=float)[:, None, None] + 0.01 * rng.normal(size=(len(order), episodes, 1))
+    agents = tuple(f"{EVIL}{place}" for place in range(len(order)))
+    return ScoreTable(agents, tuple(map(str, range(episodes))), ("distance",), values)
+
+
+TARGET = table(range(10))
+SAME, REVERSED = table(range(10)), table(range(10)[::-1])
+
+
+def assessed(proxy, **more):
+    return assess(proxy=proxy, target=TARGET, metrics=M, resamples=100, **more)
+
+
+def test_the_answer_says_prpv_and_whether_chance_explains_it():
+    good, bad = assessed(SAME), assessed(REVERSED)
+    answer = score_sentence({"a": good}, None, target="t")
+    assert answer.startswith(
+        "As a proxy of t, a has a PRPV (proxy relative predictivity value) of 0 (0 to 0), of at most"
+    )
+    assert ": better than chance (" in answer
+    assert "no better than chance (" in score_sentence({"b": bad}, None, target="t")
+    assert "until chance can be excluded" in score_next_step({"b": bad}, None)
+
+
+def test_single_episodes_have_no_interval_and_the_next_step_is_more_of_them():
+    single = assess(proxy=table(range(5), 1), target=table(range(5), 1), metrics=M, resamples=100)
+    assert "of 0, of at most 20" in score_sentence({"a": single}, None, target="t")
+    assert "at least two episodes" in score_next_step({"a": single}, None)
+
+
+def test_of_several_the_best_is_called_better_only_beyond_noise():
+    tables = {"good": SAME, "bad": REVERSED}
+    found = {name: assessed(one) for name, one in tables.items()}
+    selection = select_proxy(proxies=tables, target=TARGET, metrics=M, resamples=100)
+    assert "good ranks the agents most like t, beyond noise better than bad" in score_sentence(
+        found, selection, target="t"
+    )
+    assert score_next_step(found, selection).startswith("use good")
+    twins = {"good": SAME, "other": table(range(10))}
+    selection = select_proxy(proxies=twins, target=TARGET, metrics=M, resamples=100)
+    found = {name: assessed(one) for name, one in twins.items()}
+    assert "not beyond noise better than any other" in score_sentence(found, selection, target="t")
+    assert "tell the best proxies apart" in score_next_step(found, selection)
+
+
+def test_the_page_has_what_the_terminal_shows_each_note_once_and_no_markup_of_names(tmp_path):
+    found = {EVIL: assessed(REVERSED), "other": assessed(SAME)}
+    selection = select_proxy(proxies={EVIL: REVERSED, "other": SAME}, target=TARGET, metrics=M, resamples=100)
+    texts = []
+    for proxies, ranked, count in (({EVIL: found[EVIL]}, None, 2), (found, selection, 4)):
+        figures, page = write_score_report(proxies, ranked, tmp_path, foot_of("a"), target=EVIL)
+        texts.append(page.read_text(encoding="utf-8"))
+        assert len(figures) == texts[-1].count("<figure>") == count
+    one, both = texts
+    for text in (one, both):
+        assert "<script" not in text
+        assert "Kendall τ distance" in one
+        assert "PRPV" in text
+        for note in found[EVIL].notes:
+            assert text.count(note.split(";")[0].replace("'", "&#x27;")) == 1
+
+
+SCORE_FIGURES_M = (Metric("distance"), Metric("time", "min"))
+
+
+def score_figures_table(seed, agents=6, episodes=3):
+    values = np.random.default_rng(seed).normal(size=(agents, episodes, 2))
+    return ScoreTable(
+        tuple(f"A{i}" for i in range(agents)), tuple(map(str, range(episodes))), ("distance", "time"), values
+    )
+
+
+@pytest.fixture
+def assessment():
+    return assess(proxy=score_figures_table(4), target=score_figures_table(5), metrics=SCORE_FIGURES_M, resamples=100)
+
+
+def test_the_scatter_has_a_panel_per_metric_with_every_agent_named(assessment):
+    panels = scatter_figure(assessment).axes
+    assert [axes.get_xlabel() for axes in panels] == ["distance on the target", "time on the target"]
+    for column, axes in enumerate(panels):
+        points = next(line for line in axes.lines if line.get_marker() == "o")
+        np.testing.assert_array_equal(points.get_xdata(), assessment.inputs.target.means[:, column])
+        np.testing.assert_array_equal(points.get_ydata(), assessment.inputs.proxy.means[:, column])
+        assert sorted(text.get_text() for text in axes.texts) == sorted(assessment.inputs.agents)
+
+
+@pytest.mark.parametrize("agents", [6, MOST])
+def test_no_two_names_overlap_and_none_is_cut_at_85_millimetres(agents):
+    values = np.round(np.random.default_rng(1).normal(size=(agents, 3, 2)), 1)
+    values[: agents // 2] = 1.0
+    names = tuple(f"policy_number_{i}" for i in range(agents))
+    both = ScoreTable(names, ("0", "1", "2"), ("distance", "time"), values)
+    figure = scatter_figure(assess(proxy=both, target=both, metrics=SCORE_FIGURES_M, resamples=20))
+    assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        heights = sorted(text.get_position()[1] * axes.bbox.height for text in axes.texts)
+        assert np.diff(heights).min() * 72.0 / figure.dpi > max(text.get_fontsize() for text in axes.texts)
+        assert max(text.get_window_extent().x1 for text in axes.texts) <= figure.bbox.x1
+
+
+def test_names_are_in_the_proxys_order_each_tied_to_its_point(assessment):
+    axes = scatter_figure(assessment).axes[0]
+    means = assessment.inputs.proxy.means[:, 0]
+    top_down = sorted(axes.texts, key=lambda text: -text.get_position()[1])
+    assert [text.get_text() for text in top_down] == [f"A{row}" for row in np.argsort(-means)]
+    for text in axes.texts:
+        row = int(text.get_text()[1:])
+        assert text.xy == (assessment.inputs.target.means[row, 0], means[row])
+
+
+def test_of_many_agents_those_are_named_whose_rank_differs_most():
+    scores = np.arange(40.0)[:, None, None]
+    moved = scores.copy()
+    moved[[3, 36]] = scores[[36, 3]]
+    names = tuple(f"module.of.some.package:agent{row}" for row in range(40))
+    tables = [ScoreTable(names, ("0",), ("distance",), values) for values in (scores, moved)]
+    (axes,) = scatter_figure(assess(proxy=tables[0], target=tables[1], metrics=SCORE_FIGURES_M[:1])).axes
+    named = [text.get_text() for text in axes.texts]
+    assert len(named) == MOST
+    assert {name.rsplit(":", 1)[1] for name in named} >= {"agent3", "agent36"}
+    assert max(map(len, named)) == LONGEST
+
+
+def test_error_bars_are_standard_errors(assessment):
+    axes = scatter_figure(assessment).axes[0]
+    bars = axes.collections[0].get_segments()
+    values = assessment.inputs.target.values[0, :, 0]
+    half = np.ptp(bars[0][:, 0]) / 2
+    assert half == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)))
+
+
+def test_the_map_colours_each_pair_once_and_counts_them(assessment):
+    axes = flipped_pairs_figure(assessment.prpv).axes[0]
+    cells = np.asarray(axes.collections[0].get_array().filled(np.nan))
+    kinds = list(FLIP_COLOURS)
+    drawn = {kind: int((cells == number).sum()) for number, kind in enumerate(kinds)}
+    for kind in kinds[1:]:
+        assert drawn[kind] == sum(pair.flip == kind for pair in assessment.prpv.pairs)
+    assert len(assessment.prpv.pairs) > 3
+    assert sum(drawn.values()) == 15
+    assert np.isnan(cells[np.triu_indices(6)]).all()
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"{k}: {n}" for k, n in drawn.items()]
+
+
+def test_pairs_of_more_agents_than_can_be_named_are_a_picture_over_ranks_of_the_same_width():
+    found = assess(
+        proxy=score_figures_table(4, agents=300),
+        target=score_figures_table(5, agents=300),
+        metrics=SCORE_FIGURES_M,
+        resamples=2,
+    )
+    few, many = (
+        flipped_pairs_figure(one.prpv)
+        for one in (assess(proxy=score_figures_table(4), target=score_figures_table(5), metrics=SCORE_FIGURES_M), found)
+    )
+    assert few.get_figwidth() == many.get_figwidth()
+    assert few.get_figwidth() * 25.4 == pytest.approx(85.0)
+    (picture,) = many.axes[0].images
+    reversed_ = list(FLIP_COLOURS).index("reversed")
+    assert (picture.get_array() == reversed_).sum() == sum(pair.flip == "reversed" for pair in found.prpv.pairs) > 0
+    many.draw_without_rendering()
+    assert not any("A" in label.get_text() for label in many.axes[0].get_yticklabels())
+
+
+def test_constant_scores_and_two_agents_are_drawn_too(tmp_path):
+    flat = ScoreTable(("A", "B"), ("1",), ("distance", "time"), np.ones((2, 1, 2)))
+    found = assess(proxy=flat, target=flat, metrics=SCORE_FIGURES_M)
+    assert scatter_figure(found).axes[0].get_title() == "SRCC undefined"
+    for name, figure in (("one", scatter_figure(found)), ("two", flipped_pairs_figure(found.prpv))):
+        save_figure(figure, tmp_path / "new" / f"{name}.png")
+        assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_figure_that_cannot_be_written_leaves_nothing_behind(assessment, tmp_path):
+    (tmp_path / "map.png").mkdir()
+    with pytest.raises(RunError, match=r"map\.png: the figure cannot be written"):
+        save_figure(flipped_pairs_figure(assessment.prpv), tmp_path / "map.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["map.png"]

@@ -1,0 +1,181 @@
+"""Sentence of a study."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from confirmations import LACKS, TOLD, planted
+
+from proxytune.report.study.sentence import Finding, KnownParameter, declared_of, finding_of, say_finding
+from proxytune.scores import Metric, ScoreTable
+from proxytune.search import Information
+from proxytune.storage import Store
+from proxytune.study import StudyRun, open_study, result_of
+from proxytune.usefulness import Chance, NoiseFloor
+
+TRIM = KnownParameter("trim", "", 0.1213, (0.108, 0.146), 0.06, True)
+PITCH = KnownParameter("camera_pitch", "deg", 13.04, (11.1, 14.4), 0.1, True)
+BLUR = KnownParameter("blur", "s", 0.026, (0.005, 0.062), 0.57, True)
+DELAY = KnownParameter("delay", "s", 0.1, (0.001, 0.298), 0.99, False)
+TABLE = ScoreTable(("a", "b"), ("0",), ("distance",), np.array([[[1.0]], [[2.0]]]))
+FLOOR = NoiseFloor("same starts", 5.0, 1.0, 9.0, 1000, TABLE, (Metric("distance", "max"),))
+FOUND = Finding(
+    parameters=(TRIM, PITCH, BLUR),
+    region=0.0016,
+    inside=True,
+    prpv=6,
+    fresh=True,
+    floor=FLOOR,
+    chance=Chance(65.8, 13.7, 0.001, 1000, None),
+    perfect=True,
+    misfit=0.4,
+    fits=True,
+    information=Information("blur", (("daredevil", 0.6), ("wary", 0.4)), (("distance", 1.0),), "starts"),
+    left=0,
+    budget=24,
+    ruled=False,
+    starts=4,
+    most_starts=10,
+    confirm=1,
+    declared=("trim", "delay"),
+)
+ABOVE = replace(FOUND, prpv=16, perfect=False)
+BY_CHANCE = replace(ABOVE, prpv=58, chance=Chance(65.8, 13.7, 0.3, 1000, None))
+
+
+def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter_comes_next():
+    assert say_finding(FOUND) == (
+        "θ found: trim 0.121 (0.108 to 0.146), camera pitch 13.0 deg (11.1 to 14.4), blur 0.026 s (0.005 to 0.062). "
+        "PRPV (proxy relative predictivity value) is 6 on fresh episodes, noise floor 5 (1 to 9): "
+        "no difference from the target can be seen. "
+        "Next: use this θ; to know blur better, raise starts from 4 to 8 and measure the target from them too."
+    )
+
+
+def test_a_score_above_the_floor_is_not_called_found():
+    text = say_finding(ABOVE)
+    assert text.startswith("θ narrowed down to 0.16 % of the box: trim 0.121 ")
+    assert "noise floor 5 (1 to 9): better than chance, but a perfect proxy scores lower." in text
+    assert "found" not in text
+
+
+@pytest.mark.parametrize(
+    ("limit", "inside", "step"),
+    [
+        ("trials", True, "raise budget from 24 to 48"),
+        ("starts", True, "raise starts from 4 to 8 and measure the target from them too"),
+        ("starts", False, "raise budget from 24 to 48"),
+    ],
+)
+def test_the_next_step_is_what_keeps_more_from_being_told(limit, inside, step):
+    found = replace(ABOVE, inside=inside, information=replace(FOUND.information, limit=limit))
+    assert say_finding(found).endswith(f" Next: {step}, to get closer.")
+
+
+def test_where_a_rule_ended_the_search_a_larger_budget_would_not_help(finished):
+    found = replace(ABOVE, inside=False, ruled=True)
+    assert say_finding(found).endswith("Next: loosen the rule under [stop] that ended the search, to get closer.")
+    with Store.read(finished) as store:
+        result = result_of(StudyRun(open_study(finished), store))
+    assert finding_of(result).ruled is False
+    assert finding_of(replace(result, trials=result.trials[:3])).ruled is True
+
+
+def test_no_more_starts_are_asked_for_than_there_are():
+    assert "raise starts from 4 to 5 " in say_finding(replace(ABOVE, most_starts=5))
+    assert "add agents or metrics: all 4 starts are driven" in say_finding(replace(ABOVE, most_starts=4))
+
+
+def test_a_proxy_that_lacks_something_is_sent_to_diagnose():
+    text = say_finding(replace(ABOVE, fits=False, misfit=0.0042))
+    assert text.startswith("The proxy lacks something: no θ explains the target's scores (p = 0.0042). PRPV (")
+    assert text.endswith("run `python -m proxytune diagnose LOG --declared trim,delay`.")
+    assert "a perfect proxy scores lower" not in say_finding(replace(FOUND, fits=False, perfect=False))
+    assert say_finding(replace(ABOVE, fits=False, declared=())).endswith("run `python -m proxytune diagnose LOG`.")
+
+
+def test_what_chance_explains_is_not_found_and_has_its_probability():
+    text = say_finding(BY_CHANCE)
+    assert text == (
+        "No θ found. PRPV (proxy relative predictivity value) is 58 on fresh episodes, no better than chance "
+        "(65.8 ± 13.7, p = 0.3). Next: raise budget from 24 to 48, or add agents whose scores differ more."
+    )
+    assert "diagnose LOG" in say_finding(replace(BY_CHANCE, fits=False))
+    assert "confirm" not in say_finding(replace(BY_CHANCE, fresh=False, confirm=0))
+
+
+def test_without_fresh_episodes_luck_is_named_and_they_are_the_next_step():
+    unconfirmed = replace(ABOVE, fresh=False, confirm=0)
+    assert "is 16 in the search's own episodes, which may be partly luck." in say_finding(unconfirmed)
+    assert say_finding(unconfirmed).endswith(
+        "Next: set confirm = 1 and run the study again, to drive the best θ afresh."
+    )
+    assert "set confirm" not in say_finding(replace(unconfirmed, confirm=1))
+    assert "perfect" not in say_finding(unconfirmed)
+
+
+def test_halves_of_the_target_say_nothing_of_a_perfect_proxy():
+    text = say_finding(replace(ABOVE, floor=replace(FLOOR, kind="halves")))
+    assert "the noise floor is not known" in text
+    assert "(1 to 9)" not in text
+
+
+def test_a_study_under_way_says_so_and_how_to_go_on():
+    text = say_finding(replace(ABOVE, left=10))
+    assert text.startswith("14 of 24 trials so far. θ narrowed down")
+    assert text.endswith("Next: run the study again for the 10 trials that are left.")
+
+
+def test_unidentified_parameters_are_named_without_an_interval_and_with_who_tells_of_them():
+    text = say_finding(replace(ABOVE, parameters=(TRIM, DELAY), information=TOLD[0]))
+    assert "trim 0.121 (0.108 to 0.146); delay is unidentified." in text
+    assert "add an agent or a metric whose scores change with delay (so far agent4's do most), or a log" in text
+    nothing = say_finding(replace(ABOVE, parameters=(DELAY, replace(DELAY, name="blur")), information=None))
+    assert nothing.startswith("θ is unknown: delay and blur are unidentified.")
+
+
+def test_a_best_value_outside_its_interval_is_not_shown_as_if_it_were_inside():
+    text = say_finding(replace(ABOVE, parameters=(replace(TRIM, best=0.2), PITCH)))
+    assert "trim 0.200 (95 % region: 0.108 to 0.146)" in text
+
+
+def test_of_many_parameters_only_some_are_named():
+    many = tuple(replace(TRIM, name=f"gain{number}") for number in range(7))
+    text = say_finding(replace(FOUND, parameters=many))
+    assert "gain4 0.121 (0.108 to 0.146) and 2 more." in text
+    assert "gain5" not in text
+
+
+def test_only_effects_on_motion_are_declared_to_diagnose_each_once():
+    names = ("blur", "trim", "motor_lag.time_constant", "camera_pitch", "wheel_gain.left", "wheel_gain.right")
+    assert declared_of(names) == ("trim", "motor_lag", "wheel_gain")
+
+
+def test_a_study_s_finding_holds_what_the_study_knows(finished):
+    with Store.read(finished) as store:
+        result = result_of(StudyRun(open_study(finished), store))
+    found = finding_of(planted(result, deviation=(3.0, 0.01), misfit=LACKS))
+    assert [(known.name, known.unit, known.identified) for known in found.parameters] == [
+        ("delay", "s", False),
+        ("trim", "", True),
+    ]
+    trim = found.parameters[1]
+    assert trim.interval == pytest.approx((0.1 - 0.6 * 0.0196, 0.1 + 0.6 * 0.0196), abs=0.002)
+    assert trim.share == pytest.approx(4 * 0.0098, rel=0.1)
+    assert (found.least.name, found.information.name) == ("delay", "delay")
+    assert (found.fits, found.misfit, found.fresh, found.left) == (False, 0.002, False, 0)
+    assert (found.budget, found.starts, found.most_starts, found.confirm) == (7, 3, 5, 0)
+    silent = replace(TOLD[0], agents=(("agent0", 0.0),))
+    assert finding_of(planted(result, deviation=(3.0, 0.01), information=(silent, TOLD[1]))).information is None
+    assert finding_of(replace(result, stopped="", trials=result.trials[:3])).left == 4
+
+
+def test_a_score_at_the_floor_of_a_theta_that_other_scores_exclude_is_not_called_perfect():
+    text = say_finding(replace(FOUND, perfect=False, inside=False))
+    assert text.startswith("θ narrowed down to 0.16 % of the box: ")
+    assert (
+        "noise floor 5 (1 to 9): PRPV can get no better, but other scores of the agents differ from the target's."
+        in text
+    )
+    assert "no difference" not in text
+    assert text.endswith("Next: raise budget from 24 to 48, to get closer.")

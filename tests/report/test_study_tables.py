@@ -1,0 +1,317 @@
+"""Document and tables of a study."""
+
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
+from rich.console import Console
+
+from proxytune.report.study.document import study_document
+from proxytune.report.study.sentence import study_sentence
+from proxytune.report.study.tables import (
+    INFORMATION,
+    SEARCH,
+    THETA,
+    USEFULNESS,
+    information_table,
+    search_table,
+    study_text,
+    theta_table,
+    trials_table,
+    usefulness_table,
+)
+from proxytune.search import make_proposer
+from proxytune.space import Interval
+from proxytune.storage import Store
+from proxytune.study import Preflight, StudyRun, open_study, result_of, run_study
+from proxytune.study.preflight import Movement
+
+
+@pytest.fixture
+def result(finished):
+    with Store.read(finished) as store:
+        return result_of(StudyRun(open_study(finished), store))
+
+
+def row_of(table, name):
+    """The row of a name; None where there is none."""
+    return next((row for row in table.rows if row[0] == name), None)
+
+
+def test_the_document_has_the_promised_keys_and_is_plain_json(result):
+    document = json.loads(json.dumps(study_document(result), allow_nan=False))
+    best = result.best
+    assert document["best"]["theta"] == dict(best.trial.theta)
+    assert document["best"]["prpv"] == best.trial.prpv
+    assert document["best"]["prpv_interval"] == [best.assessment.prpv_interval.low, best.assessment.prpv_interval.high]
+    assert document["best"]["ppv"] == best.trial.ppv
+    assert [trial["index"] for trial in document["trials"]] == [1, 2, 3, 4, 5, 6, 7]
+    assert {"index", "theta", "prpv", "ppv", "failed_episodes"} <= set(document["trials"][0])
+    assert document["target"] == {
+        "path": str(result.study.settings.target),
+        "files": [str(result.study.settings.target)],
+        "agents": 6,
+        "episodes_per_agent": [3, 3],
+    }
+    assert document["settings"]["parameters"] == {"delay": [0.0, 0.3], "trim": [-0.3, 0.3]}
+
+
+def of_plain_types(value):
+    """Whether JSON's own types are all there is: numpy's would print, and differ by version."""
+    if isinstance(value, dict):
+        return all(type(key) is str and of_plain_types(one) for key, one in value.items())
+    if isinstance(value, list):
+        return all(map(of_plain_types, value))
+    return type(value) in (str, int, float, bool, type(None))
+
+
+def test_every_value_is_of_json_s_own_types(result):
+    assert of_plain_types(study_document(result))
+    assert not of_plain_types({"share": np.float64(0.5)})
+
+
+def test_what_is_known_of_theta_is_in_the_document(result):
+    document = study_document(replace(planted(result, misfit=LACKS), truth={"trim": 0.1}, cautions=("few starts",)))
+    best = document["best"]
+    assert list(best["theta_interval"]) == ["delay", "trim"]
+    assert best["theta_interval"]["trim"] == pytest.approx([0.0765, 0.1235], abs=0.002)
+    assert best["region_share"] == pytest.approx(6 * np.pi * 0.05 * 0.02, rel=0.2)
+    assert best["unidentified"] == []
+    assert document["misfit"] == {"p_value": 0.002, "fits": False, "deviance": 9.0, "expected_deviance": 1.1}
+    assert document["as_good"] == {
+        "region_share": 0.0625,
+        "theta_interval": {"delay": [0.03, 0.21], "trim": [0.05, 0.15]},
+    }
+    assert document["information"]["trim"] == {
+        "agents": {"agent1": 1.0},
+        "metrics": {"distance": 0.75, "survival_time": 0.25},
+        "limit": "trials",
+    }
+    assert (document["truth"], document["cautions"]) == ({"trim": 0.1}, ["few starts"])
+    assert study_document(result)["truth"] is None
+    assert study_document(planted(result, misfit=UNTOLD))["misfit"]["fits"] is None
+
+
+def test_pairs_that_trade_are_in_the_document(result):
+    (trade,) = study_document(planted(result, (0.5, 0.5), (0.1, 0.1), correlation=-0.9))["trades"]
+    assert trade[:2] == ["delay", "trim"]
+    assert trade[2] == pytest.approx(-0.9, abs=0.05)
+    assert study_document(planted(result))["trades"] == []
+
+
+def test_the_document_tells_the_floor_s_kind_and_whether_the_proxy_is_as_good_as_perfect(result):
+    document = study_document(result)
+    floor = result.floor
+    assert (document["noise_floor_kind"], document["cannot_be_told_from_perfect"]) == ("halves", False)
+    assert (document["noise_floor"], document["noise_floor_interval"]) == (floor.value, [floor.low, floor.high])
+    assert document["chance"] == result.judged.chance.mean
+
+
+def shown(result):
+    console = Console(width=300, file=io.StringIO())
+    console.print(study_text(result, "none run", {"figure": "convergence.png"}))
+    return console.file.getvalue()
+
+
+def test_the_first_line_is_the_sentence_that_json_has_too_then_the_table(result):
+    first, *others = shown(result).splitlines()
+    assert first == study_sentence(result) == study_document(result)["sentence"]
+    titles = [line for line in others if line in (THETA, USEFULNESS, INFORMATION, SEARCH)]
+    assert titles == [THETA, USEFULNESS, INFORMATION, SEARCH]
+    assert others[2].split()[:2] == ["parameter", "best"]
+    assert others[-2].split() == ["episodes", "none", "run"]
+    assert others[-1].rstrip() == "figure: convergence.png"
+
+
+def test_names_are_shown_as_they_are_and_not_taken_for_markup(result):
+    told = (replace(TOLD[0], agents=(("[red]agent", 1.0),)), TOLD[1])
+    assert "[red]agent 100 %" in shown(planted(result, information=told))
+
+
+def test_people_see_what_the_proxy_is_worth(result):
+    rows = {label.strip(): rest for label, *rest in usefulness_table(result).rows}
+    assert list(rows) == ["PRPV", "halves", "chance", "PPV", "misfit (p)"]
+    value, interval, meaning = rows["PRPV"]
+    assert value == f"{result.best.trial.prpv:g}"
+    assert " to " in interval
+    assert "0 to 30" in meaning
+    assert rows["PPV"][2].startswith("proxy predictivity value")
+    assert not row_of(search_table(result), "failed")
+    label, text = search_table(result).rows[0]
+    assert (label, text.startswith("7 of 7; best: trial ")) == ("trials", True)
+
+
+def with_floor(result, **changes):
+    own = result.best.assessment
+    floor = replace(own.noise_floor, **changes)
+    return replace(result, best=replace(result.best, assessment=replace(own, noise_floor=floor)))
+
+
+def test_halves_are_not_called_a_noise_floor(result):
+    assert "upper bound" in row_of(usefulness_table(result), "  halves")[3]
+    known = with_floor(result, kind="same starts", value=5.0, low=1.0, high=9.0)
+    row = row_of(usefulness_table(known), "  noise floor")
+    assert row[1:3] == ("5", "1 to 9")
+    assert row[3] == "target against itself from the same starts: what a perfect proxy scores"
+    assert not row_of(usefulness_table(with_floor(result, value=None)), "  halves")
+
+
+def test_the_floor_of_a_confirmed_study_is_said_to_be_the_proxy_s_own(result):
+    assert not [row for row in usefulness_table(result).rows if "this one re-run" in row[3]]
+    again = confirmed(result, kind="same starts")
+    assert [row for row in usefulness_table(again).rows if "this one re-run" in row[3]]
+
+
+def test_notes_give_no_advice_that_study_cannot_follow(result):
+    assert any("--unpaired" in note for note in result.judged.notes)
+    assert usefulness_table(result).notes
+    assert not any("--unpaired" in note for note in usefulness_table(result).notes)
+
+
+def test_it_is_said_whether_any_theta_explains_the_target(result):
+    row = row_of(usefulness_table(planted(result)), "misfit (p)")
+    assert row == ("misfit (p)", "0.4", "", "some θ may explain the target's scores")
+    lacking = row_of(usefulness_table(planted(result, misfit=LACKS)), "misfit (p)")
+    assert (lacking[1], lacking[3]) == ("0.002", "no θ explains the target's scores")
+    assert "too few" in row_of(usefulness_table(planted(result, misfit=UNTOLD)), "misfit (p)")[3]
+
+
+def test_how_a_study_came_to_its_end_is_said_and_a_study_under_way_says_nothing(result):
+    assert study_document(result)["stopped"] == "the budget of 7 trials is spent"
+    assert search_table(result).rows[0][1].endswith("; ended: the budget of 7 trials is spent")
+    under_way = replace(result, stopped="")
+    assert study_document(under_way)["stopped"] is None
+    assert "ended" not in search_table(under_way).rows[0][1]
+
+
+def test_more_trials_than_the_budget_are_not_written_as_a_share_of_it(result):
+    settings = replace(result.study.settings, budget=5)
+    lowered = replace(result, study=replace(result.study, settings=settings))
+    assert search_table(lowered).rows[0][1].startswith("7 (budget 5); best: trial ")
+
+
+def test_that_every_parameter_matters_is_said_too(result):
+    moved = Movement(Interval("trim", -0.3, 0.3), 0.01, "distance", 2.0, 0.5, 12, False)
+    flown = replace(result, preflight=Preflight({"trim": 0.0}, (moved,), 144))
+    assert study_document(result)["preflight"] is None
+    assert study_document(flown)["preflight"]["parameters"]["trim"] == {
+        "moves": True,
+        "p_value": 0.01,
+        "metric": "distance",
+        "change": 2.0,
+        "noise": 0.5,
+        "pairs": 12,
+    }
+    assert search_table(flown).rows[1] == ("pre-flight", "every parameter changes some metric beyond noise")
+    still = replace(flown.preflight, movements=(replace(moved, p_value=0.5),))
+    label, warning = search_table(replace(flown, preflight=still)).rows[1]
+    assert (label, warning.startswith("'trim' is not shown to change a metric")) == ("pre-flight", True)
+    assert flown.episodes == result.episodes + 144
+
+
+def test_what_was_cut_off_and_saved_is_told(result):
+    assert not row_of(search_table(result), "stopped early")
+    assert study_document(result)["trials"][0]["cut_off"] is None
+    first, *others = result.trials
+    cut = replace(first, state="cut", score=17.5, measures={}, decided=("agent0", "agent2"), bound=12.0)
+    found = replace(result, trials=(cut, *others), spared=(12, 3.456))
+    assert row_of(search_table(found), "stopped early") == (
+        "stopped early",
+        "1 trial that could not be the best; saved 12 episodes (3.46 s)",
+    )
+    document = study_document(found)
+    assert document["cut_off"] == {"trials": 1, "episodes": 12, "seconds": 3.456}
+    assert document["trials"][0]["prpv"] is None
+    assert document["trials"][0]["cut_off"] == {
+        "prpv_at_least": 12.0,
+        "prpv_estimate": 17.5,
+        "agents": ["agent0", "agent2"],
+    }
+    assert trials_table(found.trials, ["trim"]).rows[0][2] == "stopped early, at least 12"
+    assert found.episodes == result.episodes - 12
+
+
+def test_failed_episodes_are_told_with_the_first_of_them(make_study):
+    folder = make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6")
+    with Store.open(folder) as store:
+        study_run = StudyRun(open_study(folder), store)
+        run_study(study_run, make_proposer("gp", 5))
+        result = result_of(StudyRun(open_study(folder), store))
+    table = search_table(result)
+    head, first = row_of(table, "failed"), table.rows[table.rows.index(row_of(table, "failed")) + 1]
+    assert head == ("failed", "6 of 108 episodes; the first:")
+    assert first[1].startswith("trial 1: agent 'agent3' failed from start 1: ")
+    assert study_document(result)["trials"][0]["failed_episodes"] == 1
+
+
+@pytest.fixture
+def known(finished):
+    with Store.read(finished) as store:
+        return planted(replace(result_of(StudyRun(open_study(finished), store)), cautions=()))
+
+
+def test_a_row_has_the_best_value_its_interval_what_is_as_good_and_the_box(known):
+    assert [one.name for one in theta_table(known).columns] == [
+        "parameter",
+        "best",
+        "95 % interval",
+        "by PRPV alone",
+        "box",
+    ]
+    delay, trim, last = theta_table(known).rows
+    assert delay[:2] == ("delay", f"{known.best.trial.theta['delay']:.4g} s")
+    assert delay[2:] == ("0.091 to 0.149", "0.03 to 0.21", "0 to 0.3")
+    assert trim[3:] == ("0.05 to 0.15", "−0.3 to 0.3")
+    assert last[0] == "share of the box"
+    assert last[3:] == ("6.2 %", "")
+    assert 0.3 < float(last[2].removesuffix(" %")) < 3.0
+
+
+def test_the_truth_has_a_column_only_where_it_is_known_and_is_marked_outside_the_interval(known):
+    known = replace(known, truth={"trim": 0.1, "delay": 0.29})
+    assert theta_table(known).columns[3].name == "truth"
+    assert [row[3] for row in theta_table(known).rows] == ["0.29 (outside)", "0.1", ""]
+    assert [row[3] for row in theta_table(replace(known, truth={"trim": 0.1})).rows] == ["", "0.1", ""]
+
+
+def test_a_parameter_with_an_interval_of_nearly_its_range_is_unidentified(known):
+    vague = planted(known, deviation=(3.0, 0.02))
+    assert theta_table(vague).rows[0][2] == "unidentified"
+    assert theta_table(vague).notes[0].startswith("7 trials exclude almost no value of delay; unidentified")
+    assert not [line for line in theta_table(known).notes if "unidentified" in line]
+
+
+def test_pairs_that_trade_are_named_with_their_correlation(known):
+    trading = planted(known, centre=(0.5, 0.5), deviation=(0.1, 0.1), correlation=-0.9)
+    assert any("delay and trim trade off" in note and "correlation −0.9" in note for note in theta_table(trading).notes)
+    assert not [line for line in theta_table(known).notes if "trade off" in line]
+
+
+def test_it_is_said_whether_the_region_holds_the_truth_and_the_best_theta(known):
+    best = dict(known.best.trial.theta)
+    unit = (best["delay"] / 0.3, (best["trim"] + 0.3) / 0.6)
+    inside = planted(known, centre=unit)
+    assert theta_table(replace(inside, truth=best)).notes == ("the 95 % region contains the truth",)
+    outside = planted(known, centre=tuple((place + 0.5) % 1.0 for place in unit))
+    first, second = theta_table(replace(outside, truth=best)).notes
+    assert first.startswith("the best θ by PRPV is outside the 95 % region")
+    assert second == "the 95 % region does not contain the truth"
+
+
+def test_what_the_target_s_table_does_not_allow_is_a_note(known):
+    assert "no shared starts" in theta_table(replace(known, cautions=("no shared starts",))).notes
+
+
+def test_per_parameter_the_most_informative_are_named_with_what_limits_them(known):
+    assert information_table(known).rows == (
+        ("delay", "agent4 46 %, agent0 30 %", "speed 100 %", "starts"),
+        ("trim", "agent1 100 %", "distance 75 %", "trials"),
+    )
+
+
+def test_a_parameter_that_nothing_informs_has_no_row(known):
+    silent = replace(TOLD[0], agents=(("agent0", 0.0), ("agent1", 0.0)))
+    assert [row[0] for row in information_table(planted(known, information=(silent, TOLD[1]))).rows] == ["trim"]

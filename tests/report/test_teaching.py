@@ -1,0 +1,164 @@
+"""Page of `teach` claims no more than the intervals allow."""
+
+from dataclasses import replace
+from types import MappingProxyType, SimpleNamespace
+
+import numpy as np
+import pytest
+
+from proxytune.learning import Costs, Curve, Distribution, Estimate as EffectSize, Teaching, sample_needs
+from proxytune.learning.plv import Published
+from proxytune.report.plv_search import plv_answer, plv_next_step
+from proxytune.report.teaching import (
+    sorted_by_worth,
+    teach_answer,
+    teach_figure,
+    teach_next_step,
+    teach_view,
+    write_teach_report,
+)
+from proxytune.report.view import Column, foot_of
+from proxytune.teaching import Experiment, TeacherResult
+
+NOTHING = EffectSize(None, None, None)
+COUNTS = (0, 50, 100, 200, 400)
+EVIL = "<script>alert(1)</script>"
+
+
+PREDICTS = SimpleNamespace(prpv=3.0, interval=(2.0, 5.0), resampled=None, chance=SimpleNamespace(explains=False))
+NOBODY = MappingProxyType({})
+COSTS = Costs()
+
+
+def lesson(name, plv):
+    worth = Teaching(EffectSize(400, 200, 400), EffectSize(100, 50, 400), plv, NOTHING, NOTHING)
+    scores = np.linspace(10.0, 50.0, 5) + np.arange(3)[:, None]
+    cost = EffectSize(*(None if end is None else 2.5 * end for end in (plv.value, plv.low, plv.high)))
+    return TeacherResult(name, Distribution({}), Curve(COUNTS, scores), EffectSize(10.0, 8.0, 12.0), worth, cost)
+
+
+LESSONS = (
+    lesson("sure", EffectSize(300, 100, 350)),
+    lesson("harmful", EffectSize(None, None, 0)),
+    lesson("wide", EffectSize(300, -100, 400)),
+    lesson("reaching", EffectSize(200, None, 400)),
+    lesson("far", EffectSize(None, 120, None)),
+    lesson(EVIL, EffectSize(0, 0, 0)),
+)
+
+
+def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, costs=COSTS):
+    without = Curve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
+    curves = {"none": without, **{one.name: one.curve for one in lessons}}
+    needs = sample_needs(curves, none="none", best_score=60.0, tolerance=5.0, level=50.0, draws=60)
+    taught = {"published": published, "published_in": "a paper", "examinations": examinations, "costs": costs}
+    teaching = SimpleNamespace(target_samples=COUNTS, **taught)
+    settings = SimpleNamespace(name=EVIL, teaching=teaching)
+    return Experiment(settings, 60.0, replace(needs, gain=gain), lessons)
+
+
+def test_a_proxy_saves_samples_only_if_its_whole_interval_says_so():
+    saves, none, unknown = sorted_by_worth(LESSONS)
+    assert [one.name for one in saves] == ["sure", "far"]
+    assert [one.name for one in none] == ["harmful", EVIL]
+    assert [one.name for one in unknown] == ["wide", "reaching"]
+
+
+def test_the_answer_names_each_proxy_with_its_interval_where_it_belongs():
+    answer = teach_answer(experiment())
+    shown, rest = answer.split(" None saved: ")
+    assert "sure: 300 (100 to 350)" in shown
+    assert "wide" not in shown
+    assert rest.index("harmful") < rest.index("Open, since") < rest.index("wide: 300 (−100 to 400)")
+    assert "none is shown" in teach_answer(experiment(LESSONS[2:3]))
+
+
+def test_what_was_published_stands_beside_what_is_found_here_with_its_source():
+    theirs = {"none": Published(0.0, 9000, 0.0), "sure": Published(47.4, 250, 0.97)}
+    page = teach_view(experiment(published=theirs), {}, b"a picture")
+    table = next(part for part in page.parts if getattr(part, "title", "") == "Beside what was published")
+    assert [row[:2] for row in table.rows] == [("none", "0"), ("sure", "47.4")]
+    assert table.rows[1][3:] == ("250", "100 (50 to 400)", "97%", "")
+    assert table.notes == ("a paper",)
+    nobody = teach_view(experiment(), {}, b"a picture")
+    assert len(nobody.parts) == len(page.parts) - 1
+
+
+def test_the_next_step_is_more_seeds_while_something_is_open():
+    assert "raise teaching.seeds from 3 to 6" in teach_next_step(experiment())
+    assert "train in a proxy that saves" in teach_next_step(experiment(LESSONS[:2]))
+    assert "train without these proxies" in teach_next_step(experiment(LESSONS[1:2]))
+
+
+def test_without_convergence_plv_is_unknown_and_more_samples_are_next():
+    rising = experiment(gain=5.1)
+    assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
+    assert teach_next_step(rising).startswith("raise teaching.target_samples: ")
+
+
+def test_a_grid_that_shows_no_rise_at_its_end_is_not_said_to_rise():
+    coarse = experiment(gain=None)
+    assert "is unknown: teaching.target_samples has no number from 1 to half of 400" in teach_answer(coarse)
+    assert "add numbers between 0 and 400" in teach_next_step(coarse)
+
+
+def test_plv_in_cost_is_a_column_where_costs_are_stated_and_only_there():
+    stated = experiment(costs=Costs(2.5, 2.5, 0.0), published={"sure": Published(47.4, 250, 0.97)})
+    table, plain = (teach_view(one, {}, b"a picture").parts[0] for one in (stated, experiment()))
+    assert table.columns == (*plain.columns, Column("PLV in cost", numbers=True))
+    costs = {row[0]: row[-1] for row in table.rows}
+    assert costs["none"] == ""
+    assert costs["sure"] == "750 (250 to 875)"
+    assert costs["far"] == "unknown (300 or more)"
+    assert any("off_policy 2.5, on_policy 2.5, label 0" in note for note in table.notes)
+
+
+@pytest.mark.parametrize(
+    ("plv", "judged", "step"),
+    [
+        (EffectSize(84, 33, 180), "it saves target samples.", "train in proxy: nominal θ, then on target samples."),
+        (EffectSize(-84, -180, -33), "it saves none.", "train without a proxy, or raise teaching.budget"),
+        (EffectSize(10, -20, 30), "that it saves any is not shown: the interval holds 0.", "raise teaching.seeds"),
+    ],
+)
+def test_a_search_by_plv_says_of_its_best_finalist_what_the_interval_allows(plv, judged, step):
+    study = SimpleNamespace(trials=range(3), confirmed=experiment((lesson("proxy", plv),)))
+    assert plv_answer(study).endswith(f"target samples saved; {judged}")
+    assert plv_next_step(study).startswith(step)
+
+
+def test_where_the_finalists_cannot_be_judged_the_next_step_says_why():
+    study = SimpleNamespace(trials=range(3), confirmed=experiment((lesson("proxy", NOTHING),), gain=6.0))
+    assert "no finalist is known to save" in plv_answer(study)
+    assert plv_next_step(study).startswith("raise teaching.target_samples: without a proxy the score still rises")
+
+
+def test_where_examinations_are_chosen_more_of_them_are_next():
+    assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
+
+
+def test_each_proxy_has_a_panel_of_its_own_against_no_proxy_with_what_each_needs():
+    drawn = experiment()
+    panels = [axes for axes in teach_figure(drawn).axes if axes.get_visible()]
+    assert [axes.get_title() for axes in panels] == [one.name for one in LESSONS]
+    for axes, one in zip(panels, LESSONS, strict=True):
+        curves = {line.get_label(): line for line in axes.lines}
+        assert {"with the proxy", "without a proxy", "converged"} <= curves.keys()
+        mean = drawn.needs.draws.scores[one.name].mean(axis=0)
+        assert list(curves["with the proxy"].get_ydata()) == list(mean)
+        dots = [line for line in axes.lines if line.get_linestyle() == "None"]
+        assert sum(len(line.get_ydata()) for line in dots) == 3 * 5 + 3 * 4
+        ends = [path.vertices[:, 0].tolist() for bars in axes.collections[2:] for path in bars.get_paths()]
+        assert ends[-1][0] < ends[-1][1]
+
+
+def test_the_figure_fits_a_column():
+    assert teach_figure(experiment()).get_figwidth() * 25.4 <= 86.0
+
+
+def test_the_page_has_table_1_and_takes_no_name_for_markup(tmp_path):
+    page = write_teach_report(experiment(), {"sure": PREDICTS}, tmp_path / "teach.png", foot_of("teach"))
+    text = page.read_text(encoding="utf-8")
+    assert "<script" not in text
+    assert '<th scope="row">sure</th><td class="number">3 (2 to 5)</td>' in text
+    assert "converged: the mean score is at least 45.0 of 60" in text

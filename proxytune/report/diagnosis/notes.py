@@ -114,8 +114,8 @@ def _cautions(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.multistep is not None:
         ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.multistep.ratios.items())
         lines.append(
-            f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps; ratio of "
-            f"the errors on blocks left out: {ratios}"
+            f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps; ratio "
+            f"of the errors on blocks left out: {ratios}"
         )
     return lines
 

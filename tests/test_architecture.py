@@ -57,8 +57,8 @@ def test_libraries_stay_in_their_rooms(path):
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_no_module_is_longer_than_250_lines(path):
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= 250
+def test_no_module_is_longer_than_600_lines(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 600
 
 
 def test_no_room_is_a_drawer():

@@ -1,10 +1,9 @@
-from .database import is_begun as is_begun
-from .lock import locked as locked
-from .own_files import FAMILIES as FAMILIES
-from .records import State as State
-from .records import SweepRecord as SweepRecord
-from .records import TrialRecord as TrialRecord
-from .repair import Salvage as Salvage
+from .folder import FAMILIES as FAMILIES
+from .folder import locked as locked
 from .repair import salvage as salvage
 from .store import FILE_NAME as FILE_NAME
+from .store import State as State
 from .store import Store as Store
+from .store import SweepRecord as SweepRecord
+from .store import TrialRecord as TrialRecord
+from .store import is_begun as is_begun

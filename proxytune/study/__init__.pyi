@@ -1,7 +1,6 @@
 from .facts import adopt as adopt
 from .facts import note_search as note_search
 from .facts import open_to_look as open_to_look
-from .facts import unfounded as unfounded
 from .families import Choice as Choice
 from .families import ComparedFamilies as ComparedFamilies
 from .families import Lesson as Lesson
@@ -34,7 +33,6 @@ from .result import history_of as history_of
 from .result import most_confirmation_episodes as most_confirmation_episodes
 from .result import result_of as result_of
 from .result import run_confirmation as run_confirmation
-from .run import as_stored as as_stored
 from .run import check_facts as check_facts
 from .run import rescored as rescored
 from .run import retry_failed as retry_failed

@@ -13,7 +13,8 @@ from proxytune.search import fit_surrogate, unit_array
 from proxytune.search.likelihood import fit_outputs
 from proxytune.search.outcomes import composed_scores
 from proxytune.storage import Store
-from proxytune.study import StudyRun, as_stored, goal_of, open_study
+from proxytune.study import StudyRun, goal_of, open_study
+from proxytune.study.run import as_stored
 
 
 def main():

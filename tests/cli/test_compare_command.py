@@ -237,5 +237,5 @@ def test_an_agent_that_hangs_is_ended_in_a_comparison_too(make_study, tmp_path):
     few = ("--engines", "sobol", "--seeds", "2", "--budget", "2", "--initial", "1")
     assert compare(folder, *few, "--output", tmp_path / "out") == 0
     with Store.read(tmp_path / "out") as store:
-        agents = store.under_way("").agents_that_failed("it took longer than 1 s")
+        agents = store.agents_that_failed("it took longer than 1 s")
     assert agents == {"agent1"}

@@ -35,7 +35,8 @@ import processes
 from proxytune.errors import ProxytuneError
 from proxytune.search import NAMES
 from proxytune.storage import Store
-from proxytune.study import Study, StudyRun, as_stored, open_study, result_of
+from proxytune.study import Study, StudyRun, open_study, result_of
+from proxytune.study.run import as_stored
 
 KILLS = 4
 TABLES = ("facts", "trials", "episodes", "instances")

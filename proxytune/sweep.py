@@ -21,7 +21,7 @@ from proxytune.errors import InputError, SettingsError
 from proxytune.identity import meaning_of
 from proxytune.settings import nearest
 from proxytune.space import Interval, Parameter, Theta
-from proxytune.storage import FILE_NAME, Store, SweepRecord, is_begun
+from proxytune.storage import Store, SweepRecord, is_begun
 from proxytune.study import LEARNING, Evaluation, Study, StudyRun, load_family, plan, result_of, stored_run
 from proxytune.usefulness import (
     ALL,
@@ -40,7 +40,7 @@ from proxytune.usefulness import (
 
 def has_answer(study: Study) -> bool:
     """Whether a trial of the study's search by predictivity is finished; a search for PLV has its answer elsewhere."""
-    if study.settings.objective == LEARNING or not is_begun(study.settings.home / FILE_NAME):
+    if study.settings.objective == LEARNING or not is_begun(study.settings.home):
         return False
     with Store.read(study.settings.home) as store:
         return any(trial.state == "finished" for trial in store.trials(study.objective.name))

@@ -1,39 +1,15 @@
 """`repair`: keep what is whole of a study.db, and say what the next `study` does again."""
 
 import argparse
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 
 from proxytune.cli.terminal.answer import Answer
-from proxytune.errors import InputError
-from proxytune.storage import Salvage, Store, locked, salvage
-from proxytune.study import (
-    LEARNING,
-    PRPV,
-    StudyRun,
-    StudySettings,
-    as_stored,
-    open_to_look,
-    read_study_settings,
-    unfounded,
-)
+from proxytune.storage import Store, locked, salvage
+from proxytune.study import LEARNING, PRPV, read_study_settings
 
 AGAIN = "a sweep that is lost is there again after the same sweep command, which drives only episodes that are lost"
 COUNTED = {"trials": "trial", "episodes": "episode", "sweeps": "sweep"}
-
-
-@dataclass(frozen=True)
-class Scores:
-    """Whether the trials kept are what their episodes come to.
-
-    Attributes:
-        problems: Of each trial that is not, its number and why.
-        unchecked: Why that could not be seen; empty if it could.
-    """
-
-    problems: Sequence[tuple[int, str]] = ()
-    unchecked: str = ""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -49,57 +25,29 @@ def run(arguments: argparse.Namespace) -> Answer:
     with locked(settings.home):
         found = salvage(settings.home)
         with Store.read(settings.home) as store:
-            had = len(store.trials(search))
-            scores = _compared(settings, store) if had else Scores()
-        kept = min([had, *(number - 1 for number, _ in scores.problems)])
-        if kept < had:
-            with Store.open(settings.home) as store:
-                store.drop_trials(search, kept + 1)
-    return _answer(settings.home, found, scores, kept)
-
-
-def _compared(settings: StudySettings, store: Store) -> Scores:
-    """Whether the trials are what their episodes come to."""
-    try:
-        study = open_to_look(settings, store)
-        return Scores(list(unfounded(StudyRun(as_stored(study, store), store))))
-    except InputError as problem:
-        return Scores(unchecked=str(problem))
-
-
-def _answer(folder: Path, found: Salvage | None, scores: Scores, kept: int) -> Answer:
-    damaged = found is not None or bool(scores.problems)
-    problems = [f"trial {number} {problem}" for number, problem in scores.problems]
+            trials = len(store.trials(search))
     document = {
-        "damaged": damaged,
+        "damaged": found is not None,
         "aside": str(found.aside) if found else None,
         "kept": dict(found.kept) if found else None,
         "lost": dict(found.lost) if found else None,
-        "trials": kept,
-        "problems": problems,
-        "unchecked": scores.unchecked,
+        "trials": trials,
+        "problems": [found.problem] if found else [],
+        "unchecked": "",  # until format 7, why scores had not been compared with their episodes
     }
-    again = (
-        f"next: python -m proxytune study {folder}\n"
-        f"it proposes the trials from {kept + 1} on again, the same ones by the same version of proxytune, "
-        "and drives again only the episodes that are lost"
-    )
-    lines = [*_say(found), *problems, *([again] if damaged else ["study.db is whole; nothing was changed"])]
-    if scores.unchecked:
-        lines.append(f"scores were not compared with their episodes: {scores.unchecked}")
-    return Answer(document, "\n".join(lines))
-
-
-def _say(found: Salvage | None) -> list[str]:
     if found is None:
-        return []
+        return Answer(document, "study.db is whole; nothing was changed")
     lost = {table: count for table, count in found.lost.items() if count}
-    return [
+    proposes = f"proposes the trials from {trials + 1} on again, the same ones by the same version of proxytune, and "
+    lines = [
         f"kept: {_count(found.kept)}",
         f"lost: {_count(lost) or 'nothing that could be read'}",
         *([AGAIN] if "sweeps" in lost else []),
         f"the damaged file is now {found.aside}",
+        f"next: python -m proxytune study {settings.home}",
+        f"it {proposes if 'trials' in lost else ''}drives again only the episodes that are lost",
     ]
+    return Answer(document, "\n".join(lines))
 
 
 def _count(rows: Mapping[str, int]) -> str:

@@ -1,4 +1,4 @@
-from .answer import RULES as RULES, Estimate as Estimate, Rules as Rules
+from .answer import RULES as RULES, Estimate as Estimate
 from .camera.diagnose import camera_effects as camera_effects
 from .camera.edges import Edges as Edges, effects_of as effects_of
 from .camera.error import (

@@ -11,7 +11,6 @@ from .beside import (
     unpack as unpack,
 )
 from .door import (
-    GROUP as GROUP,
     ask as ask,
     describe as describe,
     load as load,

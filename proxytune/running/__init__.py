@@ -1,4 +1,11 @@
-"""Running episodes: in this process or several, with progress."""
+"""Running work: episodes and other pieces, in this process, several, or on a cluster, with progress.
+
+episodes  running, run_episode, Watch, ENDED, ENDLESS, check_machine: outcomes of episodes
+workers   working, Rescue, IsolatedWorker, WorkerExit, TracedTask, limited, was_ended_in, OVERRUN: pieces of any work
+cluster   on_cluster: the same on the machines of a Dask cluster
+progress  Watcher, Silent, Bars, Lines, progress_bar: how far a command is
+sending   work as it goes to other processes; for this room alone
+"""
 
 import lazy_loader
 

@@ -7,7 +7,7 @@ from typing import Any
 from joblib import parallel_config
 
 from proxytune.errors import ExtensionError, InputError, RunError
-from proxytune.running.same_code import check_code, made_by
+from proxytune.running.sending import check_code, made_by
 from proxytune.running.workers import Elsewhere, elsewhere
 
 CONNECT_S, JOINED_S = 10.0, 30.0

@@ -1,11 +1,13 @@
-"""Running episodes, and catching what fails."""
+"""Running episodes: what fails is an outcome, what the machine lacks is not, and what takes long is told of."""
 
+import errno
 import functools
 import math
 import random
 import sys
+import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -16,13 +18,14 @@ from threadpoolctl import ThreadpoolController
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import EpisodeError, RunError
 from proxytune.extensions import describe, is_users, one_line, place_of
-from proxytune.running.apart import Lost
-from proxytune.running.machine import check_machine
-from proxytune.running.patience import Patience
-from proxytune.running.workers import Rescue, working
+from proxytune.running.workers import Rescue, WorkerExit, working
 
 ENDED, ENDLESS = "it ended its process", "it took longer than"
 """How failures begin of episodes that end their process, and of those that do not end themselves."""
+LONG_S = 60.0
+"""An episode that has been under way for so long is told of [s]: nothing else shows that an agent hangs."""
+MONITOR = "stall monitor"
+OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.EIO)
 
 
 @dataclass(frozen=True)
@@ -66,26 +69,26 @@ def running(
     rescue = Rescue(functools.partial(_lost, watch), watch.timeout_s, watch.suspect, watch.begins)
     waits = watch.waits if watch.timeout_s is None else UNWATCHED.waits
     with (
-        Patience(waits) as patience,
-        working(work, episodes, jobs, patience.begins_unless(skip), rescue) as outcomes,
+        StallMonitor(waits) as monitor,
+        working(work, episodes, jobs, monitor.begins_unless(skip), rescue) as outcomes,
     ):
-        yield patience.until_there(outcomes)
+        yield monitor.until_there(outcomes)
 
 
-def _lost(watch: Watch, episode: Episode, lost: Lost) -> Outcome:
+def _lost(watch: Watch, episode: Episode, end: WorkerExit) -> Outcome:
     """The outcome of an episode that has ended its process, or was ended.
 
     Raises:
         RunError: If the process was killed from outside, as a machine without memory does.
     """
     where = f"agent '{episode.agent}' from start {episode.start}"
-    if lost.killed:
+    if end.killed:
         raise RunError(
-            f"{where}: its process was killed twice ({lost.how}; out of memory?); run again to continue, with more "
+            f"{where}: its process was killed twice ({end.how}; out of memory?); run again to continue, with more "
             "memory or without that agent"
         )
-    failure = f"{ENDED} twice ({lost.how})" if lost.how else f"{ENDLESS} {watch.timeout_s:g} s"
-    return Outcome(episode, None, failure, lost.seconds)
+    failure = f"{ENDED} twice ({end.how})" if end.how else f"{ENDLESS} {watch.timeout_s:g} s"
+    return Outcome(episode, None, failure, end.seconds)
 
 
 def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] = ()) -> Outcome:
@@ -114,6 +117,26 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
         check_machine(who, problem, "with more room or without that agent")
         failure = one_line(_failure(problem))
     return Outcome(episode, metrics, failure, time.perf_counter() - start)
+
+
+def check_machine(whose: str, problem: BaseException | None, remedy: str) -> None:
+    """Refuse to call something failed of what memory, disk or descriptors lacked, whoever caught that first.
+
+    Args:
+        whose: What was under way, as the complaint begins.
+        problem: What was raised.
+        remedy: How to run again, as the complaint ends.
+
+    Raises:
+        RunError: With what the machine lacked.
+    """
+    while problem is not None:
+        if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:
+            where = place_of(problem)
+            raise RunError(
+                f"{whose}: the machine failed ({describe(problem)}){where}; run again to continue, {remedy}"
+            ) from None
+        problem = problem.__cause__ or problem.__context__
 
 
 def _failure(problem: BaseException) -> str:
@@ -168,3 +191,46 @@ def _number(value: Any) -> float:
         return float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
+
+
+class StallMonitor:
+    """Says again and again which episode has been under way longest, if that is long; use as a context.
+
+    What tells is called from a thread of its own.
+    """
+
+    def __init__(self, tell: Callable[[str, float], None]) -> None:
+        self._tell, self._begun, self._ended = tell, dict[Episode, float](), threading.Event()
+        self._thread = threading.Thread(target=self._watch, name=MONITOR, daemon=True)
+
+    def __enter__(self) -> "StallMonitor":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def begins_unless(self, skip: Callable[[Episode], bool]) -> Callable[[Episode], bool]:
+        """Whether an episode is skipped, asked when it is about to begin: if not, it is under way from then on."""
+
+        def asked(episode: Episode) -> bool:
+            skipped = skip(episode)
+            if not skipped:
+                self._begun[episode] = time.monotonic()
+            return skipped
+
+        return asked
+
+    def until_there(self, outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+        """The outcomes, whose episodes are under way no more."""
+        for outcome in outcomes:
+            self._begun.pop(outcome.episode, None)
+            yield outcome
+
+    def _watch(self) -> None:
+        while not self._ended.wait(LONG_S / 10.0):
+            for episode, since in sorted(self._begun.items(), key=lambda begun: begun[1])[:1]:
+                seconds = time.monotonic() - since
+                if seconds >= LONG_S:
+                    self._tell(f"agent '{episode.agent}' from start {episode.start}", seconds)

@@ -1,6 +1,7 @@
-"""Work as it goes to other processes, which end with the one that sent it."""
+"""Work as it goes to other processes, which end with the one that sent it, and to machines with the same code."""
 
 import faulthandler
+import hashlib
 import os
 import pickle
 import signal
@@ -9,14 +10,20 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
+from pathlib import Path
+from platform import node, python_version
 from typing import Any, cast
 
-from proxytune.errors import RunError
+from proxytune.errors import InputError, RunError
 from proxytune.extensions import Packed, describe, folders, open_folders, pack, place_of, unpack
-from proxytune.running.same_code import check_code
+from proxytune.identity import version_changes, versions_of
 
 WATCH_S = 0.5
+PACKAGES = ("numpy", "scipy", "scikit-learn", "pybullet", "joblib", "distributed")
+HOME = Path(__file__).resolve().parent.parent
+DATA = ("robots/", "studies/")
+"""What a wheel has in the package and a checkout beside it."""
 
 
 class NotSendableError(RunError):
@@ -104,3 +111,23 @@ def end_with(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+@cache
+def made_by() -> Mapping[str, str]:
+    """What results depend on besides their settings: proxytune's own code, Python and packages."""
+    paths = {path.relative_to(HOME).as_posix(): path for path in sorted(HOME.rglob("*.py"))}
+    own = {name: path.read_bytes() for name, path in paths.items() if not name.startswith(DATA)}
+    digest = hashlib.sha256(repr(own).encode()).hexdigest()[:12]
+    return {"proxytune": f"code {digest}", "Python": python_version(), **versions_of(PACKAGES)}
+
+
+def check_code(theirs: Mapping[str, str]) -> None:
+    """Refuse to work for a process of which the results may differ.
+
+    Raises:
+        InputError: If anything has another version there.
+    """
+    changes = version_changes(theirs, made_by())
+    if changes:
+        raise InputError(f"the worker on {node()} has {', '.join(changes)}; install the same there as here")

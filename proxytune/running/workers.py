@@ -1,49 +1,80 @@
-"""Doing many independent pieces of work, in this process or spread over several."""
+"""Many independent pieces of work, in this process or spread over several; those that end their process, or never end.
+
+joblib spreads them, over the backend that its user chose. What dies or hangs is done once more by an IsolatedWorker,
+which is a process of joblib's own (loky). `pebble` would save the few lines of `do`: its processes run a user's script
+again, where loky's do not, and time limits within a piece and the rescue of joblib's workers would stay here.
+"""
 
 import functools
 import os
+import re
+import signal
+import threading
+import time
 import warnings
+import zlib
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import BrokenExecutor, wait
 from contextlib import closing, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from multiprocessing import TimeoutError as ParallelTimeoutError
+from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
 from joblib import Parallel, delayed
+from joblib.externals.loky import ProcessPoolExecutor
 from joblib.parallel import BACKENDS, get_active_backend
 
 from proxytune.errors import RunError
-from proxytune.running.apart import Apart, Lost
-from proxytune.running.sending import NotSendableError, Recipe, do_sent, end_with, recipe_of
+from proxytune.running.sending import NotSendableError, Recipe, do_sent, end_with, load_sent, recipe_of
 
 START_S = 30.0
 """So long may processes take to start beyond a piece's own time-out [s]."""
+OVERRUN = "SIGALRM"
+"""How the process of a piece ends that overruns a limit within it."""
 Piece = TypeVar("Piece")
 Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class WorkerExit:
+    """The end of a process before its piece had a result.
+
+    Attributes:
+        how: In one phrase, as "SIGSEGV" or "exit status 3"; empty if it was ended because the piece took too long.
+        seconds: How long the piece took until then.
+    """
+
+    how: str
+    seconds: float
+
+    @property
+    def killed(self) -> bool:
+        """Whether the process was killed from outside: by the machine, where memory ran out, or by somebody."""
+        return self.how == "SIGKILL"
 
 
 @dataclass(frozen=True)
 class Rescue(Generic[Piece, Result]):
     """What becomes of pieces that end their process, or do not end themselves.
 
-    A process that dies is not known to have died of its piece: that is done once more in a process apart, and lost if
-    that dies too.
+    A process that dies is not known to have died of its piece: that is done once more by an isolated worker, and lost
+    if that dies too.
 
     Attributes:
-        lost: The result of a piece that has no other, from how it ended.
+        lost: The result of a piece that has no other, from how its process ended.
         timeout_s: How long a piece may take [s]; then all are done in other processes.
-        suspect: Whether a piece is done in a process apart at once, because the like of it has ended one before.
+        suspect: Whether a piece is done by an isolated worker at once, because the like of it has ended a process.
         begins: Told of each piece that begins in this very process, which it may end.
-        apart: Whether no piece is done in this process, as one may end it.
+        isolated: Whether no piece is done in this process, as one may end it.
     """
 
-    lost: Callable[[Piece, Lost], Result]
+    lost: Callable[[Piece, WorkerExit], Result]
     timeout_s: float | None = None
     suspect: Callable[[Piece], bool] = lambda _: False
     begins: Callable[[Piece], None] = lambda _: None
-    apart: bool = False
+    isolated: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,7 +129,13 @@ def working(
         RunError: If a process dies and there is no rescue.
     """
     begun = (piece for piece in pieces if not skip(piece))
-    results = _results(work, begun, min(jobs, len(pieces)), rescue or Rescue(_no_rescue))
+    jobs, rescue = min(jobs, len(pieces)), rescue or Rescue(_no_rescue)
+    if jobs > 1 or _elsewhere.get():
+        results = _spread(work, begun, jobs, rescue)
+    elif rescue.isolated or rescue.timeout_s is not None:
+        results = _isolated(work, begun, rescue)
+    else:
+        results = _here(work, begun, rescue)
     try:
         yield results
     finally:
@@ -108,84 +145,70 @@ def working(
             results.close()
 
 
-def _no_rescue(piece: Any, lost: Lost) -> Any:
+def _no_rescue(piece: Any, end: WorkerExit) -> Any:
     raise RunError(
-        f"a process was killed twice by the same piece of work ({lost.how}; out of memory?); run again to continue, "
+        f"a process was killed twice by the same piece of work ({end.how}; out of memory?); run again to continue, "
         "perhaps with jobs = 1"
     )
-
-
-def _results(
-    work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int, rescue: Rescue[Piece, Result]
-) -> Generator[Result, None, None]:
-    if jobs > 1 or _elsewhere.get():
-        return _spread(work, pieces, jobs, rescue)
-    apart = rescue.apart or rescue.timeout_s is not None
-    return _apart(work, pieces, rescue) if apart else _here(work, pieces, rescue)
 
 
 def _here(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], rescue: Rescue[Piece, Result]
 ) -> Generator[Result, None, None]:
-    with Apart(work) as apart:
+    with IsolatedWorker(work) as isolated:
         for piece in pieces:
             if rescue.suspect(piece):
                 # What cannot go to another process can only be done here.
                 with suppress(NotSendableError):
-                    yield apart.do(piece, functools.partial(rescue.lost, piece))
+                    yield isolated.do(piece, functools.partial(rescue.lost, piece))
                     continue
             rescue.begins(piece)
             yield work(piece)
 
 
-def _apart(
+def _isolated(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], rescue: Rescue[Piece, Result]
 ) -> Generator[Result, None, None]:
-    with Apart(work, rescue.timeout_s) as apart:
+    with IsolatedWorker(work, rescue.timeout_s) as isolated:
         for piece in pieces:
-            yield apart.do(piece, functools.partial(rescue.lost, piece))
+            yield isolated.do(piece, functools.partial(rescue.lost, piece))
 
 
 def _spread(
     work: Callable[[Piece], Result], pieces: Iterable[Piece], jobs: int, rescue: Rescue[Piece, Result]
 ) -> Generator[Result, None, None]:
-    """Do them in several processes; where one dies or hangs, what was under way is done apart, then the rest."""
-    place, left, begun = _elsewhere.get(), enumerate(pieces), _Begun(rescue.suspect)
+    """Do them in several processes; where one dies or hangs, what was under way is isolated, then the rest is done."""
+    place, left = _elsewhere.get(), enumerate(pieces)
     recipe = recipe_of(work, place.made_by if place else None)
     ended: tuple[type[BaseException], ...] = (BrokenExecutor, ParallelTimeoutError, *(place.killed if place else ()))
+    under_way: dict[int, Piece] = {}
+
+    def begin() -> Iterator[tuple[int, Piece]]:
+        for number, piece in left:
+            under_way[number] = piece
+            if not rescue.suspect(piece):
+                yield number, piece
+
     broken = True
     while broken:
+        broken = False
         try:
             jobs = place.cores() if place else jobs
-            with closing(_in_processes(recipe, begun.of(left), jobs, rescue.timeout_s)) as results:
+            with closing(_in_processes(recipe, begin(), jobs, rescue.timeout_s)) as results:
                 for number, result in results:
-                    del begun.pieces[number]
+                    del under_way[number]
                     yield result
-            broken = False
         except ended:
             broken = True
-        yield from _apart(work, list(begun.pieces.values()), rescue)
-        begun.pieces.clear()
-
-
-class _Begun:
-    """Pieces that have begun in other processes, or are to be done apart; each until its result is there."""
-
-    def __init__(self, suspect: Callable[[Any], bool]) -> None:
-        self.pieces: dict[int, Any] = {}
-        self._suspect = suspect
-
-    def of(self, numbered: Iterator[tuple[int, Any]]) -> Iterator[tuple[int, Any]]:
-        """Numbered pieces as they begin, without those that are to be done apart."""
-        for number, piece in numbered:
-            self.pieces[number] = piece
-            if not self._suspect(piece):
-                yield number, piece
+        yield from _isolated(work, list(under_way.values()), rescue)
+        under_way.clear()
 
 
 def _in_processes(
     recipe: Recipe, numbered: Iterable[tuple[int, Any]], jobs: int, timeout_s: float | None
 ) -> Generator[tuple[int, Any], None, None]:
+    # Only joblib's own processes are ours to end with this one.
+    local = isinstance(get_active_backend()[0], BACKENDS["loky"])
     # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
     parallel = Parallel(
         n_jobs=jobs,
@@ -193,7 +216,7 @@ def _in_processes(
         pre_dispatch=jobs + 1,
         return_as="generator_unordered",
         timeout=timeout_s and timeout_s + START_S,
-        **_of_processes(),
+        **({"initializer": end_with, "initargs": (os.getpid(),)} if local else {}),
     )
     tasks = (delayed(_do_numbered)(recipe, number, piece) for number, piece in numbered)
     return cast("Generator[tuple[int, Any], None, None]", parallel(tasks))
@@ -203,7 +226,137 @@ def _do_numbered(recipe: Recipe, number: int, piece: Any) -> tuple[int, Any]:
     return number, do_sent(recipe, piece)
 
 
-def _of_processes() -> dict[str, Any]:
-    """What joblib's own processes begin with; those of another backend are not ours to end."""
-    backend, _ = get_active_backend()
-    return {"initializer": end_with, "initargs": (os.getpid(),)} if isinstance(backend, BACKENDS["loky"]) else {}
+class IsolatedWorker:
+    """One process that does one piece at a time; where a piece ends it, the next piece has a new one.
+
+    Use as a context: leaving it ends the process.
+    """
+
+    def __init__(self, work: Callable[[Any], Any], timeout_s: float | None = None) -> None:
+        self._work, self._timeout_s = work, timeout_s
+        self._recipe: Recipe | None = None
+        self._process: Any = None
+
+    def __enter__(self) -> "IsolatedWorker":
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self._end()
+
+    def do(self, piece: Any, lost: Callable[[WorkerExit], Any]) -> Any:
+        """Do a piece.
+
+        Args:
+            piece: The piece.
+            lost: Its result where it ends its process, or takes longer than it may.
+
+        Raises:
+            NotSendableError: If the work cannot go to another process.
+        """
+        if self._process is None:
+            self._recipe = self._recipe or recipe_of(self._work)
+            self._process = ProcessPoolExecutor(1, initializer=end_with, initargs=(os.getpid(),))
+            # Loading the work takes none of the pieces' time.
+            self._process.submit(load_sent, self._recipe).exception()
+        how, begun = "", time.perf_counter()
+        try:
+            result = self._process.submit(do_sent, self._recipe, piece)
+            wait([result], self._timeout_s)
+            if result.done():
+                return result.result()
+        except BrokenExecutor as problem:
+            how = _exit_told(str(problem))
+        self._end()
+        return lost(WorkerExit(how, time.perf_counter() - begun))
+
+    def _end(self) -> None:
+        if self._process is not None:
+            self._process.shutdown(wait=True, kill_workers=True)
+        self._process = None
+
+
+def _exit_told(told: str) -> str:
+    """How a process ended, from what loky tells: "The exit codes of the workers are {SIGSEGV(-11)}"."""
+    found = re.search(r"\{(\w+)\((-?\d+)\)", told)
+    if not found:
+        return "for an unknown reason"
+    name, number = found.groups()
+    return f"exit status {number}" if name == "EXIT" else name
+
+
+# Code that is not ours may hang where no Python runs any more: only the end of its process ends that. So a limit within
+# a piece ends the process, and a trace says what was under way.
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What a piece says of itself.
+
+    Attributes:
+        path: Where it says it.
+        before: What it was doing when an earlier process ended with it; empty if none did.
+    """
+
+    path: Path
+    before: str
+
+
+_trace: ContextVar[Trace | None] = ContextVar("trace", default=None)
+
+
+@dataclass(frozen=True)
+class TracedTask:
+    """Work whose pieces keep what they are doing, for whoever asks after their process has ended.
+
+    Attributes:
+        work: Does a piece, in a process that may be ended if a limit is set in it.
+        folder: Where the traces are; another machine need not have it.
+    """
+
+    work: Callable[[Any], Any]
+    folder: Path
+
+    def __call__(self, piece: Any) -> Any:
+        """Do a piece."""
+        before = _trace.set(Trace(self._path(piece), self.last(piece)))
+        try:
+            return self.work(piece)
+        finally:
+            _trace.reset(before)
+
+    def last(self, piece: Any) -> str:
+        """What a piece was doing last; empty if nothing is known."""
+        with suppress(OSError):
+            return self._path(piece).read_text(encoding="utf-8")
+        return ""
+
+    def _path(self, piece: Any) -> Path:
+        return self.folder / f"{zlib.crc32(repr(piece).encode()):08x}"
+
+
+@contextmanager
+def limited(what: str, timeout_s: float | None) -> Iterator[None]:
+    """Keep what is done meanwhile, and end this process if that takes longer than it may [s].
+
+    Outside a traced task there is no limit, nor in a cluster's worker, which is not ours to end: that does its pieces
+    in a thread of their own.
+    """
+    trace = _trace.get()
+    if trace is not None:
+        with suppress(OSError):
+            trace.path.write_text(what, encoding="utf-8")
+    ours = threading.current_thread() is threading.main_thread()
+    if trace is None or timeout_s is None or not ours:
+        yield
+        return
+    signal.setitimer(signal.ITIMER_REAL, timeout_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def was_ended_in(what: str) -> bool:
+    """Whether an earlier process ended with this piece while it was doing this."""
+    trace = _trace.get()
+    return trace is not None and trace.before == what

@@ -1,25 +1,117 @@
-"""What a study has done so far, kept in study.db: every finished episode is there at once and for good."""
+"""What a study has done so far, kept in study.db: every finished episode is there at once and for good.
+
+Rows go in and come out as values; database.py says what a row is, and what tells a damaged one.
+"""
 
 import json
 import sqlite3
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, cast
 
 from proxytune.domain import Episode, Outcome
-from proxytune.errors import InputError
+from proxytune.errors import InputError, StoreError
+from proxytune.settings import is_finite
 from proxytune.space import Theta
-from proxytune.storage import records
-from proxytune.storage.checksums import chain, count_sweeps, seal
-from proxytune.storage.complaints import not_ours, sqlite_errors_as_store_errors
-from proxytune.storage.database import connect, disconnect, transaction
-from proxytune.storage.records import SweepRecord, TrialRecord, theta_json
-from proxytune.storage.renaming import RENAMING
-from proxytune.storage.under_way import UnderWay
+from proxytune.storage.database import (
+    connect,
+    disconnect,
+    seal,
+    sqlite_errors_as_store_errors,
+    transaction,
+    undo_broken_write,
+    write_row,
+)
+from proxytune.storage.folder import refuse_links
 
 FILE_NAME = "study.db"
+State = Literal["open", "finished", "failed", "cut"]
 Made = TypeVar("Made")
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """One trial of a study.
+
+    Attributes:
+        number: Counted from 1.
+        theta: Where it was.
+        state: Whether it has been scored, has failed, was cut off, or is still open.
+        score: What the search makes small: the objective, with its sign turned if it is to be large; of a trial that
+            was cut off, what that is expected to be. None if it failed or is open.
+        measures: Every measure of it by name, the objective's among them; None where one is undefined. Empty unless
+            finished.
+        failed_episodes: How many of its episodes failed.
+        failure: Why it failed, empty if it did not.
+        decided: The agents that had been driven when it was cut off; empty if it was not.
+        bound: What its PRPV cannot be below, None unless it was cut off.
+        seconds: How long it took, where its episodes do not tell.
+    """
+
+    number: int
+    theta: Theta
+    state: State = "open"
+    score: float | None = None
+    measures: Mapping[str, float | None] = field(default_factory=dict)
+    failed_episodes: int = 0
+    failure: str = ""
+    decided: tuple[str, ...] = ()
+    bound: float | None = None
+    seconds: float = 0.0
+
+    @property
+    def prpv(self) -> float | None:
+        """Its PRPV; None unless finished."""
+        return self.measures.get("prpv")
+
+    @property
+    def ppv(self) -> float | None:
+        """Its PPV; None unless finished, and where the target's agents all score alike."""
+        return self.measures.get("ppv")
+
+    @property
+    def estimate(self) -> float | None:
+        """What its PRPV is expected to be; None unless it was cut off."""
+        return self.score if self.state == "cut" else None
+
+
+@dataclass(frozen=True)
+class SweepRecord:
+    """A sweep that has been asked for.
+
+    Attributes:
+        parameter: What is swept.
+        base: Values of the others; those not named are nominal.
+        points: Where it is looked at, in rising order.
+        target_model: The target's model.toml as it was when POD was asked for; empty where it was not.
+        replays: Identity of the domain family whose episodes are POD's replays; empty without POD.
+    """
+
+    parameter: str
+    base: Theta
+    points: tuple[float, ...]
+    target_model: str = ""
+    replays: str = ""
+
+
+_OF_EARLIER = "instance IN (SELECT id FROM instances WHERE identity = :earlier)"
+_SAME_THETA = """
+    (SELECT renamed.id FROM instances AS renamed JOIN instances AS old USING (theta)
+    WHERE renamed.identity = :now AND old.id = instance)"""
+RENAMING = (
+    "INSERT OR IGNORE INTO instances (identity, theta) SELECT :now, theta FROM instances WHERE identity = :earlier",
+    f"UPDATE trials SET instance = {_SAME_THETA} WHERE {_OF_EARLIER}",
+    f"UPDATE OR IGNORE episodes SET instance = {_SAME_THETA} WHERE {_OF_EARLIER}",
+    f"DELETE FROM episodes WHERE {_OF_EARLIER}",
+    "DELETE FROM instances WHERE identity = :earlier",
+    "UPDATE OR IGNORE sweeps SET identity = :now WHERE identity = :earlier",
+    "DELETE FROM sweeps WHERE identity = :earlier",
+    "UPDATE OR IGNORE sweeps SET replays = :now WHERE replays = :earlier",
+    "DELETE FROM sweeps WHERE replays = :earlier",
+)
+"""What gives one identity's instances, trials, episodes and sweeps to another, step by step."""
 
 
 class Store:
@@ -63,25 +155,22 @@ class Store:
 
     def facts(self) -> dict[str, Any]:
         """What determined the finished trials; empty before the first."""
-        return dict(self._made(records.fact_of, "SELECT key, value FROM facts"))
+        return dict(self._made(lambda key, value: (key, json.loads(value)), "SELECT key, value FROM facts"))
 
     def begin(self, facts: Mapping[str, Any], objective: str = "prpv") -> None:
         """Start a search afresh with these facts beside those of others; episodes are kept, its trials are not."""
         with self._transaction() as connection:
             connection.execute("DELETE FROM trials WHERE objective = ?", (objective,))
-            chain(connection, objective)
             connection.execute("DELETE FROM facts")
-            rows = [(key, json.dumps(value, allow_nan=False)) for key, value in facts.items()]
-            connection.executemany("INSERT INTO facts (key, value) VALUES (?, ?)", rows)
-            seal(connection, "facts")
+            seal(connection, "trials", "facts")
+            for key, value in facts.items():
+                write_row(connection, "facts", {"key": key, "value": json.dumps(value, allow_nan=False)})
         self._trials.pop(objective, None)
 
     def save_fact(self, key: str, value: Any) -> None:
         """Write one more fact, over what it was before; trials are kept."""
         with self._transaction() as connection:
-            row = (key, json.dumps(value, allow_nan=False))
-            connection.execute("INSERT OR REPLACE INTO facts (key, value) VALUES (?, ?)", row)
-            seal(connection, "facts", "key = ?", (key,))
+            write_row(connection, "facts", {"key": key, "value": json.dumps(value, allow_nan=False)})
 
     def rename_identity(self, earlier: Collection[str], identity: str) -> None:
         """Make all that is kept under earlier identities of a domain family belong to this one, at once.
@@ -94,16 +183,14 @@ class Store:
                     connection.execute(statement, {"earlier": name, "now": identity})
                 values = (json.dumps(identity), json.dumps(name))
                 connection.execute("UPDATE facts SET value = ? WHERE key = 'identity' AND value = ?", values)
-            for table in ("facts", "instances", "sweeps"):
-                seal(connection, table)
-            count_sweeps(connection)
+            seal(connection)
         self._outcomes.clear()
 
     def trials(self, objective: str = "prpv") -> list[TrialRecord]:
         """Every trial of a search, in order; the last ones may be open."""
         if objective not in self._trials:
             trials = self._made(
-                records.trial_of,
+                _trial,
                 "SELECT number, theta, state, score, measures, failed_episodes, failure, decided, bound, seconds"
                 " FROM trials JOIN instances ON instances.id = trials.instance WHERE objective = ? ORDER BY number",
                 (objective,),
@@ -119,44 +206,52 @@ class Store:
         """Write a trial, or several at once, over what was known of it before."""
         with self._transaction() as connection:
             for trial in trials:
-                instance = self._instance(connection, identity, theta_json(trial.theta))
-                scored = (trial.state, trial.score, json.dumps(dict(trial.measures), allow_nan=False))
-                rest = (trial.failed_episodes, trial.failure, json.dumps(trial.decided), trial.bound, trial.seconds)
-                connection.execute(
-                    "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, '')",
-                    (objective, trial.number, instance, *scored, *rest),
-                )
-            chain(connection, objective, min((trial.number for trial in trials), default=1))
+                row = {
+                    "objective": objective,
+                    "number": trial.number,
+                    "instance": self._instance(connection, identity, theta_json(trial.theta)),
+                    "state": trial.state,
+                    "score": trial.score,
+                    "measures": json.dumps(dict(trial.measures), allow_nan=False),
+                    "failed_episodes": trial.failed_episodes,
+                    "failure": trial.failure,
+                    "decided": json.dumps(trial.decided),
+                    "bound": trial.bound,
+                    "seconds": trial.seconds,
+                }
+                write_row(connection, "trials", row)
         if objective in self._trials:
             self._trials[objective] |= {trial.number: trial for trial in trials}
 
-    def drop_trials(self, objective: str, first: int) -> None:
-        """Forget the trials of a search from one on; episodes are kept."""
-        with self._transaction() as connection:
-            connection.execute("DELETE FROM trials WHERE objective = ? AND number >= ?", (objective, first))
-            chain(connection, objective, first)
-        self._trials.pop(objective, None)
-
     def save_outcome(self, identity: str, outcome: Outcome, code: str | None = None) -> None:
         """Write an episode, over an earlier failure of the same; of a failure, the code that failed too."""
-        episode = outcome.episode
+        episode, works = outcome.episode, outcome.metrics is not None
         theta = theta_json(episode.theta)
         metrics = None if outcome.metrics is None else json.dumps(dict(outcome.metrics), allow_nan=False)
-        failure = None if outcome.metrics is not None else outcome.failure
         with self._transaction() as connection:
-            instance = self._instance(connection, identity, theta)
-            row = (instance, episode.agent, episode.start, episode.seed, metrics, failure, outcome.seconds)
-            failed = None if failure is None else code
-            connection.execute("INSERT OR REPLACE INTO episodes VALUES (?, ?, ?, ?, ?, ?, ?, ?, 0)", (*row, failed))
-            seal(connection, "episodes", "instance = ? AND agent = ? AND start = ? AND seed = ?", row[:4])
-        self._remember(identity, theta, outcome)
+            row = {
+                "instance": self._instance(connection, identity, theta),
+                "agent": episode.agent,
+                "start": episode.start,
+                "seed": episode.seed,
+                "metrics": metrics,
+                "failure": None if works else outcome.failure,
+                "seconds": outcome.seconds,
+                "code": None if works else code,
+            }
+            write_row(connection, "episodes", row)
+        if (identity, theta) in self._outcomes:
+            self._outcomes[identity, theta][episode] = outcome
+        if self._seconds is not None:
+            total, count = self._seconds.get((episode.agent, episode.start), (0.0, 0))
+            self._seconds[episode.agent, episode.start] = (total + outcome.seconds, count + 1)
 
     def outcomes(self, identity: str, theta: Theta) -> Mapping[Episode, Outcome]:
         """Every episode known of a domain instance: read once, and kept up with what is written."""
         key = identity, theta_json(theta)
         if key not in self._outcomes:
             outcomes = self._made(
-                records.outcome_of,
+                _outcome,
                 "SELECT theta, agent, start, seed, metrics, failure, seconds"
                 " FROM episodes JOIN instances ON instances.id = episodes.instance WHERE identity = ? AND theta = ?",
                 key,
@@ -164,9 +259,28 @@ class Store:
             self._outcomes[key] = {outcome.episode: outcome for outcome in outcomes}
         return self._outcomes[key]
 
-    def under_way(self, identity: str) -> UnderWay:
-        """Which episode runs of the domain family with this identity."""
-        return UnderWay(self.path, self._connection, identity)
+    def under_way(self, identity: str) -> list[Episode]:
+        """The episode of a domain family during which an earlier process ended, if one did; it need not be why."""
+        return self._made(_episode, "SELECT theta, agent, start, seed FROM under_way WHERE identity = ?", (identity,))
+
+    def begin_episode(self, identity: str, episode: Episode) -> None:
+        """Keep which episode runs in this very process, in place of the one before: it may end the process."""
+        which = {"theta": json.dumps(dict(episode.theta)), "agent": episode.agent}
+        place = {"place": 1, "identity": identity}
+        with self._transaction() as connection:
+            write_row(connection, "under_way", place | which | {"start": episode.start, "seed": episode.seed})
+
+    def end_episodes(self) -> None:
+        """Keep that no episode is under way."""
+        with self._transaction() as connection:
+            connection.execute("DELETE FROM under_way")
+            seal(connection, "under_way")
+
+    def agents_that_failed(self, *how: str) -> set[str]:
+        """The agents with a failed episode, in any family, whose failure begins so."""
+        which = " OR ".join(["substr(failure, 1, ?) = ?"] * len(how))
+        values = tuple(value for one in how for value in (len(one), one))
+        return {agent for (agent,) in self._all(f"SELECT DISTINCT agent FROM episodes WHERE {which}", values)}
 
     def failed_in_other_code(self, identity: str, code: str) -> set[Episode]:
         """The episodes that failed in other code than this; those of which the code is not known are left out."""
@@ -174,13 +288,13 @@ class Store:
             "SELECT theta, agent, start, seed FROM episodes JOIN instances ON instances.id = episodes.instance"
             " WHERE identity = ? AND failure IS NOT NULL AND code <> ?"
         )
-        return set(self._made(records.episode_of, query, (identity, code)))
+        return set(self._made(_episode, query, (identity, code)))
 
     def forget_failures(self) -> None:
         """Make every failure one of other code, so that it is tried again."""
         with self._transaction() as connection:
             connection.execute("UPDATE episodes SET code = '' WHERE failure IS NOT NULL")
-            seal(connection, "episodes", "failure IS NOT NULL")
+            seal(connection, "episodes")
 
     def seconds(self) -> dict[tuple[str, int], float]:
         """How long the episodes of each agent and start took on average."""
@@ -198,36 +312,31 @@ class Store:
         return float(self._all(query, (objective, last, *seeds))[0][0])
 
     def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
-        """Remember that a sweep has been asked for in the domain family with this identity."""
-        row = (sweep.parameter, theta_json(sweep.base), json.dumps(sweep.points), identity)
+        """Remember that a sweep has been asked for in the domain family with this identity; it is the last one now."""
         with self._transaction() as connection:
-            # A sweep asked for again becomes the last one.
-            connection.execute(
-                "INSERT OR REPLACE INTO sweeps VALUES (NULL, ?, ?, ?, ?, ?, ?, 0)",
-                (*row, sweep.target_model, sweep.replays),
-            )
-            seal(connection, "sweeps", "number = last_insert_rowid()")
-            count_sweeps(connection)
+            row = {
+                "number": _next(connection, "number", "sweeps"),
+                "parameter": sweep.parameter,
+                "base": theta_json(sweep.base),
+                "points": json.dumps(sweep.points),
+                "identity": identity,
+                "target_model": sweep.target_model,
+                "replays": sweep.replays,
+            }
+            write_row(connection, "sweeps", row)
 
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""
         query = "SELECT identity, parameter, base, points, target_model, replays FROM sweeps ORDER BY number"
-        return self._made(records.sweep_of, query)
-
-    def _remember(self, identity: str, theta: str, outcome: Outcome) -> None:
-        driven = outcome.episode
-        if (identity, theta) in self._outcomes:
-            self._outcomes[identity, theta][driven] = outcome
-        if self._seconds is not None:
-            total, count = self._seconds.get((driven.agent, driven.start), (0.0, 0))
-            self._seconds[driven.agent, driven.start] = (total + outcome.seconds, count + 1)
+        return self._made(_sweep, query)
 
     def _instance(self, connection: sqlite3.Connection, identity: str, theta: str) -> int:
-        made = connection.execute("INSERT OR IGNORE INTO instances (identity, theta) VALUES (?, ?)", (identity, theta))
-        if made.rowcount > 0:
-            seal(connection, "instances", "identity = ? AND theta = ?", (identity, theta))
         query = "SELECT id FROM instances WHERE identity = ? AND theta = ?"
-        return int(connection.execute(query, (identity, theta)).fetchone()[0])
+        known = connection.execute(query, (identity, theta)).fetchone()
+        if known is None:
+            known = (_next(connection, "id", "instances"),)
+            write_row(connection, "instances", {"id": known[0], "identity": identity, "theta": theta})
+        return int(known[0])
 
     def _made(self, make: Callable[..., Made], query: str, values: tuple[Any, ...] = ()) -> list[Made]:
         """What rows are made into; a row that is whole and none of ours is damage too."""
@@ -235,7 +344,9 @@ class Store:
         try:
             return [make(*row) for row in rows]
         except (ValueError, TypeError, AttributeError, RecursionError) as problem:
-            raise not_ours(self.path, problem) from None
+            why = " ".join(str(problem).split())[:120]
+            line = f"has a row that no proxytune wrote ({why}); restore a copy, or move it away"
+            raise StoreError(f"{self.path}: {line}") from None
 
     def _all(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         with sqlite_errors_as_store_errors(self.path):
@@ -243,3 +354,73 @@ class Store:
 
     def _transaction(self) -> AbstractContextManager[sqlite3.Connection]:
         return transaction(self._connection, self.path)
+
+
+def _next(connection: sqlite3.Connection, column: str, table: str) -> int:
+    return int(connection.execute(f"SELECT coalesce(max({column}), 0) + 1 FROM {table}").fetchone()[0])
+
+
+def is_begun(folder: Path) -> bool:
+    """Whether a study has a database; not where a kill came before its first table."""
+    path = folder / FILE_NAME
+    refuse_links(folder)
+    undo_broken_write(path)
+    return path.is_file() and path.stat().st_size > 0
+
+
+def theta_json(theta: Theta | Iterable[tuple[str, float]]) -> str:
+    """θ in the one form in which it is stored: sorted by name, every digit kept."""
+    return json.dumps({name: float(value) for name, value in sorted(dict(theta).items())}, allow_nan=False)
+
+
+# What makes values of rows raises ValueError where a row is none that proxytune writes.
+
+
+def _trial(number: int, theta: str, *rest: Any) -> TrialRecord:
+    state, score, measures, failed, failure, decided, bound, seconds = rest
+    for value in (score, bound):
+        _expect(value is None or _is_number(value), "a score that is no number", value)
+    _expect(type(failed) is int and _is_number(seconds), "a count or time that is no number", (failed, seconds))
+    counted = (_numbers(measures, or_none=True), failed, failure, tuple(_list(decided, str)), bound, seconds)
+    return TrialRecord(number, _numbers(theta), state, score, *counted)
+
+
+def _episode(theta: str, agent: str, start: int, seed: int) -> Episode:
+    _expect(type(start) is int and type(seed) is int, "a number that is none", (start, seed))
+    return Episode(tuple(_numbers(theta).items()), agent, start, seed)
+
+
+def _outcome(theta: str, agent: str, start: int, seed: int, *rest: Any) -> Outcome:
+    metrics, failure, seconds = rest
+    _expect(_is_number(seconds), "a time that is no number", seconds)
+    scored = _numbers(metrics) if metrics else None
+    return Outcome(_episode(theta, agent, start, seed), scored, failure or "", seconds)
+
+
+def _sweep(identity: str, parameter: str, base: str, points: str, *pod: str) -> tuple[str, SweepRecord]:
+    target_model, replays = pod
+    return identity, SweepRecord(parameter, _numbers(base), tuple(_list(points, int, float)), target_model, replays)
+
+
+def _numbers(text: str, or_none: bool = False) -> dict[str, Any]:
+    """Numbers by name."""
+    known = json.loads(text)
+    _expect(isinstance(known, dict), "no numbers by name", text)
+    for value in known.values():
+        _expect(_is_number(value) or (or_none and value is None), "a value that is no number", value)
+    return known  # type: ignore[no-any-return]
+
+
+def _list(text: str, *kinds: type) -> list[Any]:
+    known = json.loads(text)
+    _expect(isinstance(known, list) and all(type(one) in kinds for one in known), "another list", text)
+    return known  # type: ignore[no-any-return]
+
+
+def _is_number(value: object) -> bool:
+    return type(value) in (int, float) and is_finite(cast(float, value))
+
+
+def _expect(holds: bool, what: str, found: object) -> None:
+    if not holds:
+        raise ValueError(f"{what}: {found!r:.60}")

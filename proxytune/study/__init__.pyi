@@ -1,4 +1,4 @@
-from .facts import adopt as adopt, note_search as note_search, open_to_look as open_to_look, unfounded as unfounded
+from .facts import adopt as adopt, note_search as note_search, open_to_look as open_to_look
 from .families import (
     Choice as Choice,
     ComparedFamilies as ComparedFamilies,

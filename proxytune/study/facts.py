@@ -1,12 +1,11 @@
 """By what code a study was made: earlier code that drives the very same episodes, and which search proposed what.
 
-Whether the scores that a study has stored are those that its stored episodes give.
 Looking at a study without running any of its own code: study.db has what its code had said of itself.
 """
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NoReturn, cast
 
@@ -15,11 +14,9 @@ from proxytune.errors import StoreError
 from proxytune.identity import version_changes, versions_of
 from proxytune.search import NAMES, Engine, engine_code, engine_of
 from proxytune.space import Parameter
-from proxytune.storage import Store, TrialRecord
-from proxytune.study.opening import KEPT, PRPV, Study, objective_of, open_settings, read_target, with_scores
-from proxytune.study.pruning import by_other_metrics
+from proxytune.storage import Store
+from proxytune.study.opening import Study, objective_of, open_settings, read_target, with_scores
 from proxytune.study.settings import StudySettings
-from proxytune.study.study_run import StudyRun
 
 SEARCH = "search"
 """The fact that lists which code proposed trials: from which trial on, its digest and the packages it uses."""
@@ -86,67 +83,6 @@ def _searches(store: Store) -> list[dict[str, Any]]:
 def _changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
     code = ["the code of the engine"] if before["code"] != after["code"] else []
     return [*code, *version_changes(before["versions"], after["versions"])]
-
-
-def check_scores(run: StudyRun) -> None:
-    """Refuse a study of which a trial is not what its episodes come to: PRPV and PPV are computed again.
-
-    Raises:
-        StoreError: With the first such trial.
-    """
-    for number, problem in unfounded(run):
-        remedy = f"run: python -m proxytune repair {run.settings.home}"
-        raise StoreError(f"{run.store.path}: was damaged or edited: trial {number} {problem}; {remedy}")
-
-
-def unfounded(run: StudyRun) -> Iterator[tuple[int, str]]:
-    """The number of each ended trial that is not what its episodes come to, and in a phrase why not."""
-    # A measure of one's own is code, and may have changed.
-    shipped = run if run.study.objective.name in KEPT else run.of(replace(run.study, objective=PRPV))
-    for trial in run.finished_trials():
-        problem = _lacks(run, trial) or _scored_otherwise(shipped, run.study.objective.name, trial)
-        if problem:
-            yield trial.number, problem
-
-
-def _lacks(run: StudyRun, trial: TrialRecord) -> str:
-    if set(trial.theta) != set(run.settings.space.names):
-        return "has other parameters than the study"
-    planned = run.episodes_of(trial)
-    known = run.store.outcomes(run.study.identity, trial.theta)
-    missing = sum(episode not in known for episode in planned)
-    return f"lacks {missing} of its {len(planned)} episodes" if missing else ""
-
-
-def _scored_otherwise(run: StudyRun, objective: str, trial: TrialRecord) -> str:
-    """How a trial's scores differ from what its episodes give; nothing where failures were tried again since."""
-    if trial.state == "failed" or _failed_now(run, trial) != trial.failed_episodes:
-        return ""
-    if trial.state == "cut":
-        return _differ("a bound of PRPV of", trial.bound, by_other_metrics(run, trial).bound)
-    measures = run.evaluation_of(trial).measures
-    score = trial.score
-    if objective in KEPT and measures.get(objective) is not None:
-        score = KEPT[objective].sign * float(measures[objective] or 0.0)
-    pairs = [(KEPT[name].label, trial.measures.get(name), measures.get(name)) for name in KEPT]
-    compared = (_differ(*pair) for pair in (*pairs, ("the score", trial.score, score)))
-    return next(filter(None, compared), "")
-
-
-def _failed_now(run: StudyRun, trial: TrialRecord) -> int:
-    return sum(outcome.metrics is None for outcome in run.known(run.episodes_of(trial)).values())
-
-
-def _differ(name: str, stored: float | None, computed: float | None) -> str:
-    if stored is None or computed is None:
-        same = stored is computed
-    else:
-        same = math.isclose(stored, computed, rel_tol=1e-9, abs_tol=1e-9)
-    return "" if same else f"has {name} {_say(stored)}, and its episodes give {_say(computed)}"
-
-
-def _say(value: float | None) -> str:
-    return "none" if value is None else f"{value:g}"
 
 
 DESCRIBED = "described"

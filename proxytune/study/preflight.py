@@ -38,7 +38,7 @@ from scipy.stats import wilcoxon
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode, Outcome, make_episode
 from proxytune.errors import RunError
-from proxytune.running import Lost, Rescue, run_episode, working
+from proxytune.running import Rescue, WorkerExit, run_episode, working
 from proxytune.seeds import preflight_noise_seed, preflight_seed
 from proxytune.space import Interval, Theta
 from proxytune.storage import Store
@@ -173,7 +173,7 @@ def _drive_twice(family: DomainFamily, needed: Sequence[str], episode: Episode) 
     return Twice(episode, tuple(run_episode(family, episode, needed).metrics for _ in range(2)))
 
 
-def _lost(episode: Episode, lost: Lost) -> Twice:
+def _lost(episode: Episode, end: WorkerExit) -> Twice:
     return Twice(episode, (None,))
 
 

@@ -13,7 +13,7 @@ from proxytune.scores import Metric
 from proxytune.search import Propose, Proposer, Search, Trial
 from proxytune.settings import nearest
 from proxytune.storage import State, Store, TrialRecord
-from proxytune.study.facts import CODE, DESCRIBED, SEARCH, adopt, check_scores, describe, differ
+from proxytune.study.facts import CODE, DESCRIBED, SEARCH, adopt, describe, differ
 from proxytune.study.opening import Objective, Study, changes, read_target, study_facts
 from proxytune.study.preflight import FACT as NOT_REPEATABLE, check_some_work
 from proxytune.study.pruning import Cut, by_other_metrics, reference, run_or_cut, stopped
@@ -39,9 +39,18 @@ def run_study(run: StudyRun, proposer: Proposer) -> None:
         StoreError: If the database cannot be written.
     """
     check_facts(run)
+    _drive_lost(run)
     settings = run.settings
     search = Search(settings.space, proposer, settings.seed, settings.budget, settings.initial, settings.batch)
     search.run(StudyTrials(run))
+
+
+def _drive_lost(run: StudyRun) -> None:
+    """Drive again the episodes of ended trials that a damaged study.db has lost."""
+    for trial in run.finished_trials():
+        planned = run.episodes_of(trial)
+        if len(run.known(planned)) < len(planned):
+            run.outcomes(planned, f"trial {trial.number} again")
 
 
 class StudyTrials:
@@ -136,10 +145,9 @@ def check_facts(run: StudyRun) -> None:
     """
     study, store = run.study, run.store
     adopt(study, store)
-    before, after = _facts_before(study, store), study_facts(study)
+    before, after = _facts_before(store), study_facts(study)
     if before == after:
         describe(study, store)
-        check_scores(run)
         return
     if set(store.searches()) - {LEARNING}:
         raise _changed(study, store, before)
@@ -153,11 +161,8 @@ def stored_run(study: Study, store: Store) -> StudyRun:
 
     Raises:
         SettingsError: If anything that the finished trials depend on has changed, apart from code.
-        StoreError: If a score is not what its episodes give.
     """
-    run = StudyRun(as_stored(study, store), store)
-    check_scores(run)
-    return run
+    return StudyRun(as_stored(study, store), store)
 
 
 def as_stored(study: Study, store: Store) -> Study:
@@ -166,7 +171,7 @@ def as_stored(study: Study, store: Store) -> Study:
     Raises:
         SettingsError: If anything else that the finished trials depend on has changed.
     """
-    before = _facts_before(study, store)
+    before = _facts_before(store)
     then = replace(study, identity=before.get("identity", study.identity))
     after = study_facts(then)
     if before and differ(before, after):
@@ -174,12 +179,12 @@ def as_stored(study: Study, store: Store) -> Study:
     return then
 
 
-def _facts_before(study: Study, store: Store) -> dict[str, Any]:
-    """The facts stored with the trials; databases older than cut_off lack that key."""
+def _facts_before(store: Store) -> dict[str, Any]:
+    """The facts stored with the trials."""
     before = {key: value for key, value in store.facts().items() if key not in OTHERS}
     if not isinstance(before.get("versions", {}), dict):
         raise StoreError(f"{store.path}: 'versions' is not as proxytune writes it; restore a copy, or move it away")
-    return {"cut_off": study.settings.cut_off, **before} if before else {}
+    return before
 
 
 def _changed(study: Study, store: Store, before: Mapping[str, Any]) -> SettingsError:

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -280,13 +280,14 @@ class StudyRun:
 
     @contextmanager
     def watched(self) -> Iterator[Watch]:
-        """How episodes are watched: one that ends this process is known to the next, and its agent runs apart then."""
-        under_way = self.store.under_way(self.study.identity)
-        left, agents = under_way.left(), under_way.agents_that_failed(ENDED, ENDLESS)
-        timeout_s = self.settings.episode_timeout_s
-        with under_way.ended():
-            watch = Watch(timeout_s, lambda one: one in left or one.agent in agents, under_way.begin)
-            yield replace(watch, waits=self.watcher.waiting)
+        """How episodes are watched: one that ends this process is known to the next, and its agent is isolated then."""
+        store, identity = self.store, self.study.identity
+        left, agents = store.under_way(identity), store.agents_that_failed(ENDED, ENDLESS)
+        begins, waits = partial(store.begin_episode, identity), self.watcher.waiting
+        try:
+            yield Watch(self.settings.episode_timeout_s, lambda one: one in left or one.agent in agents, begins, waits)
+        finally:
+            store.end_episodes()
 
     def _order(self, planned: Sequence[Episode], missing: Sequence[Episode], *, by_agent: bool) -> list[Episode]:
         """The longest first; or agent by agent as planned, and only within an agent the longest first."""
@@ -359,7 +360,8 @@ class StudyRun:
 
     def _lacks_episodes(self, trial: TrialRecord) -> RunError:
         path = self.store.path
-        return RunError(f"{path}: lacks episodes of trial {trial.number}; move it away and run the study again")
+        again = f"drive them again: python -m proxytune study {self.settings.home}"
+        return RunError(f"{path}: lacks episodes of trial {trial.number}; {again}")
 
 
 MOST_TRIALS, MOST_JOBS = 100_000, 1024

@@ -33,11 +33,11 @@ from proxytune.learning import (
     next_examinations,
     sample_needs,
 )
-from proxytune.running import OVERRUN, Apart, Lost, Noted, Rescue, Watcher, working
+from proxytune.running import OVERRUN, IsolatedWorker, Rescue, TracedTask, Watcher, WorkerExit, working
 from proxytune.teaching.points import TOGETHER, Point, TeachingSetup
 
-NOTES = ".under_way"
-"""The folder, beside what is kept, where points note what they do; it is there meanwhile only."""
+TRACES = ".under_way"
+"""The folder, beside what is kept, where points keep what they do; it is there meanwhile only."""
 
 
 def prepare_points(setup: TeachingSetup, points: Sequence[Point], jobs: int) -> None:
@@ -85,16 +85,16 @@ def _spread(
     setup: TeachingSetup, work: Callable[[Point], Any], points: Sequence[Point], jobs: int
 ) -> Iterator[Iterator[Any]]:
     """Do the points, in processes that a limit may end where there is one."""
-    with _notes(setup.cache.folder / NOTES) as folder:
-        noted = Noted(work, folder)
-        rescue = Rescue[Point, Any](_Loss(setup.timeout_s, noted), apart=setup.timeout_s is not None)
-        with working(noted, points, jobs, rescue=rescue) as done:
+    with _traces(setup.cache.folder / TRACES) as folder:
+        traced = TracedTask(work, folder)
+        rescue = Rescue[Point, Any](_Loss(setup.timeout_s, traced), isolated=setup.timeout_s is not None)
+        with working(traced, points, jobs, rescue=rescue) as done:
             yield done
 
 
 @contextmanager
-def _notes(folder: Path) -> Iterator[Path]:
-    """An empty folder for the points' notes, where there is room for one; a killed command may have left its own."""
+def _traces(folder: Path) -> Iterator[Path]:
+    """An empty folder for the points' traces, where there is room for one; a killed command may have left its own."""
     shutil.rmtree(folder, ignore_errors=True)
     with suppress(OSError):
         folder.mkdir(parents=True)
@@ -109,27 +109,27 @@ class _Loss:
     """What becomes of a point that has ended its process."""
 
     timeout_s: float | None
-    noted: Noted
+    traced: TracedTask
 
-    def __call__(self, point: Point, lost: Lost) -> Any:
+    def __call__(self, point: Point, end: WorkerExit) -> Any:
         """Make it once more where that tells which episode it is, or say of what it ended.
 
         Raises:
             EpisodeError: If a lesson or an examination took longer than it may.
             RunError: If the process ended otherwise.
         """
-        if self.noted.last(point).endswith(TOGETHER):
-            with Apart(self.noted) as apart:
-                return apart.do(point, functools.partial(self._refuse, point))
-        return self._refuse(point, lost)
+        if self.traced.last(point).endswith(TOGETHER):
+            with IsolatedWorker(self.traced) as isolated:
+                return isolated.do(point, functools.partial(self._refuse, point))
+        return self._refuse(point, end)
 
-    def _refuse(self, point: Point, lost: Lost) -> NoReturn:
-        what = f"{point.name}: {self.noted.last(point) or 'a point of a learning curve'}"
-        if lost.how == OVERRUN and self.timeout_s is not None:
+    def _refuse(self, point: Point, end: WorkerExit) -> NoReturn:
+        what = f"{point.name}: {self.traced.last(point) or 'a point of a learning curve'}"
+        if end.how == OVERRUN and self.timeout_s is not None:
             limit = f"{what} took longer than {self.timeout_s:g} s; correct the learner or the domain family"
             raise EpisodeError(f"{limit}, or raise episode_timeout_s, and run again to continue")
-        why = "; out of memory?" if lost.killed else ""
-        raise RunError(f"{what} ended its process ({lost.how}{why}); correct that, and run again to continue")
+        why = "; out of memory?" if end.killed else ""
+        raise RunError(f"{what} ended its process ({end.how}{why}); correct that, and run again to continue")
 
 
 def _shared(settings: TeachingSettings, points: Sequence[Point]) -> list[Point]:

@@ -28,39 +28,16 @@ from .comparison import (
 )
 from .noise import (
     Chance as Chance,
-    FloorKind as FloorKind,
     NoiseFloor as NoiseFloor,
-    Rate as Rate,
     SuccessRates as SuccessRates,
     chance as chance,
     floor_of_repeats as floor_of_repeats,
-    noise_floor as noise_floor,
 )
-from .pairs import (
-    FlippedPair as FlippedPair,
-    Prpv as Prpv,
-    dominance as dominance,
-    prpv as prpv,
-    prpv_of_means as prpv_of_means,
-)
-from .predictivity import (
-    Correlation as Correlation,
-    Mmrv as Mmrv,
-    Pod as Pod,
-    Ppv as Ppv,
-    kendall_tau as kendall_tau,
-    mmrv as mmrv,
-    pod_of_images as pod_of_images,
-    pod_of_poses as pod_of_poses,
-    ppv as ppv,
-    srcc as srcc,
-)
+from .pairs import Prpv as Prpv, dominance as dominance, prpv_of_means as prpv_of_means
+from .predictivity import pod_of_images as pod_of_images, pod_of_poses as pod_of_poses
 from .resampling import (
     Ends as Ends,
-    Intervals as Intervals,
-    PrpvInterval as PrpvInterval,
     bootstrap_means as bootstrap_means,
-    bootstrap_prpv as bootstrap_prpv,
     in_blocks as in_blocks,
     interval as interval,
     why_not_repeated as why_not_repeated,

@@ -2,19 +2,13 @@
 
 import itertools
 import re
-import shutil
 import signal
-import sqlite3
 
 import pytest
-from earlier_formats import BACK, make_earlier
 from failing_disk import HOOKED, forking
 from processes import besides_progress, episodes, trials
 
-from proxytune.errors import StoreError
-from proxytune.storage import Store, salvage
-from proxytune.storage.formats import FORMAT
-from proxytune.storage.store import theta_json
+from proxytune.storage import Store
 
 pytestmark = [
     pytest.mark.slow,
@@ -70,11 +64,6 @@ def kept(folder):
     return trials(folder), episodes(folder)
 
 
-def trials_of(folder):
-    with Store.read(folder) as store:
-        return [(one.number, theta_json(one.theta), one.state, one.score) for one in store.trials()]
-
-
 def files(folder):
     """What is in a study's folder, but for a page that a kill broke off: the next has another name."""
     return {path.name for path in folder.iterdir() if not path.name.startswith(".report.html.")}
@@ -122,50 +111,3 @@ def test_a_disk_full_from_any_write_on_is_told_in_a_line_and_nothing_is_lost(for
         goes_on(forker, folder, never_stopped)
         assert driven.read_text().count("\n") <= EPISODES + 1, "none is driven again but the one under way"
     assert failed > 50
-
-
-@pytest.fixture(scope="module")
-def half(forker, small, make_studies):
-    """Makes a study of which half the trials are finished, in a database of an earlier format."""
-    first = small("first half")
-    half_text = (first / "study.toml").read_text().replace("budget = 2", "budget = 1")
-    (first / "study.toml").write_text(half_text)
-    assert forker.run("study", first)[0] == 0, forker.printed
-
-    def make(called, version):
-        folder = small(called)
-        for name in ("study.db", "report.html"):
-            shutil.copy(first / name, folder)
-        make_earlier(folder / "study.db", version)
-        return folder
-
-    return make
-
-
-@pytest.mark.parametrize("version", BACK)
-def test_a_study_of_an_earlier_format_goes_on_to_the_same_trials_and_gets_checksums(
-    forker, half, never_stopped, version
-):
-    folder = half(f"format {version}", version)
-    assert trials_of(folder) == [never_stopped[0][0][:4]]
-    goes_on(forker, folder, never_stopped)
-    with sqlite3.connect(folder / "study.db") as plain:
-        plain.execute("UPDATE episodes SET seconds = seconds + 1")
-    with pytest.raises(StoreError, match=f"{EPISODES} episodes"):
-        kept(folder)
-
-
-def test_a_conversion_killed_at_any_write_is_undone_and_made_again(forker, half, never_stopped):
-    """By the next run, or by `repair`, which loses nothing, and by who only looks."""
-    undone = 0
-    for folder, _ in each_write(forker, lambda called: half(f"converted {called}", 1), "within", 60):
-        path = folder / "study.db"
-        if not (folder / "study.db-journal").exists() and int.from_bytes(path.read_bytes()[60:64]) == FORMAT:
-            break
-        undone += (folder / "study.db-journal").exists()
-        if undone % 2:
-            assert salvage(folder) is None, "nothing is damaged"
-            assert trials_of(folder) == [never_stopped[0][0][:4]]
-        else:
-            goes_on(forker, folder, never_stopped)
-    assert undone > 20

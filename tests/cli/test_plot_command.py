@@ -1,6 +1,5 @@
 import json
 import shutil
-import sqlite3
 
 import pytest
 
@@ -97,23 +96,6 @@ def test_the_sweep_asked_for_last_is_drawn_where_two_have_one_name(make_study, t
     assert drawn_again(folder, capsys) != first
     assert swept_against(folder, model, capsys, "trim") == first
     assert drawn_again(folder, capsys) == first
-
-
-def test_a_sweep_of_an_older_format_is_drawn_without_pod(make_study, capsys):
-    folder = make_study()
-    assert main(["sweep", str(folder), "--parameter", "trim", "--points", "2"]) == 0
-    before = {path.name: path.read_bytes() for path in (folder / "figures").glob("*.png")}
-    with sqlite3.connect(folder / "study.db") as plain:
-        plain.executescript(
-            "CREATE TABLE old AS SELECT parameter, base, points, identity FROM sweeps; DROP TABLE sweeps;"
-            " ALTER TABLE old RENAME TO sweeps; DROP TABLE trials; CREATE TABLE trials (number INTEGER PRIMARY KEY,"
-            " instance INTEGER, state TEXT, prpv REAL, ppv REAL, failed_episodes INTEGER, failure TEXT);"
-            " ALTER TABLE episodes DROP COLUMN code; ALTER TABLE episodes DROP COLUMN checksum; DROP TABLE chains;"
-            " ALTER TABLE facts DROP COLUMN checksum; ALTER TABLE instances DROP COLUMN checksum;"
-            " PRAGMA user_version = 1;"
-        )
-    capsys.readouterr()
-    assert drawn_again(folder, capsys) == before
 
 
 def drawn_by(folder, capsys, *texts):

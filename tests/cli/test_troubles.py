@@ -14,7 +14,7 @@ from stopping import Stopping
 from proxytune.cli.main import main
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.storage.formats import FORMAT
+from proxytune.storage.database import FORMAT
 from proxytune.study import StudyRun, open_study, run_study
 
 slow = pytest.mark.slow
@@ -137,7 +137,7 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     study = open_study(folder)
     with Store.open(folder) as store:
         with pytest.raises(KeyboardInterrupt):
-            study_run = StudyRun(study, store, Stopping(80))
+            study_run = StudyRun(study, store, Stopping(60))
             run_study(study_run, make_proposer("gp", 5))
         for name in ("study.db", "study.db-wal"):
             shutil.copy(folder / name, crashed / name)

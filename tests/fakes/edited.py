@@ -1,21 +1,16 @@
-"""A study.db edited as a test needs it, with checksums that fit, as if a study had been run so."""
+"""A study.db edited as a test needs it, with digests that fit, as if a study had been run so."""
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
-from proxytune.storage.checksums import prepare, seal_all
+from proxytune.storage.database import open_file, seal
 
 
 @contextmanager
 def edited(path: Path) -> Iterator[sqlite3.Connection]:
     """A connection to edit with."""
-    plain = sqlite3.connect(path)
-    try:
-        with plain:
-            prepare(plain)
-            yield plain
-            seal_all(plain)
-    finally:
-        plain.close()
+    with closing(open_file(path, writable=True)) as plain:
+        yield plain
+        seal(plain)

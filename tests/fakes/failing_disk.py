@@ -184,7 +184,7 @@ def forking(output, *words):
 
 
 class Here:
-    """In place of a process apart, which takes a second to start: an episode that a kill broke off is run here."""
+    """In place of an isolated worker, which takes a second to start: an episode that a kill broke off is run here."""
 
     def __init__(self, work, timeout_s=None):
         self._work = work
@@ -214,7 +214,7 @@ if __name__ == "__main__":
     from proxytune.running import workers
     from proxytune.study import open_study
 
-    workers.Apart, command.run = Here, only_search
+    workers.IsolatedWorker, command.run = Here, only_search
     with redirect_stdout(io.StringIO()):
         main(sys.argv[1:])
     gc.freeze()

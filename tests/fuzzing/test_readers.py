@@ -40,7 +40,8 @@ from proxytune.loop.episodes import pictures_file, read_pictures
 from proxytune.loop.opening import Kept
 from proxytune.scores import read_scores
 from proxytune.storage import Store
-from proxytune.study import StudyRun, as_stored, open_study, read_lessons, read_study_settings, result_of
+from proxytune.study import StudyRun, open_study, read_lessons, read_study_settings, result_of
+from proxytune.study.run import as_stored
 
 MODEL = """\
 format = 1
@@ -131,7 +132,7 @@ def read_study(home: Path) -> object:
 def write_note(home: Path, finished: Path) -> None:
     copy_finished(home, finished)
     with Store.open(home) as store:
-        store.under_way("one").begin(make_episode({"delay": 0.1, "trim": -0.2}, agent="agent1", start=2, seed=11))
+        store.begin_episode("one", make_episode({"delay": 0.1, "trim": -0.2}, agent="agent1", start=2, seed=11))
     (home / "theta").write_text('{"delay": 0.1, "trim": -0.2}')
 
 
@@ -139,7 +140,7 @@ def read_note(home: Path) -> object:
     with closing(sqlite3.connect(home / "study.db")) as plain, plain:
         plain.execute("UPDATE under_way SET theta = CAST(? AS TEXT)", ((home / "theta").read_bytes(),))
     with Store.open(home) as store:
-        return store.under_way("one").left()
+        return store.under_way("one")
 
 
 def write_lessons(home: Path, finished: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from proxytune.cli.main import main
 from proxytune.errors import InputError
 from proxytune.running import on_cluster, working
-from proxytune.running.same_code import check_code, made_by
+from proxytune.running.sending import check_code, made_by
 
 distributed = pytest.importorskip("distributed")
 

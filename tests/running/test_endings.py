@@ -1,10 +1,11 @@
-"""Episodes that end their process, never end, or meet the limits of the machine."""
+"""Episodes that end their process, never end, take long, or meet the limits of the machine."""
 
 import contextlib
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from processes import ENVIRONMENT
 from proxytune.cli.terminal.interruption import signals_as_interruptions
 from proxytune.domain import make_episode
 from proxytune.errors import RunError
-from proxytune.running import Watch, run_episode, running
+from proxytune.running import Watch, episodes, run_episode, running
+from proxytune.running.episodes import MONITOR
 
 EPISODES = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for a in range(3) for s in range(3)]
 LAST = EPISODES[-1]
@@ -162,3 +164,46 @@ def test_workers_end_with_a_parent_that_is_killed_as_they_start(delay_s):
     for one in left:
         os.kill(one, signal.SIGKILL)
     assert not left
+
+
+FEW = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for a in range(2) for s in range(2)]
+LONG_S = 0.1
+
+
+def told_of(fault, jobs=1, **more):
+    """What is said while these episodes run, of which all but one take no time."""
+    said = []
+    watch = Watch(waits=lambda *told: said.append(told), **more)
+    with running(Deadly(faults=(fault,)), FEW, jobs, watch=watch) as outcomes:
+        assert len(list(outcomes)) == len(FEW)
+    return said
+
+
+@pytest.fixture
+def soon(monkeypatch):
+    monkeypatch.setattr(episodes, "LONG_S", LONG_S)
+
+
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_it_is_told_which_episode_has_been_under_way_for_long(soon, jobs):
+    said = told_of("agent1:0:lingers", jobs)
+    assert "agent 'agent1' from start 0" in [what for what, _ in said]
+    assert all(seconds >= LONG_S for _, seconds in said)
+
+
+@pytest.mark.slow
+def test_where_every_episode_is_short_nothing_is_told():
+    assert told_of("agent1:0:lingers") == []
+
+
+@pytest.mark.slow
+def test_where_a_limit_ends_them_nothing_is_told(soon):
+    assert told_of("agent1:0:lingers", timeout_s=60.0) == []
+
+
+def test_nobody_waits_any_longer_once_the_episodes_are_left(soon):
+    said = []
+    with pytest.raises(KeyboardInterrupt), running(Deadly(), FEW, 1, watch=Watch(waits=said.append)):
+        raise KeyboardInterrupt
+    assert MONITOR not in [thread.name for thread in threading.enumerate()]
+    assert said == []

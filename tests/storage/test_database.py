@@ -1,14 +1,29 @@
-import json
+"""study.db as a file: what it is made of, what is refused, and what is told of a damaged one."""
+
+import random
 import shutil
 import sqlite3
+from dataclasses import replace
 
 import pytest
+from edited import edited
+from hypothesis import given, settings, strategies as some
 
+from proxytune.domain import Outcome, make_episode
 from proxytune.errors import StoreError
-from proxytune.storage import salvage
-from proxytune.storage.checksums import COLUMNS
-from proxytune.storage.database import OF_SEVERAL_FILES, connect, disconnect, open_file, sqlite_errors_as_store_errors
-from proxytune.storage.formats import FORMAT, TRIALS_3
+from proxytune.storage import Store, SweepRecord, TrialRecord, database, salvage
+from proxytune.storage.database import (
+    FORMAT,
+    OF_SEVERAL_FILES,
+    connect,
+    digest_of,
+    disconnect,
+    open_file,
+    seal,
+    sqlite_errors_as_store_errors,
+    transaction,
+    write_row,
+)
 
 
 def made(path):
@@ -16,17 +31,21 @@ def made(path):
     return path
 
 
+def add_fact(connection, key, value):
+    write_row(connection, "facts", {"key": key, "value": value})
+
+
 def test_a_database_is_made_with_its_format_and_plain_tables(tmp_path):
     path = made(tmp_path / "study.db")
     with sqlite3.connect(path) as plain:
         assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
         names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    assert names == {"facts", "instances", "trials", "chains", "episodes", "sweeps"}
+    assert names == {"facts", "instances", "trials", "episodes", "sweeps", "under_way", "counts"}
 
 
 def test_a_clean_end_leaves_the_one_file(tmp_path):
     connection = connect(tmp_path / "study.db", writable=True)
-    connection.execute("INSERT INTO facts VALUES ('seed', '1', row_checksum('seed', '1'))")
+    add_fact(connection, "seed", "1")
     disconnect(connection)
     assert [path.name for path in tmp_path.iterdir()] == ["study.db"]
     with sqlite3.connect(tmp_path / "study.db") as plain:
@@ -35,9 +54,9 @@ def test_a_clean_end_leaves_the_one_file(tmp_path):
 
 def test_it_can_be_read_while_it_is_written(tmp_path):
     writer = connect(tmp_path / "study.db", writable=True)
-    writer.execute("INSERT INTO facts VALUES ('seed', '1', row_checksum('seed', '1'))")
+    add_fact(writer, "seed", "1")
     writer.execute("BEGIN IMMEDIATE")
-    writer.execute("INSERT INTO facts VALUES ('starts', '3', row_checksum('starts', '3'))")
+    add_fact(writer, "starts", "3")
     reader = connect(tmp_path / "study.db", writable=False)
     assert reader.execute("SELECT key FROM facts").fetchall() == [("seed",)]
     reader.close()
@@ -75,131 +94,55 @@ def test_a_newer_format_is_refused(tmp_path):
     refused(path, f"has format {FORMAT + 1}, this proxytune reads up to {FORMAT}; install a newer one")
 
 
-UNDO_5 = "DROP TABLE chains; ALTER TABLE trials DROP COLUMN digest;" + "".join(
-    f"ALTER TABLE {table} DROP COLUMN checksum;" for table in COLUMNS
-)
-"""Makes a database of format 5 of a new one."""
+@pytest.mark.parametrize("version", range(1, 7))
+@pytest.mark.parametrize("writable", [True, False])
+def test_formats_that_were_never_released_are_refused_with_what_to_do(tmp_path, version, writable):
+    path = made(tmp_path / "study.db")
+    with sqlite3.connect(path) as plain:
+        plain.execute(f"PRAGMA user_version = {version}")
+    line = f"has format {version}, made by a version of proxytune that was never released; start the study anew in"
+    refused(path, line, writable)
+    with pytest.raises(StoreError, match=line):
+        salvage(tmp_path)
 
-OLD_TRIALS = f"""
-{UNDO_5}
-ALTER TABLE episodes DROP COLUMN code;
-DROP TABLE trials;
-CREATE TABLE trials (
-    number INTEGER PRIMARY KEY, instance INTEGER NOT NULL REFERENCES instances (id),
-    state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed')),
-    prpv REAL, ppv REAL, failed_episodes INTEGER NOT NULL DEFAULT 0, failure TEXT NOT NULL DEFAULT '');
-INSERT INTO instances VALUES (1, 'identity', '{{}}');
-INSERT INTO trials VALUES (1, 1, 'finished', 4.0, 0.25, 1, ''), (2, 1, 'failed', NULL, NULL, 3, 'it fell');
-PRAGMA user_version = 2;
-"""
-TRIAL = "objective, number, instance, state, score, measures, failed_episodes, failure, decided, bound, seconds"
-TRIALS_OF_2 = f"SELECT {TRIAL} FROM trials ORDER BY number"
-CONVERTED_TRIALS = [
-    ("prpv", 1, 1, "finished", 4.0, '{"prpv": 4.0, "ppv": 0.25}', 1, "", "[]", None, 0.0),
-    ("prpv", 2, 1, "failed", None, "{}", 3, "it fell", "[]", None, 0.0),
-]
-TRIALS_OF_3 = f"""
-{UNDO_5}
-ALTER TABLE episodes DROP COLUMN code;
-DROP TABLE trials;
-{TRIALS_3}
-INSERT INTO instances VALUES (1, 'identity', '{{}}');
-INSERT INTO trials VALUES (1, 1, 'finished', 4.0, {1 / 3!r}, 1, '', '[]', NULL, NULL),
-    (2, 1, 'cut', NULL, NULL, 0, '', '["agent1"]', 5.0, 12.5), (3, 1, 'open', NULL, NULL, 0, '', '[]', NULL, NULL);
-PRAGMA user_version = 3;
-"""
-OLD_SWEEPS = """
-DROP TABLE sweeps;
-CREATE TABLE sweeps (
-    parameter TEXT NOT NULL, base TEXT NOT NULL, points TEXT NOT NULL, identity TEXT NOT NULL,
-    PRIMARY KEY (parameter, base, points, identity)) WITHOUT ROWID;
-INSERT INTO sweeps VALUES ('trim', '{}', '[-0.3, 0.3]', 'identity'), ('blur', '{}', '[0.0, 0.1]', 'identity');
-INSERT INTO facts VALUES ('seed', '1');
-PRAGMA user_version = 1;
-"""
-SWEEPS_OF_1 = "SELECT number, parameter, base, points, identity, target_model, replays FROM sweeps ORDER BY number"
-CONVERTED = [
-    (1, "blur", "{}", "[0.0, 0.1]", "identity", "", ""),
-    (2, "trim", "{}", "[-0.3, 0.3]", "identity", "", ""),
-]
+
+NEXT = "ALTER TABLE facts ADD COLUMN source TEXT NOT NULL DEFAULT 'here'; CREATE TABLE notes (text TEXT);"
 
 
 @pytest.fixture
-def of_format_2(tmp_path):
+def with_next_format(tmp_path, monkeypatch):
+    """A database of this format, with a fact, before a proxytune whose format is the next."""
     path = made(tmp_path / "study.db")
-    with sqlite3.connect(path) as plain:
-        plain.executescript(OLD_TRIALS)
+    with edited(path) as plain:
+        plain.execute("INSERT INTO facts (key, value) VALUES ('seed', '1')")
+    monkeypatch.setattr(database, "STEPS", (*database.STEPS, NEXT))
+    monkeypatch.setattr(database, "FORMAT", FORMAT + 1)
     return path
 
 
-@pytest.fixture
-def of_format_1(of_format_2):
-    with sqlite3.connect(of_format_2) as plain:
-        plain.executescript(OLD_SWEEPS)
-    return of_format_2
+def facts_in(connection):
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    return version, connection.execute("SELECT key, value, source FROM facts").fetchall()
 
 
-def test_format_1_is_read_as_it_is(of_format_1):
-    before = of_format_1.read_bytes()
-    connection = connect(of_format_1, writable=False)
-    assert connection.execute(SWEEPS_OF_1).fetchall() == CONVERTED
-    assert connection.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
+def test_the_next_format_reads_this_one_as_it_is_and_converts_it_when_it_writes(with_next_format):
+    before = with_next_format.read_bytes()
+    connection = connect(with_next_format, writable=False)
+    assert facts_in(connection) == (FORMAT + 1, [("seed", "1", "here")])
     connection.close()
-    assert of_format_1.read_bytes() == before
-
-
-def test_format_2_is_read_as_it_is(of_format_2):
-    before = of_format_2.read_bytes()
-    connection = connect(of_format_2, writable=False)
-    assert connection.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
-    assert connection.execute(SWEEPS_OF_1).fetchall() == []
+    assert with_next_format.read_bytes() == before
+    disconnect(connect(with_next_format, writable=True))
+    connection = connect(with_next_format, writable=False)
+    assert facts_in(connection) == (FORMAT + 1, [("seed", "1", "here")])
     connection.close()
-    assert of_format_2.read_bytes() == before
+    assert with_next_format.read_bytes() != before
 
 
-def test_format_2_becomes_the_present_one_when_opened_for_writing_and_keeps_what_it_had(of_format_2):
-    disconnect(connect(of_format_2, writable=True))
-    with sqlite3.connect(of_format_2) as plain:
-        assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
-        assert plain.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
-        plain.execute("UPDATE trials SET state = 'cut'")
-
-
-def test_format_1_becomes_the_present_one_when_opened_for_writing_and_keeps_what_it_had(of_format_1):
-    disconnect(connect(of_format_1, writable=True))
-    with sqlite3.connect(of_format_1) as plain:
-        assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
-        assert plain.execute(SWEEPS_OF_1).fetchall() == CONVERTED
-        assert plain.execute(TRIALS_OF_2).fetchall() == CONVERTED_TRIALS
-        assert plain.execute("SELECT key, value FROM facts").fetchall() == [("seed", "1")]
-        names = {name for (name,) in plain.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-    assert names == {"facts", "instances", "trials", "chains", "episodes", "sweeps"}
-
-
-@pytest.mark.parametrize("writable", [True, False])
-def test_trials_of_format_3_have_their_scores_and_measures_to_the_last_bit(tmp_path, writable):
-    path = made(tmp_path / "study.db")
-    with sqlite3.connect(path) as plain:
-        plain.executescript(TRIALS_OF_3)
-    connection = connect(path, writable=writable)
-    rows = connection.execute("SELECT number, state, score, measures, bound FROM trials ORDER BY number").fetchall()
-    connection.close()
-    assert json.loads(rows[0][3]) == {"prpv": 4.0, "ppv": 1 / 3}
-    assert [(*row[:3], row[4]) for row in rows] == [
-        (1, "finished", 4.0, None),
-        (2, "cut", 12.5, 5.0),
-        (3, "open", None, None),
-    ]
-
-
-def test_a_new_database_and_a_converted_one_have_the_same_tables(of_format_1, tmp_path):
-    disconnect(connect(of_format_1, writable=True))
-    new = made(tmp_path / "new.db")
-    tables = []
-    for path in (of_format_1, new):
-        with sqlite3.connect(path) as plain:
-            tables.append(sorted(plain.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL")))
-    assert tables[0] == tables[1]
+def test_the_next_format_takes_nothing_that_is_damaged_from_this_one(with_next_format):
+    with sqlite3.connect(with_next_format) as plain:
+        plain.execute("UPDATE facts SET value = '2'")
+    for writable in (False, True):
+        refused(with_next_format, "is damaged, or was edited by hand: 1 fact", writable)
 
 
 def test_somebody_else_s_database_is_refused(tmp_path):
@@ -215,10 +158,10 @@ def test_a_text_file_is_refused(tmp_path):
 
 def filled(path):
     connection = connect(path, writable=True)
-    rows = [(number, f"identity {number}", "{}") for number in range(3000)]
-    connection.execute("BEGIN")
-    connection.executemany("INSERT INTO instances VALUES (?1, ?2, ?3, row_checksum(?2, ?3))", rows)
-    connection.execute("COMMIT")
+    rows = [(f"identity {number}", "{}") for number in range(3000)]
+    with transaction(connection, path):
+        connection.executemany("INSERT INTO instances (identity, theta) VALUES (?, ?)", rows)
+        seal(connection)
     disconnect(connection)
     return path
 
@@ -245,9 +188,6 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path):
         connect(tmp_path / "nowhere" / "study.db", writable=True)
 
 
-ONE_MORE = "INSERT INTO instances VALUES (?1, ?2, '{}', row_checksum(?2, '{}'))"
-
-
 def test_a_full_disk_is_told_and_what_was_committed_stays(tmp_path):
     path = tmp_path / "study.db"
     connection = connect(path, writable=True)
@@ -259,7 +199,8 @@ def test_a_full_disk_is_told_and_what_was_committed_stays(tmp_path):
         sqlite_errors_as_store_errors(path),
     ):
         for number in range(10_000):
-            connection.execute(ONE_MORE, (number, f"identity {number}"))
+            with transaction(connection, path):
+                write_row(connection, "instances", {"id": number, "identity": f"identity {number}", "theta": "{}"})
             written += 1
     connection.close()
     again = connect(path, writable=True)
@@ -286,7 +227,7 @@ def test_a_part_of_a_page_is_refused_but_not_beside_the_log_that_has_the_whole_o
     refused(path, "is damaged (its end has been cut off)")
     path.write_bytes(content)
     writer = connect(path, writable=True)
-    writer.execute("INSERT INTO facts VALUES ('seed', '1', row_checksum('seed', '1'))")
+    add_fact(writer, "seed", "1")
     with path.open("ab") as main_file:
         main_file.write(b"?" * 100)
     reader = connect(path, writable=False)
@@ -307,28 +248,13 @@ def test_a_folder_is_refused(tmp_path):
         connect(tmp_path / "study.db", writable=True)
 
 
-def test_format_4_knew_nothing_of_the_code_of_failures(tmp_path):
-    path = made(tmp_path / "study.db")
-    with sqlite3.connect(path) as plain:
-        plain.executescript(
-            f"{UNDO_5} ALTER TABLE episodes DROP COLUMN code; PRAGMA user_version = 4;"
-            " INSERT INTO instances VALUES (1, 'i', '{}');"
-            " INSERT INTO episodes VALUES (1, 'a', 0, 1, NULL, 'it fell', 0.5), (1, 'a', 1, 1, '{}', NULL, 0.5);"
-        )
-    disconnect(connect(path, writable=True))
-    with sqlite3.connect(path) as plain:
-        assert plain.execute("PRAGMA user_version").fetchone() == (FORMAT,)
-        rows = plain.execute("SELECT start, failure, code FROM episodes ORDER BY start").fetchall()
-    assert rows == [(0, "it fell", None), (1, None, None)]
-
-
 def test_a_stranger_s_schema_may_not_call_our_functions(tmp_path):
     path = made(tmp_path / "study.db")
     with sqlite3.connect(path) as plain:
-        plain.create_function("row_checksum", -1, lambda *values: 0, deterministic=True)
-        plain.execute("CREATE VIEW evil AS SELECT row_checksum(key) FROM facts")
+        plain.create_function("row_digest", -1, lambda *values: 0, deterministic=True)
+        plain.execute("CREATE VIEW evil AS SELECT row_digest(key) FROM facts")
     connection = open_file(path, writable=True)
-    with pytest.raises(sqlite3.OperationalError, match="unsafe use of row_checksum"):
+    with pytest.raises(sqlite3.OperationalError, match="unsafe use of row_digest"):
         connection.execute("SELECT * FROM evil").fetchall()
     connection.close()
 
@@ -374,3 +300,184 @@ def test_a_journal_that_would_have_another_file_deleted_is_refused(broken_off, t
     with pytest.raises(StoreError, match="study.db-journal: names another file"):
         connect(broken_off, writable=writable)
     assert victim.read_text() == "mine"
+
+
+THETAS = [{"trim": 0.1 * number, "delay": 1 / 3} for number in range(4)]
+
+
+def small_study(folder):
+    with Store.open(folder) as store:
+        store.begin({"seed": 1, "identity": "i"})
+        for number, theta in enumerate(THETAS, start=1):
+            episode = make_episode(theta, agent="agent1", start=2, seed=11)
+            store.save_outcome("i", Outcome(episode, {"distance": number + 0.1}, "", 1.5), "code")
+            store.save_outcome("i", Outcome(replace(episode, start=3), None, "it fell", 0.5), "code")
+            store.save_trial("i", TrialRecord(number, theta))
+            store.save_trial("i", TrialRecord(number, theta, "finished", 4.0, {"prpv": 4.0, "ppv": 1 / 3}))
+        store.save_trial("i", TrialRecord(1, THETAS[0], "finished", -3.0, {"plv": 3.0}), objective="plv")
+        store.save_sweep("i", SweepRecord("trim", {"delay": 0.1}, (0.0, 0.1)))
+        store.begin_episode("i", make_episode(THETAS[1], agent="agent1", start=2, seed=11))
+    return folder / "study.db"
+
+
+def opened(folder, writable):
+    with Store.open(folder) if writable else Store.read(folder) as store:
+        return store.trials()
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_what_was_written_is_whole(tmp_path, writable):
+    small_study(tmp_path)
+    assert [trial.number for trial in opened(tmp_path, writable)] == [1, 2, 3, 4]
+
+
+DAMAGES = {
+    "UPDATE trials SET score = score + 7 WHERE number = 3": "1 trial",
+    "UPDATE trials SET measures = replace(measures, '4.0', '5.0') WHERE number = 2": "1 trial",
+    "UPDATE trials SET score = 'abc' WHERE number = 4 AND objective = 'prpv'": "1 trial",
+    "UPDATE trials SET instance = 1 WHERE number = 3": "1 trial",
+    "UPDATE trials SET instance = 99 WHERE number = 3": "1 trial",
+    "UPDATE trials SET number = 77 WHERE number = 3": "1 trial",
+    "UPDATE trials SET score = 0 WHERE objective = 'plv'": "1 trial",
+    "DELETE FROM trials WHERE number = 2": "1 trial",
+    "DELETE FROM trials WHERE number = 4": "1 trial",
+    "DELETE FROM trials WHERE objective = 'plv'": "1 trial",
+    "UPDATE facts SET value = 'x' WHERE key = 'seed'": "1 fact",
+    "DELETE FROM facts WHERE key = 'seed'": "1 fact",
+    "UPDATE episodes SET metrics = '[]' WHERE metrics IS NOT NULL": "4 episodes",
+    "UPDATE episodes SET seconds = 1.25 WHERE instance = 1 AND start = 2": "1 episode",
+    "UPDATE episodes SET code = 'other' WHERE instance = 1 AND start = 3": "1 episode",
+    "UPDATE episodes SET agent = CAST(x'ff61' AS TEXT) WHERE instance = 1 AND start = 3": "1 episode",
+    "UPDATE episodes SET instance = 10 + instance WHERE instance > 2": "4 episodes",
+    "DELETE FROM episodes WHERE instance = 2": "2 episodes",
+    "UPDATE sweeps SET points = '[0.0, 0.2]'": "1 sweep",
+    "DELETE FROM sweeps": "1 sweep",
+    "DELETE FROM sweeps; UPDATE facts SET value = 'x' WHERE key = 'seed'": "1 fact, 1 sweep",
+    "UPDATE under_way SET theta = '{'": "1 note of the episode under way",
+    "UPDATE under_way SET start = 'first'": "1 note of the episode under way",
+    "UPDATE instances SET identity = 'j' WHERE id = 1": "1 domain instance",
+    "UPDATE instances SET theta = '{}' WHERE id = 4": "1 domain instance",
+    "UPDATE counts SET rows = 7 WHERE name = 'episodes'": "1 episode",
+    "UPDATE counts SET rows = 'x' WHERE name = 'facts'": "1 fact",
+    "DELETE FROM counts WHERE name = 'sweeps'": "1 sweep",
+}
+
+
+@pytest.mark.parametrize("writable", [True, False])
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damage_is_told_with_what_is_lost_and_what_to_do(tmp_path, damage, writable):
+    path = small_study(tmp_path)
+    with sqlite3.connect(path) as plain:
+        plain.executescript(damage)
+    lost = f"{path}: is damaged, or was edited by hand: {DAMAGES[damage]}; run: python -m proxytune repair {tmp_path}"
+    with pytest.raises(StoreError) as complaint:
+        opened(tmp_path, writable)
+    assert str(complaint.value) == f"{lost}, which keeps all else"
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        "UPDATE facts SET value = 'x'",
+        "UPDATE trials SET decided = '{' WHERE number = 2",
+        "UPDATE trials SET measures = '[]' WHERE number = 2",
+        "UPDATE trials SET score = 'abc' WHERE number = 2",
+        "UPDATE trials SET failed_episodes = 'many' WHERE number = 2",
+        "UPDATE instances SET theta = '[1]' WHERE id = 2",
+        'UPDATE instances SET theta = \'{"trim": "x"}\' WHERE id = 2',
+        "UPDATE episodes SET metrics = '{\"distance\": null}' WHERE start = 2",
+        "UPDATE episodes SET metrics = '" + "[" * 3000 + "' WHERE start = 2",
+        "UPDATE sweeps SET points = '7'",
+        "UPDATE under_way SET theta = '[1, 2]'",
+        "UPDATE under_way SET start = 'first'",
+    ],
+)
+def test_json_of_another_shape_is_a_store_error_also_where_its_digest_fits(tmp_path, edit):
+    with edited(small_study(tmp_path)) as plain:
+        plain.execute(edit)
+    with pytest.raises(StoreError, match="has a row that no proxytune wrote"), Store.read(tmp_path) as store:
+        store.facts(), store.trials(), store.sweeps(), store.under_way("i")
+        for theta in THETAS:
+            store.outcomes("i", theta)
+
+
+VALUES = some.lists(some.none() | some.integers() | some.floats() | some.text(), min_size=1, max_size=4)
+
+
+@settings(max_examples=300, deadline=None)
+@given(VALUES, VALUES)
+def test_other_values_have_another_digest(one, other):
+    assert (digest_of(*one) == digest_of(*other)) == (ascii(one) == ascii(other))
+
+
+def test_sweeps_asked_for_again_or_renamed_are_not_missed(tmp_path):
+    path = small_study(tmp_path)
+    sweep = SweepRecord("trim", {"delay": 0.1}, (0.0, 0.1))
+    with Store.open(tmp_path) as store:
+        store.save_sweep("i", sweep)
+        store.save_sweep("j", sweep)
+        store.rename_identity(("i",), "j")
+    with Store.read(tmp_path) as store:
+        assert store.sweeps() == [("j", sweep)]
+    with sqlite3.connect(path) as plain:
+        plain.execute("DELETE FROM sweeps")
+    with pytest.raises(StoreError, match="1 sweep"):
+        opened(tmp_path, writable=False)
+
+
+@pytest.mark.parametrize("writable", [True, False])
+@pytest.mark.parametrize(
+    ("statement", "what"),
+    [
+        ("CREATE TRIGGER evil AFTER INSERT ON trials BEGIN DELETE FROM trials; END", "a trigger 'evil'"),
+        ("ALTER TABLE trials RENAME TO own; CREATE VIEW trials AS SELECT * FROM own", "a view 'trials'"),
+        ("CREATE VIRTUAL TABLE notes USING fts5(text)", "a virtual table 'notes'"),
+        ("ALTER TABLE facts ADD COLUMN more TEXT", r"its table 'facts' is not as proxytune makes it"),
+        ("ALTER TABLE trials ADD COLUMN more AS (score + 7)", r"its table 'trials' is not as proxytune makes it"),
+        ("DROP TABLE counts; CREATE TABLE counts (n)", r"its table 'counts' is not as proxytune makes it"),
+        ("DROP TABLE sweeps", r"its table 'sweeps' is not as proxytune makes it"),
+    ],
+)
+def test_what_runs_by_itself_in_a_database_is_refused(tmp_path, statement, what, writable):
+    path = small_study(tmp_path)
+    with sqlite3.connect(path) as plain:
+        plain.executescript(statement)
+    with pytest.raises(StoreError, match=what):
+        opened(tmp_path, writable)
+
+
+def told_or_unchanged(folder, whole):
+    """Whether damage is told in one line; else, whether what is read is what was written."""
+    try:
+        with Store.read(folder) as store:
+            return all_of(store) == whole
+    except StoreError as problem:
+        return "\n" not in str(problem)
+
+
+def all_of(store):
+    outcomes = [dict(store.outcomes("i", theta)) for theta in THETAS]
+    return store.facts(), store.trials(), store.trials("plv"), store.sweeps(), outcomes, store.seconds()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_flipped_bit_is_told_or_changes_nothing_that_is_read(tmp_path, seed):
+    rng, path = random.Random(seed), small_study(tmp_path)
+    content = path.read_bytes()
+    with Store.read(tmp_path) as store:
+        whole = all_of(store)
+    used = [place for place, byte in enumerate(content) if byte]
+    for _ in range(60):
+        damaged, place = bytearray(content), rng.choice(used)
+        damaged[place] ^= 1 << rng.randrange(8)
+        path.write_bytes(damaged)
+        assert told_or_unchanged(tmp_path, whole), place
+
+
+def test_a_database_that_was_cut_off_anywhere_is_told(tmp_path):
+    path = small_study(tmp_path)
+    content = path.read_bytes()
+    for size in random.Random(1).sample(range(1, len(content)), 60):
+        path.write_bytes(content[:size])
+        with pytest.raises(StoreError, match="is damaged|is not a study's database"):
+            opened(tmp_path, writable=False)

@@ -225,3 +225,24 @@ def test_renaming_is_whole_or_not_at_all(tmp_path, monkeypatch):
             store.rename_identity(("old",), "new")
         assert store.outcomes("old", THETA) == {EPISODE: WORKED}
         assert store.outcomes("new", THETA) == {}
+
+
+RUNNING = [replace(EPISODE, start=start) for start in (0, 1)]
+
+
+def test_the_last_episode_that_began_is_known_to_the_next_process_of_the_same_family_alone(tmp_path):
+    with Store.open(tmp_path) as store:
+        for episode in RUNNING:
+            store.begin_episode("one", episode)
+    with Store.open(tmp_path) as store:
+        assert store.under_way("one") == RUNNING[1:]
+        assert store.under_way("another") == []
+        store.end_episodes()
+        assert store.under_way("one") == []
+
+
+def test_agents_are_known_by_how_an_episode_of_theirs_failed(tmp_path):
+    with Store.open(tmp_path) as store:
+        for agent, failure in (("a", "it ended its process"), ("b", "raised it ended"), ("c", "it took long")):
+            store.save_outcome("one", Outcome(replace(EPISODE, agent=agent), None, failure, 1.0))
+        assert store.agents_that_failed("it ended", "it took") == {"a", "c"}

@@ -8,7 +8,7 @@ from processes import besides_progress, start, trials
 
 from proxytune.cli.main import main
 from proxytune.domain import make_episode
-from proxytune.running import patience
+from proxytune.running import episodes
 from proxytune.storage import Store
 
 FAMILY = {"family": '"deadly:deadly"', "budget": "2", "initial": "2"}
@@ -70,7 +70,7 @@ def test_what_the_machine_lacks_stops_the_study_and_is_not_kept(make_study, caps
 def test_an_episode_under_way_when_the_study_was_killed_becomes_what_it_would_have_been(make_study, finished):
     folder = make_study("killed")
     with Store.open(folder) as store:
-        store.under_way("wobbly 1 ()").begin(make_episode({}, agent="agent0", start=0, seed=1))
+        store.begin_episode("wobbly 1 ()", make_episode({}, agent="agent0", start=0, seed=1))
     assert main(["study", str(folder)]) == 0
     assert trials(folder) == trials(finished)
 
@@ -78,7 +78,7 @@ def test_an_episode_under_way_when_the_study_was_killed_becomes_what_it_would_ha
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [["study"], ["sweep", "--parameter", "trim", "--points", "2"]])
 def test_an_agent_that_takes_long_is_told_of_where_nothing_limits_its_time(make_study, capsys, monkeypatch, command):
-    monkeypatch.setattr(patience, "LONG_S", 0.2)
+    monkeypatch.setattr(episodes, "LONG_S", 0.2)
     name, *more = command
     assert main([name, str(make_study(domain=domain("lingers"), **FAMILY)), *more]) == 0
     said = capsys.readouterr().err

@@ -8,9 +8,10 @@ from proxytune.cli.main import main
 from proxytune.errors import SettingsError, StoreError
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import StudyRun, as_stored, check_facts, note_search, open_study, run_study, study_facts
+from proxytune.study import StudyRun, check_facts, note_search, open_study, run_study, study_facts
 from proxytune.study.facts import SEARCH
 from proxytune.study.opening import changes
+from proxytune.study.run import as_stored
 
 NOW = {"numpy": "2.0", "pybullet": "3.2.6"}
 

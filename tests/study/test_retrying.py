@@ -3,7 +3,6 @@
 import sqlite3
 
 import pytest
-from edited import edited as edited_database
 from stopping import Stopping
 
 from proxytune.api.studies import run_study
@@ -103,13 +102,3 @@ def test_a_retry_that_is_stopped_within_a_trial_or_just_before_it_is_kept_goes_o
     assert report.spent.episodes == 5 * 3 - episodes
     assert [trial.state for trial in report.result.trials] == ["finished"] * 5
     assert {trial.failed_episodes for trial in report.result.trials} == {0}
-
-
-def test_failures_of_which_the_code_is_not_known_are_remembered(edited):
-    folder = edited("if episode.agent == 'agent3' and episode.start: raise KeyError('mass')")
-    run_study(folder)
-    with edited_database(folder / "study.db") as plain:
-        plain.execute("UPDATE episodes SET code = NULL")
-    assert run_study(edited("pass")).spent.episodes == 0
-    with Store.read(folder) as store:
-        assert {trial.failed_episodes for trial in store.trials()} == {2}

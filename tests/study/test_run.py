@@ -12,7 +12,6 @@ from proxytune.storage import Store, TrialRecord
 from proxytune.study import (
     PRPV,
     StudyRun,
-    as_stored,
     check_facts,
     goal_of,
     open_study,
@@ -22,7 +21,7 @@ from proxytune.study import (
     score_trials,
     with_metrics,
 )
-from proxytune.study.run import came_to
+from proxytune.study.run import as_stored, came_to
 from proxytune.study.settings import StopRules
 
 COARSE = (Metric.parse("distance:max:20%"), Metric.parse("survival_time:max"))
@@ -242,17 +241,6 @@ def test_changed_code_of_the_family_is_refused_but_its_old_result_can_still_be_l
             check_facts(StudyRun(newer, store))
         assert as_stored(newer, store).identity == open_study(finished).identity
         assert store.trials() == trials
-
-
-@pytest.mark.parametrize("cut_off", ["true", "false"])
-def test_a_study_from_before_there_was_cutting_off_goes_on_either_way(finished, make_study, cut_off):
-    _, trials = run(finished)
-    with sqlite3.connect(finished / "study.db") as plain:
-        plain.execute("DELETE FROM facts WHERE key = 'cut_off'")
-    make_study(cut_off=cut_off)
-    assert run(finished) == (0, trials)
-    with Store.read(finished) as store:
-        assert as_stored(open_study(finished), store).identity == open_study(finished).identity
 
 
 def test_looking_at_an_edited_study_is_refused(finished, make_study):

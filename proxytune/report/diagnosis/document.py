@@ -238,8 +238,6 @@ def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
     place, turn = views.position_m / views.tracks.share, np.degrees(views.heading_rad) / views.tracks.share
     keys = ("nats", "share", "rms_px")
     left = [
-        {key: _number(getattr(one, key)) for key in keys} | {"open": bool(one.significant)} for one in diagnosis.residual_fields
-    ]
         {key: _number(getattr(one, key)) for key in keys} | {"open": bool(one.significant)}
         for one in diagnosis.residual_fields
     ]

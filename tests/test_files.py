@@ -47,7 +47,7 @@ def test_a_link_in_the_drafts_place_is_not_followed(tmp_path):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from proxytune.drafts import draft_of
+from proxytune.files import draft_of
 with draft_of(Path(sys.argv[1])):
     os.kill(os.getpid(), signal.SIGKILL)
 """

@@ -10,8 +10,8 @@ ENGINE = '''"""The middle of the box, and from there a spiral."""
 from dataclasses import dataclass
 from math import cos, sin
 
-from proxytune.search.design import from_unit
-from proxytune.search.engines.engine import Engine
+from proxytune.search import from_unit
+from proxytune.search import Engine
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ MEASURE = '''"""The largest error of a mean score."""
 
 import numpy as np
 
-from proxytune.usefulness.measure import Measure
+from proxytune.usefulness import Measure
 
 
 def largest_error(proxy, target, metrics):

@@ -280,7 +280,7 @@ def test_an_episode_is_the_same_without_numba(compiled, tmp_path, monkeypatch, p
 
 
 def test_numpy_does_it_where_numba_is_told_not_to_compile(compiled):
-    code = "from proxytune.driving.texels.choosing import by_numba; print(by_numba().__name__)"
+    code = "from proxytune.driving.texels import by_numba; print(by_numba().__name__)"
     told = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},

@@ -64,7 +64,7 @@ def test_the_parameters_of_the_environment_come_first(tmp_path):
 
 OWN = """
 from proxytune.effects import Stage
-from proxytune.effects.motors.actuation import Trim
+from proxytune.effects.motors import Trim
 
 class Mine(Trim):
     name = "mine"

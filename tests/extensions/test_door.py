@@ -216,7 +216,7 @@ def test_a_plugin_whose_name_could_not_be_written_as_one_word_is_refused(install
 
 ELSEWHERE = """
 import pickle, sys
-from proxytune.extensions.travelling import unpack
+from proxytune.extensions import unpack
 packed, work = pickle.loads(sys.stdin.buffer.read())
 unpack(packed)
 unpack(packed)

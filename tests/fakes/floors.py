@@ -2,7 +2,8 @@
 
 FLOORS = (
     {"errors"},
-    {"settings", "drafts", "seeds", "meaning", "versions", "extensions", "space", "shipped", "scores", "logs"},
+    {"settings", "drafts", "seeds", "space", "shipped", "scores", "logs"}
+    | {"meaning", "lineage", "versions", "extensions"},
     {"usefulness", "effects", "importing"},
     {"domain"},
     {"driving"},

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from proxytune.effects import Cue, Form, Means, Panel, Setting, Signal, Stage, Trace
-from proxytune.effects.trace import Draws
+from proxytune.effects import Draws
 from proxytune.space import Parameter
 
 

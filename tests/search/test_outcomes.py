@@ -52,8 +52,8 @@ def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
     code = (
         f"import sys; sys.path.append({str(FAKES)!r})\n"
         "from steps import WHOLE\n"
-        "from proxytune.search.engines.composite import Composite\n"
-        "from proxytune.search.proposer import Trial\n"
+        "from proxytune.search.outcomes import Composite\n"
+        "from proxytune.search import Trial\n"
         "from proxytune.space import Interval, Space\n"
         f"print(repr(Composite(WHOLE).propose({SPACE!r}, {trials!r}, 4)))"
     )
@@ -154,8 +154,8 @@ def test_outcomes_another_process_with_other_threads_proposes_the_same_to_the_la
         code = (
             f"import sys; sys.path.append({str(FAKES)!r})\n"
             "from steps import WHOLE\n"
-            "from proxytune.search.engines.outcomes import Outcomes\n"
-            "from proxytune.search.proposer import Trial\n"
+            "from proxytune.search.outcomes import Outcomes\n"
+            "from proxytune.search import Trial\n"
             "from proxytune.space import Interval, Space\n"
             f"print(repr(Outcomes(WHOLE).propose({SPACE!r}, {trials!r}, 4)))"
         )

@@ -229,7 +229,7 @@ def test_an_unknown_engine_is_refused_with_the_nearest_name():
 
 
 def test_an_engine_in_a_file_of_ones_own_is_found_beside_and_goes_by_the_name_it_was_asked_for(tmp_path):
-    (tmp_path / "mine.py").write_text("from proxytune.search.engines.sobol import ENGINE\nNONE = 3\n")
+    (tmp_path / "mine.py").write_text("from proxytune.search.engine import SOBOL\nNONE = 3\n")
     assert engine_of("mine:ENGINE", tmp_path) == replace(engine_of("sobol"), name="mine:ENGINE")
     with pytest.raises(InputError, match="engine 'mine:NONE' is a int; make it a proxytune"):
         engine_of("mine:NONE", tmp_path)
@@ -238,7 +238,7 @@ def test_an_engine_in_a_file_of_ones_own_is_found_beside_and_goes_by_the_name_it
 
 
 def test_the_code_of_ones_own_engine_is_part_of_what_its_runs_depend_on(tmp_path):
-    head = "from proxytune.search.engines.engine import Engine\n"
+    head = "from proxytune.search import Engine\n"
     text = f"{head}class Mine:\n    step = 1\nENGINE = Engine('m', '', '', Mine)\n"
     other, codes = text.replace("step = 1", "step = 2"), []
     for place, source in (("one", text), ("same", f"# a comment\n{text}"), ("other", other)):

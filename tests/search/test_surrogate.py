@@ -26,8 +26,8 @@ def test_a_proposal_does_not_depend_on_the_order_in_which_trials_are_told(order)
 def test_another_process_with_other_threads_proposes_the_same_to_the_last_bit():
     trials = search(make_proposer("gp", 5), 8, seed=4)
     code = (
-        "from proxytune.search.engines.gaussian_process import GaussianProcess as G\n"
-        "from proxytune.search.proposer import Trial\n"
+        "from proxytune.search.surrogate import GaussianProcess as G\n"
+        "from proxytune.search import Trial\n"
         "from proxytune.space import Interval, Space\n"
         f"print(repr(G().propose({SPACE!r}, {trials!r}, 4)))"
     )

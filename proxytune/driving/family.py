@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from proxytune.domain import Demonstration, Episode, Policy, Recording
-from proxytune.driving import lineage
 from proxytune.driving.agent import Picture
 from proxytune.driving.agents import load_agent
 from proxytune.driving.batch_rollout import drive_together, groups_of
@@ -44,7 +43,7 @@ from proxytune.driving.episode import (
 )
 from proxytune.driving.expert import Observation, Playback, Pupil, lesson_driver
 from proxytune.driving.lane import off_map
-from proxytune.driving.maps import chosen_map, shipped_map
+from proxytune.driving.maps import chosen_map
 from proxytune.driving.optics import Camera, CameraFigures
 from proxytune.driving.plants import Plant, check_body, drivetrain
 from proxytune.driving.road import Road
@@ -64,51 +63,29 @@ from proxytune.effects import (
 )
 from proxytune.errors import EpisodeError, SettingsError
 from proxytune.identity import meaning_of, modules_beside, versions_of
+from proxytune.lineage import code_name
 from proxytune.settings import Section, nearest
 from proxytune.space import Parameter, Theta
-
-PACKAGE = Path(__file__).resolve().parent.parent
 
 
 def identity_of(settings: tuple[Any, ...], robot: Path, folder: Path, versions: Mapping[str, str]) -> str:
     """A digest of settings, of what our code, the robot's files and the user's modules mean, and of versions.
 
     Args:
-        settings: Of the family, without the folder.
+        settings: Of the family, without the folder. Their `repr` counts: a class of theirs, as that of the map, cannot
+            be renamed without giving every episode another name.
         robot: The robot's folder.
         folder: Where the user's modules lie.
         versions: Of the packages that simulate.
     """
     own = meaning_of(modules_beside(folder), folder)
-    parts = (settings, lineage.named(code_meaning()), robot_meaning(robot), own, sorted(versions.items()))
+    parts = (settings, code_name("driving"), robot_meaning(robot), own, sorted(versions.items()))
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
-
-
-def earlier_identities(settings: tuple[Any, ...], robot: Path, folder: Path) -> tuple[str, ...]:
-    """The identities under which earlier code kept episodes that are those of today, to the last bit.
-
-    Args:
-        settings: Of the family, those that there were then.
-        robot: The robot's folder.
-        folder: Where the user's modules lie; they counted by their bytes, without those in packages.
-    """
-    code = lineage.digest_of_54760ad(robot.name, robot_meaning(robot), code_meaning())
-    if code is None:
-        return ()
-    own = b"".join(path.read_bytes() for path in sorted(folder.glob("*.py")))
-    return (hashlib.sha256(repr(settings).encode() + own + code).hexdigest()[:16],)
-
-
-@functools.lru_cache
-def code_meaning() -> str:
-    """What the code of effects and of driving means; what is said in `lineage` about earlier code is no part of it."""
-    modules = [path for room in ("effects", "driving") for path in (PACKAGE / room).rglob("*.py")]
-    return meaning_of((path for path in modules if path != Path(lineage.__file__).resolve()), PACKAGE)
 
 
 @functools.lru_cache
 def robot_meaning(robot: Path) -> str:
-    """What the files of a robot's folder mean."""
+    """A digest of what the files of a robot's folder mean."""
     return meaning_of((path for path in robot.iterdir() if path.is_file()), robot)
 
 
@@ -191,15 +168,6 @@ class LaneFollowing:
         """A digest of settings, of what robot, code and the user's modules mean, and of versions."""
         settings = tuple(getattr(self, name) for name in self.__dataclass_fields__ if name != "folder")
         return identity_of(settings, robot_home(self.robot, self.folder), self.folder, self.versions)
-
-    @property
-    def earlier_identities(self) -> tuple[str, ...]:
-        """Identities under which earlier code kept episodes that are the very same."""
-        # Maps were known by their names: one of another name, or changed since, has no earlier episodes.
-        name = self.map.name if self.map == shipped_map("small_loop") else "none of then"
-        world = (self.robot, self.plant, self.camera, name, self.seconds)
-        settings = (*world, self.position_noise_m, self.heading_noise_deg, self.effects)
-        return earlier_identities(settings, robot_home(self.robot, self.folder), self.folder)
 
     @property
     def versions(self) -> Mapping[str, str]:

@@ -19,11 +19,12 @@ import numpy as np
 from proxytune.domain import Episode
 from proxytune.driving import Command, Picture, Robot
 from proxytune.effects import Catalogue, Effect, effects_from, is_learnt
-from proxytune.environments.identity import code_meaning, folder_meaning
 from proxytune.environments.making import EnvironmentSettings, EpisodeMetric, make_environment, read_domain, read_values
 from proxytune.environments.signals import Actuators, EnvironmentParameters, Sensors, Spaces, figures, look_at
 from proxytune.errors import EpisodeError, ExtensionError, InputError, SettingsError
 from proxytune.extensions import ask, describe, load
+from proxytune.identity import files_beside, meaning_of
+from proxytune.lineage import code_name
 from proxytune.seeds import acting_seed, course_generator, reset_seed
 from proxytune.settings import Section, nearest
 from proxytune.space import Theta
@@ -246,6 +247,8 @@ def wrap(
 
 STARTS = 1000
 """Each is an initial state of the environment, by a seed of its own."""
+READ_BY_CODE = (".py", ".xml", ".urdf", ".sdf", ".zip", ".npz", ".pt", ".onnx")
+"""Modules, bodies and policies: what a study makes itself, as tables and figures, is none of them."""
 
 
 @dataclass(frozen=True)
@@ -267,9 +270,15 @@ class GymnasiumFamily:
 
     @property
     def identity(self) -> str:
-        """A digest of settings, of what our code and the user's files mean, and of versions."""
+        """A digest of settings, of what our code and the user's files mean, and of versions.
+
+        The `repr` of settings and spaces counts: their classes and attributes cannot be renamed without giving every
+        episode another name.
+        """
+        folder = self.settings.folder
+        own = meaning_of((path for path in files_beside(folder) if path.suffix in READ_BY_CODE), folder)
         table = [getattr(self.settings, name) for name in self.settings.__dataclass_fields__ if name != "folder"]
-        parts = (table, self.spaces, self.held, code_meaning(), folder_meaning(self.settings.folder))
+        parts = (table, self.spaces, self.held, code_name("environments"), own)
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
     @property

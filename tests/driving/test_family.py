@@ -1,4 +1,4 @@
-"""Under which name episodes are kept: what changes it, what does not, and that studies of earlier code go on.
+"""Under which name episodes of driving are kept: what changes it besides our code, and what does not.
 
 A mounted camera is the robot's nominal one but for the figures that camera effects set.
 """
@@ -9,25 +9,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from proxytune.driving import (
-    LaneFollowing,
-    family as identity,
-    lineage,
-    mounted_camera,
-    read_robot,
-    robot_from_geometry,
-    robot_home,
-    shipped_map,
-)
+from proxytune.driving import LaneFollowing, mounted_camera, read_robot, robot_from_geometry, shipped_map
+from proxytune.driving.family import robot_meaning
 from proxytune.effects import effects_from
 from proxytune.errors import SettingsError
 from proxytune.files import shipped
-
-OF_THEN = {
-    ("planar", ""): "9e04143f2c12f033",
-    ("planar", "x = 1\n"): "5fc0d658a4944099",
-}
-"""What commit 54760ad said, by plant and the text of the user's module."""
 
 
 def family(folder, plant="planar", camera="ground_plane"):
@@ -36,87 +22,16 @@ def family(folder, plant="planar", camera="ground_plane"):
     )
 
 
-@pytest.fixture
-def fresh():
-    """Forget what is cached of code and robots, before and after."""
-    kept = (identity.code_meaning, identity.robot_meaning)
-    for cached in kept:
-        cached.cache_clear()
-    yield
-    for cached in kept:
-        cached.cache_clear()
-
-
-def test_code_that_means_something_else_is_decided_upon():
-    hint = "all episodes proven the same? then append it to SAME_CODE in driving/lineage.py, else see there"
-    assert identity.code_meaning() in lineage.SAME_CODE, f"code means {identity.code_meaning()}; {hint}"
-
-
-@pytest.mark.parametrize(("plant", "module"), OF_THEN)
-def test_an_earlier_identity_is_what_the_code_of_then_said(tmp_path, plant, module):
-    if module:
-        (tmp_path / "mine.py").write_text(module)
-    assert family(tmp_path, plant).earlier_identities == (OF_THEN[plant, module],)
-
-
-def test_earlier_episodes_count_only_while_code_and_robot_mean_what_they_did(tmp_path, monkeypatch, fresh):
+def test_a_robot_counts_by_what_its_files_mean(tmp_path):
     shutil.copytree(shipped("robots") / "duckiebot", tmp_path / "duckiebot")
     described = tmp_path / "duckiebot" / "robot.toml"
-    text = described.read_text()
+    before, text = family(tmp_path).identity, described.read_text()
     described.write_text(f"# a comment\n{text}")
-    assert len(family(tmp_path).earlier_identities) == 1
-    identity.robot_meaning.cache_clear()
+    robot_meaning.cache_clear()
+    assert family(tmp_path).identity == before
     described.write_text(text.replace("0.0318", "0.0319", 1))
-    assert family(tmp_path).earlier_identities == ()
-    identity.robot_meaning.cache_clear()
-    described.write_text(text)
-    monkeypatch.setattr(lineage, "SAME_CODE", ("other code",))
-    assert family(tmp_path).earlier_identities == ()
-
-
-def test_every_robot_that_travels_has_an_earlier_identity(tmp_path):
-    assert {path.parent.name for path in shipped("robots").glob("*/robot.toml")} >= set(lineage.OF_54760AD)
-    code = identity.code_meaning()
-    digests = [lineage.digest_of_54760ad(r, identity.robot_meaning(robot_home(r)), code) for r in lineage.OF_54760AD]
-    assert None not in digests
-    assert lineage.digest_of_54760ad("another robot", "", identity.code_meaning()) is None
-
-
-@pytest.fixture
-def package(tmp_path, monkeypatch, fresh):
-    """A copy of our code, to be edited."""
-    for room in ("effects", "driving"):
-        shutil.copytree(identity.PACKAGE / room, tmp_path / "package" / room)
-    monkeypatch.setattr(identity, "PACKAGE", tmp_path / "package")
-    monkeypatch.setattr(lineage, "__file__", str(tmp_path / "package" / "driving" / "lineage.py"))
-    return tmp_path / "package"
-
-
-@pytest.mark.parametrize("module", ["effects/chain.py", "driving/task.py", "driving/road/lane.py"])
-def test_a_changed_comment_in_our_code_leaves_the_identity_and_a_changed_line_does_not(package, module, tmp_path):
-    before, path = family(tmp_path / "study").identity, package / module
-    path.write_text(f"# a comment\n{path.read_text()}")
-    identity.code_meaning.cache_clear()
-    assert family(tmp_path / "study").identity == before
-    path.write_text(f"{path.read_text()}\nMORE = 1\n")
-    identity.code_meaning.cache_clear()
-    assert family(tmp_path / "study").identity != before
-
-
-def test_what_is_said_of_earlier_code_is_no_part_of_the_code(package):
-    before = identity.code_meaning()
-    (package / "driving" / "lineage.py").write_text("SAME_CODE = ()\n")
-    identity.code_meaning.cache_clear()
-    assert identity.code_meaning() == before
-
-
-def test_code_that_is_proven_to_drive_the_same_episodes_keeps_their_identity(package, tmp_path, monkeypatch):
-    before = family(tmp_path / "study").identity
-    (package / "effects" / "more.py").write_text("MORE = 1\n")
-    identity.code_meaning.cache_clear()
-    assert family(tmp_path / "study").identity != before
-    monkeypatch.setattr(lineage, "SAME_CODE", (*lineage.SAME_CODE, identity.code_meaning()))
-    assert family(tmp_path / "study").identity == before
+    robot_meaning.cache_clear()
+    assert family(tmp_path).identity != before
 
 
 def test_a_user_s_modules_count_by_their_meaning_in_packages_too(tmp_path):

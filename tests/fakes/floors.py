@@ -2,7 +2,7 @@
 
 FLOORS = (
     {"errors"},
-    {"arrays", "settings", "files", "seeds", "identity", "extensions", "space", "scores", "logs"},
+    {"arrays", "settings", "files", "seeds", "identity", "lineage", "extensions", "space", "scores", "logs"},
     {"usefulness", "effects", "importing"},
     {"domain"},
     {"driving"},

@@ -23,11 +23,11 @@ from runs import EngineSummary, Run, RunKey, append_run, finished_run, read_runs
 from study_problems import StudyObjective, TruthObjective, lacking_families, noise_floor
 
 from proxytune.cli.main import add_shared_options, run_command
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
-from proxytune.cli.terminal.study_folder import study_folder
+from proxytune.cli.options import configure_cluster, on_its_cluster, study_folder
+from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError, StoreError
-from proxytune.report.writing import save, write_text
+from proxytune.report import write_text
+from proxytune.report.writing import save
 from proxytune.running import Bars, working
 from proxytune.search import NAMES as STUDY_ENGINES, Engine, engine_code
 from proxytune.storage import Store, locked

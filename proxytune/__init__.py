@@ -2,9 +2,13 @@
 
     study        run_study, read_study, StudyReport
     simulators   run_families, read_families, FamiliesReport: several tuned in the same time
-    scores       score, Assessment, Metric, ScoreTable, read_scores
+    sweep        run_sweep, SweepReport: usefulness along a parameter
+    teaching     teach, TeachReport: what a proxy saves in training
+    scores       score, Assessment, Metric, ScoreTable, read_scores; measure, Measurement: scores in a model's domain
     search       SearchBox: ask for a θ, tell its score
-    logs         diagnose, DiagnosisReport, read_log, log_of, Log
+    logs         diagnose, DiagnosisReport, read_log, log_of, Log; import_log, ImportReport
+    models       predict, Prediction, PicturePrediction; export, ExportReport
+    loop         run_loop, LoopReport: tune, diagnose, extend, tune again
     driving      drive, DrivenEpisode: one episode of a study's proxy
     to extend    DomainFamily, Episode, Parameter, Agent, Effect, Engine, Proposer, Learner, Measure
     errors       ProxytuneError, InputError, RunError

@@ -1,16 +1,38 @@
-from .api.asking import SearchBox as SearchBox
-from .api.diagnosing import DiagnosisReport as DiagnosisReport, diagnose as diagnose
-from .api.driving import DrivenEpisode as DrivenEpisode, drive as drive
-from .api.families import FamiliesReport as FamiliesReport, read_families as read_families, run_families as run_families
-from .api.logs import log_of as log_of
-from .api.studies import StudyReport as StudyReport, read_study as read_study, run_study as run_study
-from .api.tables import score as score
+from .api import (
+    DiagnosisReport as DiagnosisReport,
+    DrivenEpisode as DrivenEpisode,
+    ExportReport as ExportReport,
+    FamiliesReport as FamiliesReport,
+    ImportReport as ImportReport,
+    Measurement as Measurement,
+    PicturePrediction as PicturePrediction,
+    Prediction as Prediction,
+    SearchBox as SearchBox,
+    StudyReport as StudyReport,
+    SweepReport as SweepReport,
+    TeachReport as TeachReport,
+    diagnose as diagnose,
+    drive as drive,
+    export as export,
+    import_log as import_log,
+    log_of as log_of,
+    measure as measure,
+    predict as predict,
+    read_families as read_families,
+    read_study as read_study,
+    run_families as run_families,
+    run_study as run_study,
+    run_sweep as run_sweep,
+    score as score,
+    teach as teach,
+)
 from .domain import DomainFamily as DomainFamily, Episode as Episode
 from .driving import Agent as Agent
 from .effects import Effect as Effect
 from .errors import InputError as InputError, ProxytuneError as ProxytuneError, RunError as RunError
 from .learning import Learner as Learner
 from .logs import Log as Log, read_log as read_log
+from .loop import LoopReport as LoopReport, run_loop as run_loop
 from .scores import Metric as Metric, ScoreTable as ScoreTable, read_scores as read_scores
 from .search import Engine as Engine, Proposer as Proposer
 from .space import Parameter as Parameter

@@ -17,7 +17,7 @@ from floors import floor
 
 import proxytune
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, main, parser
-from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
+from proxytune.cli.terminal import INTERRUPTED, TERMINATED
 from proxytune.driving import AGENTS, METRICS, UNITS, map_names
 from proxytune.effects import CATALOGUE, GROUPS
 from proxytune.files import shipped

@@ -1,1 +1,19 @@
-"""What a Python user calls: whole tasks in one call each, on files or on DataFrames."""
+"""What a Python user calls: one function for each command, on files or DataFrames, with a report that shows itself.
+
+    study        run_study, read_study: pre-flight, trials, confirmation
+    families     several simulators, each tuned in the same time
+    curves       run_sweep, teach
+    scores       score: tables as DataFrames
+    diagnosis    diagnose
+    logs         log_of, record_log
+    transfer     import_log, measure, predict, export
+    driving      drive
+    search_box   SearchBox: the optimiser alone
+    theta        θ as people give it
+
+The command line is options, one of these functions, and text.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

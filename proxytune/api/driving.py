@@ -8,6 +8,7 @@ import pandas as pd
 
 from proxytune.domain import make_episode
 from proxytune.errors import InputError
+from proxytune.report import frame_html
 from proxytune.seeds import episode_seed
 from proxytune.space import Theta
 from proxytune.study import check_episode, load_family, read_study_settings, record_episode
@@ -28,6 +29,11 @@ class DrivenEpisode:
     scores: Mapping[str, float]
     poses: pd.DataFrame | None
     commands: pd.DataFrame | None
+
+    def _repr_html_(self) -> str:
+        scores = ", ".join(f"{name} {value:.4g}" for name, value in self.scores.items())
+        table = pd.DataFrame([self.scores]) if self.poses is None else self.poses
+        return frame_html(f"One episode: {scores}.", table)
 
 
 def drive(

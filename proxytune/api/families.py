@@ -8,9 +8,17 @@ from typing import Any, NamedTuple, Protocol
 
 from matplotlib.figure import Figure
 
-from proxytune.api.studies import StudyReport, most_episodes, read_study, run_opened
+from proxytune.api.study import StudyReport, most_episodes, read_study, run_opened
 from proxytune.errors import RunError
-from proxytune.report import families_document, families_figure, families_sentence, write_families_report
+from proxytune.report import (
+    families_document,
+    families_figure,
+    families_sentence,
+    families_view,
+    fragment_html,
+    png_of,
+    write_families_report,
+)
 from proxytune.running import Bars, Silent, Watcher
 from proxytune.storage import Store, locked
 from proxytune.study import (
@@ -93,6 +101,9 @@ class FamiliesReport:
 
     def __repr__(self) -> str:
         return f"FamiliesReport of '{self.compared.settings.name}': {self.sentence}"
+
+    def _repr_html_(self) -> str:
+        return fragment_html(families_view(self.compared, png_of(self.figure())))
 
     @property
     def sentence(self) -> str:

@@ -1,14 +1,24 @@
-"""A log from DataFrames."""
+"""A log from DataFrames.
 
-from collections.abc import Mapping
+A log recorded of the domain of a model file: manoeuvres, and lane drives for pictures; `record` is this.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import tomlkit
 
-from proxytune.api.frames import as_files
-from proxytune.errors import LogError
-from proxytune.logs import Log, read_log
+from proxytune.api.scores import as_files
+from proxytune.diagnosis import PICTURES, FilmedDrive, film, frames_text, log_text, record, samples_text
+from proxytune.driving import LaneFollowing
+from proxytune.errors import InputError, LogError
+from proxytune.logs import Frames, Log, read_log
+from proxytune.report import write_picture, write_text
+from proxytune.settings import Section
+from proxytune.study import StudySettings, bare_family
 
 Description = Mapping[str, str | float]
 
@@ -37,3 +47,94 @@ def _toml(stated: Description) -> str:
         return tomlkit.dumps(plain)
     except TypeError as problem:
         raise LogError(f"log.toml: {problem}; give texts and numbers") from None
+
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be driven.
+
+    Attributes:
+        repeats: Drives of each manoeuvre.
+        seconds: Length of a drive [s].
+        frames: How many pictures are taken, on lane drives; 0: none.
+        seed: Of manoeuvres, starts and noise.
+    """
+
+    repeats: int = 2
+    seconds: float = 60.0
+    frames: int = 0
+    seed: int = 1
+
+
+def recordable(settings: StudySettings, model: Path) -> LaneFollowing:
+    """The domain of a model, by a study's [domain].
+
+    Raises:
+        InputError: If it cannot be recorded.
+    """
+    family = bare_family(settings, model)
+    if not isinstance(family, LaneFollowing):
+        raise InputError(f"{settings.folder}: only the lane-following family can be recorded; give another study")
+    return family
+
+
+def record_log(settings: StudySettings, model: Path, folder: Path, wanted: Wanted, tell: Tell) -> Log:
+    """Drive every manoeuvre, and lanes where pictures are wanted, and write the log; without log.toml it is none.
+
+    Args:
+        settings: Of the study, for its [domain].
+        model: The model.toml of the domain.
+        folder: The log's folder to write.
+        wanted: What is to be driven.
+        tell: Hears how far it is.
+
+    Raises:
+        InputError: If the domain cannot be recorded, or has no camera or expert where pictures are wanted.
+        EpisodeError: If a lane drive ends before its pictures are taken.
+        RunError: If a file cannot be written.
+    """
+    family = recordable(settings, model)
+    drives = film(family, wanted.frames, wanted.seed) if wanted.frames else ()
+    log = record(family, name=folder.name, repeats=wanted.repeats, seconds=wanted.seconds, seed=wanted.seed)
+    if wanted.frames:
+        road = _write_map(settings.domain, folder)
+        log = _film(log, drives, road, folder, lambda taken: tell(f"driving: {taken} of {wanted.frames} frames"))
+    _write(log, folder, f"{model.name} on the {family.plant} plant, driven by proxytune")
+    return log
+
+
+def _write_map(domain: Section, folder: Path) -> str:
+    """The map's name; a user's own file is copied into the log."""
+    name = domain.text("map", "small_loop")
+    if not name.endswith(".toml"):
+        return name
+    source = domain.path.parent / name
+    write_text(folder / source.name, source.read_text(encoding="utf-8"))
+    return str((folder / source.name).resolve())
+
+
+def _film(log: Log, filmed: Iterable[FilmedDrive], road: str, folder: Path, tell: Callable[[int], None]) -> Log:
+    """The log with lane drives after its own; each drive's pictures are written before the next one starts."""
+    episodes, paths = list(log.episodes), list[Path]()
+    drives, times = list[int](), list[float]()
+    for episode, taken, pictures in filmed:
+        for picture in pictures:
+            paths.append(folder / (PICTURES % len(paths)))
+            write_picture(paths[-1], picture)
+        drives += [len(episodes)] * len(pictures)
+        times += taken.tolist()
+        episodes.append(episode)
+        tell(len(paths))
+    frames = Frames(tuple(paths), np.array(drives), np.array(times), road)
+    return replace(log, episodes=tuple(episodes), frames=frames)
+
+
+def _write(log: Log, folder: Path, source: str) -> None:
+    """Its tables, then log.toml: without that a folder is no log."""
+    write_text(folder / "samples.csv", samples_text(log))
+    if log.frames:
+        write_text(folder / "frames.csv", frames_text(log, log.frames, range(len(log.frames.paths)), "%.6f"))
+    write_text(folder / "log.toml", log_text(log, source))

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
 
 SHELLS = ("bash", "zsh", "tcsh")

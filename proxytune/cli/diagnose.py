@@ -8,11 +8,9 @@ from pathlib import Path
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.api.diagnosing import DiagnosisReport
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
-from proxytune.cli.terminal.steps import Steps
-from proxytune.cli.terminal.typed import typed
+from proxytune.api import DiagnosisReport
+from proxytune.cli.options import configure_source, facts_of, typed, wanted_of
+from proxytune.cli.terminal import Answer, Steps
 from proxytune.diagnosis import diagnose_log, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError

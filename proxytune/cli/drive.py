@@ -6,10 +6,9 @@ from pathlib import Path
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.study_folder import study_folder
-from proxytune.cli.terminal.theta import ChosenTheta, choose_theta
-from proxytune.cli.terminal.waiting import waiting
+from proxytune.api import ChosenTheta, choose_theta
+from proxytune.cli.options import study_folder
+from proxytune.cli.terminal import Answer, waiting
 from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import InputError
 from proxytune.report import NO_PLACES, check_episode_file, episode_document, episode_text, say_parting, write_episode

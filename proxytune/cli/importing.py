@@ -8,10 +8,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.source_options import configure_source, facts_of, wanted_of
-from proxytune.cli.terminal.waiting import waiting
-from proxytune.importing import Source, Survey, read_source, source_without_unnamed_pictures, write_log
+from proxytune.api import import_log
+from proxytune.cli.options import configure_source, facts_of, wanted_of
+from proxytune.cli.terminal import Answer, waiting
+from proxytune.importing import Source, Survey
 
 MEASURES = ("drive", "time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
 """The columns of the table of drives."""
@@ -29,15 +29,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """List what the source holds, and write the log."""
-    facts = facts_of(arguments)
+    wanted, facts = wanted_of(arguments), facts_of(arguments)
     with waiting(f"reading {arguments.source}"):
-        whole = read_source(arguments.source, wanted_of(arguments), facts.offset_s)
-        source = source_without_unnamed_pictures(whole, facts)
-        if arguments.output is not None:
-            write_log(source, arguments.output, facts, origin=arguments.source.name)
-    written = None if arguments.output is None else str(arguments.output)
-    document = source.facts | {"log": written, "drives": [one.facts for one in source.surveys]}
-    return Answer(document, _told(source, arguments.output))
+        report = import_log(arguments.source, arguments.output, wanted=wanted, facts=facts)
+    return Answer(report.document(), _told(report.source, arguments.output))
 
 
 def _told(source: Source, output: Path | None) -> Group:

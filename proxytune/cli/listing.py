@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal import Answer
 from proxytune.driving import AGENTS, METRICS, lane_length, load_agent, map_names, read_robot, robot_names, shipped_map
 from proxytune.effects import DECLARED, SHIPPED
 from proxytune.extensions import plugins

@@ -6,16 +6,13 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from datetime import UTC, datetime
 from pathlib import Path
 
 from proxytune.cli.diagnose import shares
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.steps import Steps
-from proxytune.cli.terminal.study_folder import study_folder
+from proxytune.cli.options import study_folder
+from proxytune.cli.terminal import Answer, Steps
 from proxytune.logs import Log
-from proxytune.loop import Closed, close_loop, document_of, foot_of_loop, open_loop, text_of, view_of
-from proxytune.report import write_page
+from proxytune.loop import Closed, run_loop, text_of
 from proxytune.running import Bars, Watcher
 
 
@@ -36,15 +33,12 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Do every step that is not done, and write the page."""
     begun = time.perf_counter()
     folder = study_folder(arguments.path)
-    loop = open_loop(folder, arguments.twin, arguments.log)
-    closed = close_loop(loop, Terminal())
-    page = loop.home / "report.html"
-    date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    write_page(page, view_of(closed), foot_of_loop(closed, _command(arguments), date))
-    document = document_of(closed)
-    document["files"] = {name: str(path) for name, path in _files(closed, page).items()}
+    report = run_loop(folder, log=arguments.log, twin=arguments.twin, teller=Terminal())
+    page = report.write(_command(arguments))
+    document = report.document()
+    document["files"] = {name: str(path) for name, path in _files(report.closed, page).items()}
     document["this_run"]["seconds"] = time.perf_counter() - begun
-    return Answer(document, text_of(closed, page))
+    return Answer(document, text_of(report.closed, page))
 
 
 class Terminal:

@@ -7,13 +7,9 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import proxytune
-from proxytune.cli.commands import COMMANDS
-from proxytune.cli.examples import epilog
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.interruption import signals_as_interruptions
-from proxytune.cli.terminal.own_output import print_answer, prints_to_stderr
-from proxytune.cli.terminal.trouble import FAILED, stopped_by
-from proxytune.cli.terminal.trusting import only_trusted_code
+from proxytune.cli.commands import COMMANDS, epilog
+from proxytune.cli.terminal import FAILED, Answer, print_answer, prints_to_stderr, signals_as_interruptions, stopped_by
+from proxytune.cli.trusting import only_trusted_code
 from proxytune.errors import InputError, ProxytuneError
 
 DONE, BAD_INPUT = 0, 2

@@ -7,14 +7,11 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from proxytune.cli.terminal.answer import Answer
+from proxytune.api import measure
+from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
-from proxytune.running import Bars
-from proxytune.scores import ScoreTable, write_scores
-from proxytune.seeds import TARGET_OFFSET, target_seed
-from proxytune.study import measure, read_study_settings
-
-MOST_REPEATS = 1_000_000
+from proxytune.scores import ScoreTable
+from proxytune.seeds import TARGET_OFFSET
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -36,35 +33,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score every agent from every start, and write the table."""
-    settings = read_study_settings(arguments.path)
-    seed = target_seed(settings.seed) if arguments.seed is None else arguments.seed
-    if seed < 0:
-        raise InputError(f"--seed must be at least 0, got {seed}")
-    if not 1 <= arguments.repeats <= MOST_REPEATS:
-        raise InputError(f"--repeats must be between 1 and {MOST_REPEATS}, got {arguments.repeats}")
-    if not arguments.model.is_file():
-        raise InputError(f"--model {arguments.model}: no such file; check the path")
     if not arguments.output.absolute().parent.is_dir():
         raise InputError(f"{arguments.output}: its folder does not exist; create it first")
     if arguments.output.is_dir():
         raise InputError(f"--output {arguments.output}: is a folder; give the name of a file in it")
-    with Bars(len(settings.agents) * settings.starts * arguments.repeats) as bars:
-        scores = measure(settings, arguments.model, seed, bars, arguments.repeats)
-    write_scores(scores, arguments.output)
-    document = {
-        "scores": str(arguments.output),
-        "model": str(arguments.model),
-        "seed": seed,
-        "agents": list(scores.agents),
-        "episodes": len(scores.episodes),
-        "repeats": arguments.repeats,
-        "means": {agent: _means(scores, row) for row, agent in enumerate(scores.agents)},
-    }
-    return Answer(document, Group(_table(scores), Text(f"seed {seed}\n{arguments.output}")))
-
-
-def _means(scores: ScoreTable, row: int) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(scores.metrics, scores.means[row], strict=True)}
+    options = {"repeats": arguments.repeats, "seed": arguments.seed}
+    found = measure(arguments.path, arguments.model, progress=True, **options)
+    found.write(arguments.output)
+    document = {"scores": str(arguments.output), **found.document()}
+    return Answer(document, Group(_table(found.scores), Text(f"seed {found.seed}\n{arguments.output}")))
 
 
 def _table(scores: ScoreTable) -> Table:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from rich.text import Text
 
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.trusting import remember
+from proxytune.cli.terminal import Answer
+from proxytune.cli.trusting import remember
 from proxytune.driving import read_robot, robot_names
 from proxytune.errors import InputError, ProxytuneError, RunError
 from proxytune.files import draft_path

@@ -9,10 +9,10 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from proxytune.api.studies import StudyReport
-from proxytune.cli.families import redraw_families
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.typed import typed
+from proxytune.api import StudyReport
+from proxytune.cli.options import typed
+from proxytune.cli.study import redraw_families
+from proxytune.cli.terminal import Answer
 from proxytune.report import (
     curve_name,
     draw_curves,

@@ -5,9 +5,8 @@ from pathlib import Path
 
 from rich.text import Text
 
-from proxytune.api.recording import Wanted, record_log
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.waiting import waiting
+from proxytune.api import Wanted, record_log
+from proxytune.cli.terminal import Answer, waiting
 from proxytune.errors import InputError
 from proxytune.logs import Log
 from proxytune.study import read_study_settings

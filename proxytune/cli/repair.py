@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
-from proxytune.cli.terminal.answer import Answer
+from proxytune.cli.terminal import Answer
 from proxytune.storage import Store, locked, salvage
 from proxytune.study import LEARNING, PRPV, read_study_settings
 

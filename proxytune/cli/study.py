@@ -1,22 +1,174 @@
-"""`study`: run or resume a study, and sum it up."""
+"""`study`: run or resume a study, and sum it up.
+
+A study's page while the study runs: written anew every few seconds, as its episodes end.
+`study` and `plot` of several families: each tuned in the same time, and compared.
+`study` with objective = "plv": the proxy whose samples save most on the target.
+"""
 
 import argparse
 import sys
 import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from proxytune.api.families import Spending
-from proxytune.api.studies import StudyReport, most_episodes, run_opened
-from proxytune.cli.families import compare_families
-from proxytune.cli.learning_value import search_by_plv
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.cluster_options import configure_cluster, on_its_cluster
-from proxytune.cli.terminal.live_page import renewed_page
-from proxytune.cli.terminal.study_folder import study_folder
-from proxytune.report import study_text
-from proxytune.running import Bars
-from proxytune.study import LEARNING, Spent, Study, StudyResult, open_settings, read_study_settings, with_spending
+from proxytune.api import (
+    FamiliesReport,
+    Spending,
+    StudyReport,
+    most_episodes,
+    read_families,
+    run_opened,
+    run_opened_families,
+)
+from proxytune.cli.options import configure_cluster, on_its_cluster, study_folder
+from proxytune.cli.terminal import Answer
+from proxytune.errors import ProxytuneError
+from proxytune.report import (
+    RENEW_S,
+    families_text,
+    plv_document,
+    plv_text,
+    study_text,
+    write_live_page,
+    write_plv_report,
+)
+from proxytune.running import Bars, Watcher
+from proxytune.search import make_proposer
+from proxytune.storage import Store, locked
+from proxytune.study import (
+    LEARNING,
+    Spent,
+    Study,
+    StudyResult,
+    StudySettings,
+    open_settings,
+    read_study_settings,
+    with_spending,
+)
+from proxytune.teaching import PlvSearch, load_setup, most_examinations, search_space
+
+
+class LivePage:
+    """Hears how a run goes, passes it on, and writes the study's page."""
+
+    def __init__(self, settings: StudySettings, objective: str, watcher: Watcher) -> None:
+        self._settings, self._objective, self._watcher = settings, objective, watcher
+        self._path = settings.home / "report.html"
+        self._doing, self._due = "", 0.0
+        self.written = False
+
+    def begin(self, what: str, known: int) -> None:
+        """Something begins."""
+        self._doing = what
+        self._watcher.begin(what, known)
+
+    def episode(self) -> None:
+        """One more episode has been run; the page is written where the last time was long enough ago."""
+        self._watcher.episode()
+        if time.monotonic() >= self._due:
+            self.write(self._doing)
+            self._due = time.monotonic() + RENEW_S
+
+    def best(self, score: float) -> None:
+        """The lowest score so far."""
+        self._watcher.best(score)
+
+    def finished(self, what: str) -> None:
+        """Something has ended."""
+        self._watcher.finished(what)
+
+    def waiting(self, episode: str, seconds: float) -> None:
+        """An episode has been under way for long."""
+        self._watcher.waiting(episode, seconds)
+
+    def write(self, doing: str) -> None:
+        """Write the page, and say at the first time where it is."""
+        # The run is worth more than its page, and the page of the end says what is wrong with the place.
+        with suppress(ProxytuneError):
+            with Store.read(self._settings.home) as store:
+                trials = [one for one in store.trials(self._objective) if one.state != "open"]
+            write_live_page(self._path, self._settings, self._objective, trials, doing)
+            if not self.written:
+                print(f"proxytune study: page: {self._path} (renews itself while the study runs)", file=sys.stderr)
+            self.written = True
+
+
+@contextmanager
+def renewed_page(
+    settings: StudySettings, objective: str, watching: AbstractContextManager[Watcher]
+) -> Iterator[Watcher]:
+    """A watcher that keeps the study's page up to date; a run that is stopped leaves a page that says so.
+
+    Args:
+        settings: The study's.
+        objective: The measure that its trials are searched by.
+        watching: Gives what else hears of every episode.
+    """
+    with watching as watcher:
+        page = LivePage(settings, objective, watcher)
+        try:
+            yield page
+        except BaseException:
+            if page.written:
+                page.write("")
+            raise
+
+
+def compare_families(settings: StudySettings, spending: Spending) -> Answer:
+    """Run what is left of every family, and compare them; finished ones are summed up again without simulating."""
+    begun = time.perf_counter()
+    report = run_opened_families(settings, Terminal(), spending)
+    seconds = {"total": time.perf_counter() - begun, "episodes": report.spent.seconds}
+    return _answer(report, {"episodes": {"run": report.spent.episodes}, "seconds": seconds})
+
+
+def redraw_families(settings: StudySettings) -> Answer:
+    """Draw the figure and the page of several families again; nothing is simulated."""
+    return _answer(read_families(settings.path), {})
+
+
+def _answer(report: FamiliesReport, spent: Mapping[str, Any]) -> Answer:
+    figure, page = report.write()
+    document = {**report.document(), **spent, "figures": [str(figure)], "report": str(page)}
+    return Answer(document, families_text(report.compared, {"figure": figure, "report": page}))
+
+
+class Terminal:
+    """Tells on standard error how it goes."""
+
+    def say(self, line: str) -> None:
+        """One line."""
+        print(f"proxytune study: {line}", file=sys.stderr, flush=True)
+
+    def tuning(self, study: Study) -> AbstractContextManager[Watcher]:
+        """A bar of episodes, and the family's page while it is tuned."""
+        settings = study.settings
+        return renewed_page(settings, study.objective.name, Bars(most_episodes(settings)))
+
+    def teaching(self, points: int) -> AbstractContextManager[Watcher]:
+        """A bar of points of learning curves."""
+        return Bars(points, "points of learning curves")
+
+
+def search_by_plv(study: Study, folder: Path, by_prpv: Callable[[], StudyResult]) -> Answer:
+    """Run what is left of a search by PLV; first narrow the box by PRPV where the study asks for it."""
+    settings = study.settings
+    setup = load_setup(settings)
+    widths = setup.settings.widths
+    search_space(settings, widths, {})
+    predictive = by_prpv() if setup.settings.narrow else None
+    space = search_space(settings, widths, predictive.knowledge.as_good[1] if predictive else {})
+    terminal = Bars(most_examinations(setup.settings), "points of learning curves")
+    watching = renewed_page(settings, LEARNING, terminal)
+    with locked(folder), Store.open(folder) as store, watching as bars:
+        search = PlvSearch(settings, setup, store, space, bars)
+        chosen = predictive.best.trial.theta if predictive else None
+        result = search.run(make_proposer(study.engine, settings.initial), chosen)
+    figure, page = write_plv_report(result, folder)
+    document = {**plv_document(result), "figure": str(figure), "report": str(page)}
+    return Answer(document, plv_text(result, {"figure": figure, "report": page}))
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

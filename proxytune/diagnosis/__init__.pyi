@@ -1,4 +1,4 @@
-from .answer import RULES as RULES, Estimate as Estimate
+from .answer import RULES as RULES, Estimate as Estimate, Rules as Rules
 from .camera.diagnose import camera_effects as camera_effects
 from .camera.edges import Edges as Edges, effects_of as effects_of
 from .camera.error import (
@@ -37,6 +37,7 @@ from .motion.innovations import (
     wheel_speeds as wheel_speeds,
 )
 from .motion.prediction import (
+    Agreement as Agreement,
     Ratio as Ratio,
     Rmse as Rmse,
     agreement as agreement,

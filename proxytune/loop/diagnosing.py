@@ -12,8 +12,7 @@ from typing import Any
 
 import tomlkit
 
-from proxytune.api.diagnosing import DiagnosisReport
-from proxytune.api.recording import Wanted, recordable
+from proxytune.api import DiagnosisReport, Wanted, recordable
 from proxytune.diagnosis import camera_effects, diagnose_log, film, motion_effects, robot_of
 from proxytune.driving import Robot
 from proxytune.effects import Catalogue, effect_of

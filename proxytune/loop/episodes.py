@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proxytune.api.studies import StudyReport
+from proxytune.api import StudyReport
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import EpisodeError, StoreError

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from proxytune.api.recording import recordable
+from proxytune.api import recordable
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.driving import AGENTS, LaneFollowing
 from proxytune.errors import InputError, LogError, RunError, SettingsError, StoreError

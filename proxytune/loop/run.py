@@ -4,19 +4,22 @@ A closed loop as one JSON document and one page.
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.api.recording import record_log
-from proxytune.api.studies import StudyReport, most_episodes, run_opened
+from proxytune.api import StudyReport, most_episodes, record_log, run_opened
 from proxytune.driving import robot_home
 from proxytune.errors import InputError
 from proxytune.identity import versions_of
+from proxytune.logs import Log
 from proxytune.loop.comparison import (
     Compared,
     answer,
@@ -51,6 +54,7 @@ from proxytune.loop.opening import (
     digest_of_files,
     drive_held_out,
     held_out_settings,
+    open_loop,
     scored_agents,
 )
 from proxytune.report import (
@@ -60,11 +64,14 @@ from proxytune.report import (
     Table,
     View,
     columns_of,
+    fragment_html,
     group_texts,
     note_texts,
     png_of,
     table_text,
+    write_page,
 )
+from proxytune.running import Silent, Watcher
 from proxytune.scores import write_scores
 from proxytune.seeds import target_seed
 from proxytune.storage import locked
@@ -269,6 +276,77 @@ PICTURES = {
     ),
 }
 """Figures of `diagnose` that the page shows where they are there: title and caption."""
+
+
+@dataclass(frozen=True, repr=False)
+class LoopReport:
+    """A closed loop: before and after.
+
+    Attributes:
+        closed: All of it.
+    """
+
+    closed: Closed
+
+    def __repr__(self) -> str:
+        return f"LoopReport: {view_of(self.closed).sentence}"
+
+    def _repr_html_(self) -> str:
+        return fragment_html(view_of(self.closed))
+
+    def table(self) -> pd.DataFrame:
+        """One row per measure: before, after, noise floors, a random ranking."""
+        found = _table(self.closed, rows_of(self.closed))
+        return pd.DataFrame(found.rows, columns=[column.name or "measure" for column in found.columns])
+
+    def document(self) -> dict[str, Any]:
+        """What `loop --json` prints of it, without the files."""
+        return document_of(self.closed)
+
+    def write(self, command: str = "") -> Path:
+        """Write the page into the loop's folder; its path.
+
+        Raises:
+            RunError: If it cannot be written.
+        """
+        page = self.closed.loop.home / "report.html"
+        date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+        write_page(page, view_of(self.closed), foot_of_loop(self.closed, command, date))
+        return page
+
+
+class Quiet:
+    """Tells nothing of how a loop goes."""
+
+    def say(self, line: str) -> None:
+        """Say nothing."""
+
+    def episodes(self, total: int) -> AbstractContextManager[Watcher]:
+        """Count silently."""
+        return nullcontext(Silent())
+
+    def diagnosis(self, log: Log) -> AbstractContextManager[Callable[[str], None]]:
+        """Hear steps silently."""
+        return nullcontext(lambda step: None)
+
+
+def run_loop(
+    path: str | Path, *, log: str | Path | None = None, twin: str | Path | None = None, teller: Teller | None = None
+) -> LoopReport:
+    """Tune, diagnose, extend and tune again; every step that is done is kept.
+
+    Args:
+        path: The study's folder, or its study.toml.
+        log: The target's log, or what `import_log` reads; recorded from the twin where it is not given.
+        twin: The target's model.toml, where it is a simulator; the study's key `truth` where it is not given.
+        teller: Hears how it goes.
+
+    Raises:
+        InputError: If the study, the log or the twin cannot be used.
+        RunError: If a step fails; all that was finished is kept.
+    """
+    given = (Path(one) if one is not None else None for one in (twin, log))
+    return LoopReport(close_loop(open_loop(Path(path), *given), teller or Quiet()))
 
 
 def rows_of(closed: Closed) -> list[Compared]:

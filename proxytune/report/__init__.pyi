@@ -3,6 +3,7 @@ from .diagnosis.answer import (
     diagnosis_headline as diagnosis_headline,
     diagnosis_notes as diagnosis_notes,
     diagnosis_text as diagnosis_text,
+    diagnosis_view as diagnosis_view,
     write_diagnosis as write_diagnosis,
 )
 from .diagnosis.document import camera_noise_floor as camera_noise_floor, diagnosis_document as diagnosis_document
@@ -31,6 +32,7 @@ from .families import (
     families_figure as families_figure,
     families_sentence as families_sentence,
     families_text as families_text,
+    families_view as families_view,
     write_families_report as write_families_report,
 )
 from .figure_style import (
@@ -41,7 +43,7 @@ from .figure_style import (
     VERMILLION as VERMILLION,
     dress as dress,
 )
-from .html import write_page as write_page
+from .html import fragment_html as fragment_html, frame_html as frame_html, write_page as write_page
 from .plv_search import plv_document as plv_document, plv_text as plv_text, write_plv_report as write_plv_report
 from .scores import (
     ranking_document as ranking_document,
@@ -55,6 +57,7 @@ from .study.figures import study_figures as study_figures
 from .study.page import (
     RENEW_S as RENEW_S,
     study_foot as study_foot,
+    study_view as study_view,
     write_live_page as write_live_page,
     write_study_report as write_study_report,
 )
@@ -64,16 +67,20 @@ from .sweep import (
     curve_document as curve_document,
     curve_name as curve_name,
     draw_curves as draw_curves,
+    figures_of_sweep as figures_of_sweep,
     held_alike as held_alike,
     held_values as held_values,
     sweep_text as sweep_text,
+    sweep_view as sweep_view,
     write_curves as write_curves,
     write_sweep_page as write_sweep_page,
 )
 from .table_files import check_table_file as check_table_file
 from .teaching import (
     teach_document as teach_document,
+    teach_figure as teach_figure,
     teach_text as teach_text,
+    teach_view as teach_view,
     write_teach_report as write_teach_report,
 )
 from .text import group_texts as group_texts, note_texts as note_texts, table_text as table_text

@@ -6,11 +6,15 @@ import re
 from io import BytesIO
 from pathlib import Path
 from string import Template
+from typing import TYPE_CHECKING
 
 from PIL import Image
 
 from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View
 from proxytune.report.writing import write_text
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 MANY = 12
 """A page of more parts than this has a table of contents."""
@@ -114,6 +118,18 @@ def write_page(path: Path, view: View, foot: Foot, renew_s: int = 0) -> None:
         RunError: If it cannot be written.
     """
     write_text(path, page_html(view, foot, renew_s))
+
+
+def fragment_html(view: View) -> str:
+    """A view as a piece of HTML for a notebook: sentence, next step, tables, figures and notes."""
+    following = f"<p><strong>Next:</strong> {_text(view.next_step)}</p>" if view.next_step else ""
+    parts = "\n".join(_part(part, f"part-{number}") for number, part in enumerate(view.parts, start=1))
+    return f"<h3>{html.escape(view.title)}</h3>\n<p>{_text(view.sentence)}</p>\n{following}\n{parts}"
+
+
+def frame_html(sentence: str, frame: "DataFrame") -> str:
+    """A sentence and a DataFrame as a piece of HTML for a notebook."""
+    return f"<p>{_text(sentence)}</p>\n{frame.to_html(max_rows=20)}"
 
 
 def page_html(view: View, foot: Foot, renew_s: int = 0) -> str:

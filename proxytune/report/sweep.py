@@ -241,11 +241,17 @@ def _next_step(curves: Sequence[Curve]) -> str:
     return "search all parameters at once with `python -m proxytune study`."
 
 
-def draw_curves(curves: Sequence[Curve], folder: Path, truth: Theta | None) -> list[Path]:
-    """Draw one figure per curve, and two of all curves with the same values of the others; return their paths."""
+def figures_of_sweep(curves: Sequence[Curve], truth: Theta | None) -> dict[str, Figure]:
+    """One figure per curve, and two of all curves with the same values of the others, by name."""
     figures = {curve_name(curve): panels_figure(curve, truth) for curve in curves}
     for alike in held_alike(curves):
         figures |= _figures_together(alike, truth)
+    return figures
+
+
+def draw_curves(curves: Sequence[Curve], folder: Path, truth: Theta | None) -> list[Path]:
+    """Draw the figures of a sweep; return their paths."""
+    figures = figures_of_sweep(curves, truth)
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     return [folder / f"{name}.png" for name in figures]

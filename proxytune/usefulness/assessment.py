@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +29,9 @@ from proxytune.usefulness.resampling import (
     prpv_interval,
     why_not_repeated,
 )
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FEW_EPISODES = 5
 ENOUGH_EPISODES = 10
@@ -73,6 +77,23 @@ class Assessment:
     noise_floor: NoiseFloor
     chance: Chance
     seed: int
+
+    def table(self) -> "pd.DataFrame":
+        """One row per measure and metric: value, and the ends of its 95 % interval."""
+        import pandas as pd
+
+        from proxytune.usefulness.catalogue import MEASURES
+
+        rows = [
+            (measure.name_for(metric), one.value, *(one.interval or (None, None)))
+            for measure in MEASURES
+            for metric, one in measure.measured(self).items()
+        ]
+        return pd.DataFrame(rows, columns=["measure", "value", "low", "high"]).set_index("measure")
+
+    def _repr_html_(self) -> str:
+        value, (_, most) = self.prpv.value, self.prpv.range
+        return f"<p>PRPV {value} of at most {most}.</p>\n{self.table().to_html(na_rep='')}"
 
     @property
     def at_noise_floor(self) -> bool | None:

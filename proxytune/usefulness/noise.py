@@ -12,14 +12,7 @@ import numpy as np
 
 from proxytune.arrays import Flags, Floats
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness.comparison import (
-    Comparison,
-    by_start,
-    compare,
-    is_repeated,
-    split_repeats,
-    start_places,
-)
+from proxytune.usefulness.comparison import Comparison, by_start, compare, is_repeated, split_repeats, start_places
 from proxytune.usefulness.pairs import prpv_of_means, stand
 from proxytune.usefulness.resampling import agent_blocks, counted_means, draw_counts, in_blocks, interval, too_few
 

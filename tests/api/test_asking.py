@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from proxytune.api.asking import SearchBox
+from proxytune.api.search_box import SearchBox
 from proxytune.errors import InputError
 from proxytune.search import ENGINES, Engine
 from proxytune.search.engine import RandomPoints

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from proxytune.api.driving import drive
-from proxytune.api.studies import run_study
+from proxytune.api.study import run_study
 from proxytune.errors import EpisodeError, InputError, RunError, SettingsError
 
 PLANAR = {"plant": '"planar"', "seconds": "2.0", "position_noise_m": "0.0"}

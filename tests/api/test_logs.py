@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from pictured import lane_poses, write_still_frames
 from planted import CALM, TRUTH, planted_log, write_log
 
-from proxytune.api.diagnosing import diagnose
+from proxytune.api.diagnosis import diagnose
 from proxytune.api.logs import log_of
 from proxytune.effects import read_model
 from proxytune.errors import InputError, LogError

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from proxytune.api.studies import read_study, run_study
+from proxytune.api import read_study
+from proxytune.api.study import run_study
 from proxytune.cli.main import main
 from proxytune.errors import InputError, ProxytuneError, RunError
 
@@ -133,7 +134,7 @@ def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
         def __exit__(self, *problem):
             pass
 
-    monkeypatch.setattr("proxytune.api.studies.Bars", Spy)
+    monkeypatch.setattr("proxytune.api.study.Bars", Spy)
     folder = make_study("shown", budget="2", initial="2")
     run_study(folder)
     assert totals == []

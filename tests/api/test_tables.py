@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from proxytune.api.tables import score
+from proxytune.api.scores import score
 from proxytune.cli.main import main
 from proxytune.errors import InputError, ScoresError
-from proxytune.report.scores import score_document
+from proxytune.report import score_document
 from proxytune.scores import Metric, read_scores
 
 METRICS = ["distance:max", "time:min:5%"]

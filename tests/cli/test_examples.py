@@ -4,7 +4,7 @@ import shlex
 
 import pytest
 
-from proxytune.cli.examples import EXAMPLES, epilog
+from proxytune.cli.commands import EXAMPLES, epilog
 from proxytune.cli.main import COMMANDS, main, parser
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 import skopt
 
-from proxytune.api.studies import read_study
+from proxytune.api import read_study
 from proxytune.cli.main import main
 
 MODEL = """format = 1

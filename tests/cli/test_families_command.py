@@ -8,7 +8,8 @@ from several import make_several
 from stopping import Stopping
 from taught import TEACHING
 
-from proxytune.api.families import Quiet, Spending, read_families, run_families, run_opened_families
+from proxytune.api import Spending, read_families, run_opened_families
+from proxytune.api.families import Quiet, run_families
 from proxytune.cli.main import main
 from proxytune.errors import InputError
 from proxytune.study import read_study_settings

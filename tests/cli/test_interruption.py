@@ -12,7 +12,7 @@ from planted import planted_log, write_log
 from processes import besides_progress, finished_episodes, start, wait_for
 
 from proxytune.cli.main import COMMANDS, main
-from proxytune.cli.terminal.interruption import Terminated, signals_as_interruptions
+from proxytune.cli.terminal import Terminated, signals_as_interruptions
 from proxytune.extensions import Interrupted
 
 SLOWLY = {"sleep": "0.03"}

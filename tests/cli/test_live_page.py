@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from proxytune.cli import study as live_page
 from proxytune.cli.main import main
-from proxytune.cli.terminal import live_page
-from proxytune.cli.terminal.live_page import LivePage, renewed_page
+from proxytune.cli.study import LivePage, renewed_page
 from proxytune.errors import RunError
 from proxytune.running import Silent
 from proxytune.study import open_study
@@ -41,7 +41,7 @@ def test_the_page_is_there_after_the_first_episode_and_its_path_is_said_once(set
 
 def test_it_is_written_at_most_every_few_seconds(settings, monkeypatch):
     clock, written = Clock(monkeypatch), []
-    monkeypatch.setattr(live_page, "write_text", lambda path, text: written.append(path))
+    monkeypatch.setattr(live_page, "write_live_page", lambda path, *known: written.append(path))
     page = LivePage(settings, "prpv", Silent())
     for _ in range(100):
         clock.now += 0.1
@@ -60,10 +60,10 @@ def test_a_run_that_is_stopped_leaves_a_page_that_says_so_and_no_longer_renews(s
 
 
 def test_a_page_that_cannot_be_written_does_not_stop_the_run(settings, monkeypatch, capsys):
-    def refuse(path, text):
+    def refuse(path, *known):
         raise RunError("no room")
 
-    monkeypatch.setattr(live_page, "write_text", refuse)
+    monkeypatch.setattr(live_page, "write_live_page", refuse)
     with renewed_page(settings, "prpv", nullcontext(Silent())) as watcher:
         watcher.episode()
     assert capsys.readouterr().err == ""

@@ -11,8 +11,7 @@ import pytest
 import proxytune as proxytune_package
 from proxytune.cli import listing
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.interruption import INTERRUPTED, TERMINATED
+from proxytune.cli.terminal import INTERRUPTED, TERMINATED, Answer
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
 from proxytune.extensions import Interrupted
 

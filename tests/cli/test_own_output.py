@@ -9,8 +9,7 @@ import pytest
 
 from proxytune.cli import listing
 from proxytune.cli.main import FAILED, main
-from proxytune.cli.terminal.answer import Answer
-from proxytune.cli.terminal.own_output import prints_to_stderr
+from proxytune.cli.terminal import Answer, prints_to_stderr
 
 CHATTER = """
 import os, subprocess, sys
@@ -56,7 +55,7 @@ def test_a_path_that_is_no_utf_8_is_json_all_the_same(monkeypatch, capsys):
 
 
 def test_a_closed_standard_output_is_no_trouble_before_the_answer():
-    code = "import os; os.close(1); from proxytune.cli.terminal.own_output import prints_to_stderr as p\nwith p(): pass"
+    code = "import os; os.close(1); from proxytune.cli.terminal import prints_to_stderr as p\nwith p(): pass"
     assert run(code).returncode == 0
 
 

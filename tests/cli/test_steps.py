@@ -1,6 +1,6 @@
 """Every step is told as it begins: a bar with the time left on a terminal, else a line."""
 
-from proxytune.cli.terminal.steps import Steps
+from proxytune.cli.terminal import Steps
 from proxytune.running import progress
 
 

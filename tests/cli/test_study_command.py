@@ -198,7 +198,7 @@ def travelling(make_study, tmp_path, monkeypatch):
     make_study("package/quickstart")
     (home / "quickstart" / "study.db").write_text("somebody's")
     (home / "quickstart" / "figures").mkdir()
-    monkeypatch.setattr("proxytune.cli.terminal.study_folder.shipped", lambda kind: home)
+    monkeypatch.setattr("proxytune.cli.options.shipped", lambda kind: home)
     return home
 
 

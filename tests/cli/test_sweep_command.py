@@ -2,8 +2,8 @@ import json
 
 import pytest
 
+from proxytune.api import read_theta
 from proxytune.cli.main import main
-from proxytune.cli.terminal.theta import read_theta
 from proxytune.errors import InputError
 
 

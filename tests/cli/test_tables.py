@@ -8,8 +8,7 @@ from rich.console import Console
 from taught import make_taught
 
 from proxytune.cli.main import COMMANDS, parser
-from proxytune.report.text import table_text
-from proxytune.report.view import Table, columns_of
+from proxytune.report import Table, columns_of, table_text
 
 LONG = "an_agent_with_a_name_that_is_much_longer_than_any_column_of_a_narrow_terminal"
 SCORES = "domain,agent,episode,distance,lane_error_of_the_whole_drive\n" + "".join(

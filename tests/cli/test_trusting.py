@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from proxytune.cli.main import main
-from proxytune.cli.terminal.trusting import is_trusted, memory, only_trusted_code, remember
+from proxytune.cli.trusting import is_trusted, memory, only_trusted_code, remember
 from proxytune.errors import ExtensionError
 from proxytune.extensions import import_beside, load
 from proxytune.files import shipped
@@ -151,7 +151,7 @@ def test_the_code_of_shipped_studies_is_ours_wherever_it_lies_until_it_is_change
     folder = tmp_path / "pendulum"
     shutil.copytree(shipped("studies") / "gymnasium_pendulum", folder, ignore=shutil.ignore_patterns("study.db*"))
     (folder / "study.toml").write_text((folder / "study.toml").read_text().replace("format = 1", "format = 2"))
-    from proxytune.cli.terminal.trusting import _is_shipped
+    from proxytune.cli.trusting import _is_shipped
 
     assert _is_shipped(folder, "pendulum")
     assert not _is_shipped(folder, "os")
@@ -204,7 +204,7 @@ def test_the_trials_of_a_study_are_exported_without_its_code(stranger, monkeypat
 
 
 def test_a_caller_of_the_api_has_chosen_what_to_run(stranger):
-    from proxytune.api.studies import run_study
+    from proxytune.api.study import run_study
 
     assert len(run_study(stranger).trials()) == 5
     assert (stranger / "was_run").exists()

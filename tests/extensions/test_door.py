@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from processes import ENVIRONMENT
 
-from proxytune.cli.terminal.interruption import signals_as_interruptions
+from proxytune.cli.terminal import signals_as_interruptions
 from proxytune.driving import AGENTS, load_agent
 from proxytune.errors import ExtensionError
 from proxytune.extensions import folders, import_beside, load, make, pack, plugins

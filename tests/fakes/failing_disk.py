@@ -207,10 +207,10 @@ def only_search(arguments):
 
 
 if __name__ == "__main__":
-    from proxytune.api import studies
+    from proxytune.api import study as studies
     from proxytune.cli import study as command
     from proxytune.cli.main import main
-    from proxytune.cli.terminal.answer import Answer
+    from proxytune.cli.terminal import Answer
     from proxytune.running import workers
     from proxytune.study import open_study
 

@@ -6,7 +6,7 @@ Run as a script it is the command line, with the log that `loop` records of a tw
 import json
 import sys
 
-from proxytune.api.recording import Wanted
+from proxytune.api import Wanted
 from proxytune.loop import diagnosing
 
 STUDY = """\

@@ -12,7 +12,7 @@ import pytest
 from processes import ENVIRONMENT, FAKES, wait_for
 from tiny_loop import RIGHTING, short, write_diagnosis, write_tiny
 
-from proxytune.api.studies import StudyReport
+from proxytune.api import StudyReport
 from proxytune.cli.main import main
 from proxytune.loop import diagnosing, run as closing
 from proxytune.loop.run import STEPS

@@ -15,10 +15,8 @@ from proxytune.driving import AXLES, drivetrain, orientation, read_body
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import CATALOGUE, Setting, effects_from, theta_names
 from proxytune.errors import InputError, SettingsError
-from proxytune.report.export.instance import FORMATS, PLACES, export_lines, place_of
-from proxytune.report.export.mjcf import mjcf_text
-from proxytune.report.export.ros import ros_text
-from proxytune.report.export.urdf import urdf_text
+from proxytune.report import FORMATS, export_lines, mjcf_text, ros_text, urdf_text
+from proxytune.report.export.instance import PLACES, place_of
 
 DUTIES = np.repeat([[0.5, 0.5], [0.3, 0.6], [0.9, 0.9], [-0.2, 0.3]], 60, axis=0)
 FOUND = {

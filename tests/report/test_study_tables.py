@@ -9,8 +9,7 @@ import pytest
 from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
 from rich.console import Console
 
-from proxytune.report.study.document import study_document
-from proxytune.report.study.sentence import study_sentence
+from proxytune.report import study_document, study_sentence, study_text
 from proxytune.report.study.tables import (
     INFORMATION,
     SEARCH,
@@ -18,7 +17,6 @@ from proxytune.report.study.tables import (
     USEFULNESS,
     information_table,
     search_table,
-    study_text,
     theta_table,
     trials_table,
     usefulness_table,

@@ -13,7 +13,7 @@ import pytest
 from deadly import Deadly
 from processes import ENVIRONMENT
 
-from proxytune.cli.terminal.interruption import signals_as_interruptions
+from proxytune.cli.terminal import signals_as_interruptions
 from proxytune.domain import make_episode
 from proxytune.errors import RunError
 from proxytune.running import Watch, episodes, run_episode, running

@@ -9,7 +9,7 @@ import pytest
 from wobbly import Wobbly
 
 from proxytune.api.driving import drive
-from proxytune.api.studies import run_study
+from proxytune.api.study import run_study
 from proxytune.cli.main import main
 from proxytune.domain import make_episode
 from proxytune.errors import ExtensionError, InputError, SettingsError

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from proxytune.api.studies import read_study, run_study
+from proxytune.api import read_study
+from proxytune.api.study import run_study
 from proxytune.cli.main import main
 from proxytune.storage import Store
 from proxytune.study import open_study

@@ -11,7 +11,7 @@ from stopping import Stopping
 
 from proxytune.domain import Outcome
 from proxytune.errors import EpisodeError, RunError
-from proxytune.report.study.document import study_document
+from proxytune.report import study_document
 from proxytune.report.study.tables import usefulness_table
 from proxytune.running import Silent
 from proxytune.search import make_proposer

@@ -5,7 +5,7 @@ import sqlite3
 import pytest
 from stopping import Stopping
 
-from proxytune.api.studies import run_study
+from proxytune.api.study import run_study
 from proxytune.errors import RunError
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, retry_failed

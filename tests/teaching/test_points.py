@@ -16,7 +16,7 @@ from taught import PROXY, make_taught, setup
 from tightrope import Cells, Tightrope
 from wobbly import Wobbly
 
-from proxytune.cli.terminal.interruption import signals_as_interruptions
+from proxytune.cli.terminal import signals_as_interruptions
 from proxytune.errors import EpisodeError, LearnerError, RunError, SettingsError
 from proxytune.learning import Cache, Distribution, TeachingSettings, digest
 from proxytune.running import Silent

@@ -10,7 +10,15 @@ from typing import Any, NamedTuple
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.report import study_document, study_figures, study_sentence, write_study_report
+from proxytune.report import (
+    fragment_html,
+    png_of,
+    study_document,
+    study_figures,
+    study_sentence,
+    study_view,
+    write_study_report,
+)
 from proxytune.running import Bars, Silent, Watcher
 from proxytune.search import History, make_proposer, optimize_result
 from proxytune.storage import Store, locked
@@ -62,6 +70,9 @@ class StudyReport:
 
     def __repr__(self) -> str:
         return f"StudyReport of '{self.result.study.settings.name}': {self.sentence}"
+
+    def _repr_html_(self) -> str:
+        return fragment_html(study_view(self.result, {name: png_of(one) for name, one in self.figures().items()}))
 
     @property
     def sentence(self) -> str:

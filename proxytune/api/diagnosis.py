@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from proxytune.diagnosis import CameraDiagnosis, Diagnosis, LogDiagnosis, diagnose_log, robot_of
+from proxytune.diagnosis import RULES, CameraDiagnosis, Diagnosis, LogDiagnosis, Rules, diagnose_log, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.importing import open_log
@@ -20,6 +20,9 @@ from proxytune.report import (
     diagnosis_figures,
     diagnosis_headline,
     diagnosis_notes,
+    diagnosis_view,
+    fragment_html,
+    png_of,
     write_diagnosis,
 )
 
@@ -39,6 +42,9 @@ class DiagnosisReport:
 
     def __repr__(self) -> str:
         return f"DiagnosisReport of {diagnosis_headline(self.found)}"
+
+    def _repr_html_(self) -> str:
+        return fragment_html(diagnosis_view(self.found, {name: png_of(one) for name, one in self.figures().items()}))
 
     @property
     def diagnosis(self) -> Diagnosis | None:
@@ -123,6 +129,7 @@ def diagnose(
     declared: Sequence[str] | None = None,
     effects: Sequence[str] = (),
     seed: int = 1,
+    rules: Rules = RULES,
 ) -> DiagnosisReport:
     """Tune what is declared to a log, find the effects that the model lacks, and test both on what was kept aside.
 
@@ -136,6 +143,7 @@ def diagnose(
             robot has if not given.
         effects: Effects of your own to try too, as "module:Attribute".
         seed: Seed of the null distributions.
+        rules: Thresholds of the selection, as in replace(RULES, p_value=0.01).
 
     Raises:
         InputError: If the log, the robot or an effect cannot be used.
@@ -145,7 +153,7 @@ def diagnose(
     with _opened(log) as drives, nullcontext() if test is None else _opened(test) as others:
         try:
             vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))
-            return DiagnosisReport(diagnose_log(drives, vehicle, declared, test=others, seed=seed))
+            return DiagnosisReport(diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules))
         except InputError as problem:
             raise type(problem)(_in_python(str(problem))) from None
 

@@ -7,7 +7,7 @@ from proxytune.domain import DomainFamily
 from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
 from proxytune.space import Theta
-from proxytune.storage import FILE_NAME
+from proxytune.storage import FILE_NAME as DATABASE
 from proxytune.study import StudySettings, check_robot, open_settings
 from proxytune.sweep import best_theta, has_answer
 
@@ -31,7 +31,7 @@ def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily
     Raises:
         InputError: If the text is no θ, the model is of another robot, or the study has no best θ.
     """
-    if text == "best" or (text is None and (settings.home / FILE_NAME).is_file()):
+    if text == "best" or (text is None and (settings.home / DATABASE).is_file()):
         study = open_settings(settings)
         if text == "best" or has_answer(study):
             return ChosenTheta(best_theta(study, option), "best")

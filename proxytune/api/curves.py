@@ -1,0 +1,262 @@
+"""Sweeps and learning curves from Python: usefulness along a parameter, and what a proxy saves in training."""
+
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from proxytune.api.theta import read_theta
+from proxytune.effects import Catalogue
+from proxytune.errors import InputError
+from proxytune.report import (
+    curve_document,
+    draw_curves,
+    figures_of_sweep,
+    fragment_html,
+    held_values,
+    png_of,
+    study_foot,
+    sweep_view,
+    teach_document,
+    teach_figure,
+    teach_view,
+    write_curves,
+    write_sweep_page,
+    write_teach_report,
+)
+from proxytune.running import Bars, Silent, Watcher
+from proxytune.space import Theta
+from proxytune.storage import Store, locked
+from proxytune.study import Study, StudyRun, StudySettings, adopt, open_study
+from proxytune.sweep import (
+    Curve,
+    best_theta,
+    check_base,
+    curve_of,
+    discrepancy_study,
+    has_answer,
+    plan_sweep,
+    run_sweep as run_planned,
+    series_of,
+    sweep_interval,
+    with_target,
+)
+from proxytune.teaching import (
+    Experiment,
+    Predictivity,
+    check_proxies,
+    count_examinations,
+    load_setup,
+    predictivity,
+    run_experiment,
+)
+
+MOST_POINTS = 10_000
+
+
+@dataclass(frozen=True, repr=False)
+class SweepReport:
+    """Usefulness along one parameter or each of a study's.
+
+    Attributes:
+        settings: Of the study.
+        curves: One for each parameter that was swept.
+        chosen: What the others are held at: "best", "nominal" or "given".
+        theta: Their values; those not named are nominal.
+        episodes: Number of episodes that this call has run.
+        truth: The target's own θ, where it is known.
+    """
+
+    settings: StudySettings
+    curves: tuple[Curve, ...]
+    chosen: str
+    theta: Theta
+    episodes: int
+    truth: Theta | None
+
+    def __repr__(self) -> str:
+        return (
+            f"SweepReport of '{self.settings.name}': {', '.join(curve.parameter for curve in self.curves)}; {self.held}"
+        )
+
+    def _repr_html_(self) -> str:
+        figures = {name: png_of(figure) for name, figure in figures_of_sweep(self.curves, self.truth).items()}
+        return fragment_html(sweep_view(self.settings.name, self.curves, figures, self.held))
+
+    @property
+    def held(self) -> str:
+        """What the other parameters are held at, in words."""
+        if self.chosen == "best":
+            values = held_values(self.theta, whose="the study's best θ: ")
+            return f"{values}; --at nominal holds the robot's own"
+        return "the others are nominal" if self.chosen == "nominal" else held_values(self.theta)
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """For each parameter, one row per value: each measure."""
+        return {
+            curve.parameter: pd.DataFrame(
+                {one.key: [estimate.score for estimate in one.estimates] for one in series_of(curve)},
+                index=pd.Index([point.value for point in curve.points], name=curve.parameter),
+            )
+            for curve in self.curves
+        }
+
+    def document(self) -> dict[str, Any]:
+        """What `sweep --json` prints of it, without the files."""
+        return {
+            "curves": [curve_document(curve) for curve in self.curves],
+            "episodes": {"run": self.episodes},
+            "at": {"chosen": self.chosen, "theta": dict(self.theta)},
+        }
+
+    def write(self, folder: str | Path | None = None, command: str = "") -> tuple[list[Path], list[Path]]:
+        """Write figures, and CSV, JSON and page, into the study's figures unless another folder is given; their paths.
+
+        Raises:
+            RunError: If one cannot be written.
+        """
+        output = self.settings.home / "figures" if folder is None else Path(folder)
+        figures = draw_curves(self.curves, output, self.truth)
+        page = write_sweep_page(self.settings, self.curves, output, self.held, command)
+        return figures, [*write_curves(self.curves, output), page]
+
+
+def run_sweep(
+    path: str | Path,
+    parameter: str = "all",
+    *,
+    points: int = 13,
+    at: str | Theta | None = None,
+    target_model: str | Path | None = None,
+    progress: bool = False,
+) -> SweepReport:
+    """Measure usefulness along a parameter, or along each of a study's; what was simulated before is kept.
+
+    Args:
+        path: The study's folder, or its study.toml.
+        parameter: The one to sweep, or "all" of the study.
+        points: Number of values of the parameter.
+        at: The others: values by name, a model.toml, "best" or "nominal"; the study's best once a trial is finished.
+        target_model: The target's model.toml, if there is one; adds POD, the proxy observation discrepancy.
+        progress: Show a bar.
+
+    Raises:
+        InputError: If the study, the parameter or a value cannot be used.
+        RunError: If no episode works; all that was finished is kept.
+    """
+    study = open_study(Path(path))
+    if not 2 <= points <= MOST_POINTS:
+        raise InputError(f"--points must be between 2 and {MOST_POINTS}, got {points}")
+    word = ("best" if has_answer(study) else "nominal") if at is None else at
+    base = _base(study, word)
+    names = study.settings.space.names if parameter == "all" else (parameter,)
+    sweeps = [plan_sweep(sweep_interval(study, name), base, points) for name in names]
+    discrepancy = None
+    if target_model:
+        discrepancy = discrepancy_study(study, Path(target_model))
+        sweeps = [with_target(sweep, Path(target_model), discrepancy) for sweep in sweeps]
+    per_point = len(study.settings.agents) + (discrepancy is not None)
+    total = sum(len(sweep.points) for sweep in sweeps) * per_point * study.settings.starts
+    folder = study.settings.home
+    with locked(folder), Store.open(folder) as store:
+        adopt(study, store)
+        with _watching(progress, total) as watcher:
+            run = StudyRun(study, store, watcher)
+            for sweep in sweeps:
+                run_planned(run, sweep, discrepancy)
+        curves = tuple(curve for sweep in sweeps if (curve := curve_of(run, sweep)))
+    chosen = word if word in ("best", "nominal") else "given"
+    return SweepReport(study.settings, curves, str(chosen), sweeps[0].base, run.spent.episodes, study.truth)
+
+
+def _base(study: Study, word: str | Theta) -> Theta:
+    if isinstance(word, Mapping):
+        base: Theta = word
+    elif word == "best":
+        base = best_theta(study)
+    else:
+        base = read_theta(word, Catalogue(study.settings.folder.resolve()), "--at")
+    check_base(study, base)
+    return base
+
+
+def _watching(progress: bool, total: int, unit: str = "") -> AbstractContextManager[Watcher]:
+    if not progress:
+        return nullcontext(Silent())
+    return Bars(total, unit) if unit else Bars(total)
+
+
+@dataclass(frozen=True, repr=False)
+class TeachReport:
+    """Learning curves and PLV, the proxy learning value (eq. 5): how many target samples each proxy saves.
+
+    Attributes:
+        settings: Of the study.
+        experiment: What was taught, and what it is worth.
+        prpv: How useful the same proxies are as predictors.
+    """
+
+    settings: StudySettings
+    experiment: Experiment
+    prpv: Mapping[str, Predictivity | None]
+
+    def __repr__(self) -> str:
+        return f"TeachReport of '{self.settings.name}': {self._view(b'').sentence}"
+
+    def _repr_html_(self) -> str:
+        return fragment_html(self._view(png_of(teach_figure(self.experiment))))
+
+    def _view(self, figure: bytes) -> Any:
+        return teach_view(self.experiment, self.prpv, figure)
+
+    def table(self) -> pd.DataFrame:
+        """One row per proxy: PLV, with the ends of its interval where they are known."""
+        rows = {
+            name: row.get("plv") if isinstance(row.get("plv"), dict) else {"value": row.get("plv")}
+            for name, row in self.document().get("proxies", {}).items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("proxy")
+
+    def document(self) -> dict[str, Any]:
+        """What `teach --json` prints of it, without the files."""
+        return teach_document(self.experiment, self.prpv)
+
+    def write(self, command: str = "") -> tuple[Path, Path]:
+        """Write the figure and the page into the study's folder; their paths.
+
+        Raises:
+            RunError: If one cannot be written.
+        """
+        figure = self.settings.home / "figures" / "teach.png"
+        return figure, write_teach_report(self.experiment, self.prpv, figure, study_foot(self.settings, command))
+
+
+def teach(path: str | Path, *, progress: bool = False) -> TeachReport:
+    """Train learners from each proxy and on the target, and say how many target samples each proxy saves.
+
+    A finished experiment is summed up again without training or driving.
+
+    Args:
+        path: The study's folder, or its study.toml, with a [teaching] table.
+        progress: Show a bar.
+
+    Raises:
+        InputError: If the study or its [teaching] cannot be used.
+        RunError: If training fails; all that was finished is kept.
+    """
+    study = open_study(Path(path))
+    settings, setup = study.settings, load_setup(study.settings)
+    # Before anything is written.
+    check_proxies(settings, setup)
+    proxies = setup.settings.proxies
+    with locked(settings.home), Store.open(settings.home) as store:
+        adopt(study, store)
+        examinations = count_examinations(setup.settings, len(proxies) + 1)
+        with _watching(progress, examinations, "points of learning curves") as bars:
+            experiment = run_experiment(settings, setup, bars)
+        with _watching(progress, len(settings.agents) * settings.starts * len(proxies)) as bars:
+            prpv = predictivity(StudyRun(study, store, bars), proxies)
+    return TeachReport(settings, experiment, prpv)

@@ -1,0 +1,425 @@
+"""What goes in and out of proxytune from Python: logs of others, score tables of a twin, predictions, exports."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from proxytune.api.study import read_study
+from proxytune.diagnosis import (
+    PICTURES,
+    Agreement,
+    agreement,
+    frames_of,
+    frames_text,
+    predict as predict_poses,
+    predict_pictures,
+    robot_of,
+)
+from proxytune.driving import LaneFollowing, Robot, read_robot, robot_from_geometry, robot_names
+from proxytune.effects import Catalogue, Model, read_model
+from proxytune.errors import InputError
+from proxytune.importing import (
+    Facts,
+    Source,
+    Wanted,
+    open_log,
+    read_source,
+    source_without_unnamed_pictures,
+    write_log,
+)
+from proxytune.logs import GEOMETRY, Log
+from proxytune.report import (
+    FORMATS,
+    ExportLine,
+    Instance,
+    export_lines,
+    frame_html,
+    mjcf_text,
+    ros_text,
+    urdf_text,
+    write_picture,
+    write_text,
+    write_whole,
+)
+from proxytune.running import Bars, Silent
+from proxytune.scores import ScoreTable, write_scores
+from proxytune.search import History, write_optuna, write_skopt
+from proxytune.seeds import target_seed
+from proxytune.study import bare_family, measure as measure_scores, read_study_settings
+
+TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
+"""Formats that take the trials of a study, not what was found."""
+WRITERS: Mapping[str, Callable[[Instance], str]] = {"urdf": urdf_text, "mjcf": mjcf_text, "ros": ros_text}
+NO_RATE_HZ = 20.0
+"""A robot without a folder has no rate of control; none of the formats states one."""
+MOST_REPEATS = 1_000_000
+
+
+@dataclass(frozen=True, repr=False)
+class ImportReport:
+    """What a bag, a table or a trajectory holds, and the log that was written of it.
+
+    Attributes:
+        source: Its channels, drives and notes.
+        log: The log's folder; None where none was written.
+    """
+
+    source: Source
+    log: Path | None
+
+    def __repr__(self) -> str:
+        return f"ImportReport of {len(self.source.surveys)} drives ({self.source.form}), log: {self.log}"
+
+    def _repr_html_(self) -> str:
+        return frame_html(f"{self.source.form}: {len(self.source.surveys)} drives", self.drives())
+
+    def drives(self) -> pd.DataFrame:
+        """One row per drive: its length, rates, gaps and reaction."""
+        return pd.DataFrame([one.facts for one in self.source.surveys])
+
+    def document(self) -> dict[str, Any]:
+        """What `import --json` prints."""
+        written = None if self.log is None else str(self.log)
+        return self.source.facts | {"log": written, "drives": [one.facts for one in self.source.surveys]}
+
+
+def import_log(
+    source: str | Path, output: str | Path | None = None, *, wanted: Wanted | None = None, facts: Facts | None = None
+) -> ImportReport:
+    """Read a ROS bag, CSV, TUM, MRCLAM or .npz, say what is in it, and write it as a log.
+
+    Args:
+        source: A file or folder.
+        output: The log's folder to write; nothing is written where it is not given.
+        wanted: Topics and columns to take; chosen where it is not given.
+        facts: What only the user knows: robot, figures, map, offset of clocks.
+
+    Raises:
+        InputError: If the source cannot be read, with file, row and column.
+        RunError: If the log cannot be written.
+    """
+    known, path = facts or Facts(), Path(source)
+    whole = read_source(path, wanted or Wanted(), known.offset_s)
+    found = source_without_unnamed_pictures(whole, known)
+    if output is not None:
+        write_log(found, Path(output), known, origin=path.name)
+    return ImportReport(found, None if output is None else Path(output))
+
+
+@dataclass(frozen=True, repr=False)
+class Measurement:
+    """Scores of a study's agents in the domain of a model, as a target is measured.
+
+    Attributes:
+        scores: The table.
+        model: The model.toml of the domain.
+        seed: Seed of the episodes.
+        repeats: Episodes from every start.
+    """
+
+    scores: ScoreTable
+    model: Path
+    seed: int
+    repeats: int
+
+    def __repr__(self) -> str:
+        return f"Measurement of {len(self.scores.agents)} agents in {self.model.name}, seed {self.seed}"
+
+    def _repr_html_(self) -> str:
+        return frame_html(repr(self), self.means())
+
+    def means(self) -> pd.DataFrame:
+        """One row per agent: its mean score in each metric."""
+        index = pd.Index(self.scores.agents, name="agent")
+        return pd.DataFrame(self.scores.means, index=index, columns=list(self.scores.metrics))
+
+    def document(self) -> dict[str, Any]:
+        """What `measure --json` prints of it, without the file."""
+        return {
+            "model": str(self.model),
+            "seed": self.seed,
+            "agents": list(self.scores.agents),
+            "episodes": len(self.scores.episodes),
+            "repeats": self.repeats,
+            "means": {str(agent): dict(row) for agent, row in self.means().to_dict("index").items()},
+        }
+
+    def write(self, path: str | Path) -> None:
+        """Write the score table as CSV.
+
+        Raises:
+            RunError: If it cannot be written.
+        """
+        write_scores(self.scores, Path(path))
+
+
+def measure(
+    study: str | Path, model: str | Path, *, repeats: int = 1, seed: int | None = None, progress: bool = False
+) -> Measurement:
+    """Drive a study's agents in the domain of a model file.
+
+    Args:
+        study: The study's folder, or its study.toml, for its agents, starts and [domain].
+        model: The model.toml of the domain.
+        repeats: Episodes from every start, each with its own placement noise.
+        seed: Seed of the episodes; the study's seed plus an offset where it is not given.
+        progress: Show a bar.
+
+    Raises:
+        InputError: If the study or the model cannot be used.
+        RunError: If an episode fails.
+    """
+    settings, path = read_study_settings(Path(study)), Path(model)
+    own = target_seed(settings.seed) if seed is None else seed
+    if own < 0:
+        raise InputError(f"--seed must be at least 0, got {own}")
+    if not 1 <= repeats <= MOST_REPEATS:
+        raise InputError(f"--repeats must be between 1 and {MOST_REPEATS}, got {repeats}")
+    if not path.is_file():
+        raise InputError(f"--model {path}: no such file; check the path")
+    episodes = len(settings.agents) * settings.starts * repeats
+    with Bars(episodes) if progress else nullcontext(Silent()) as watcher:
+        return Measurement(measure_scores(settings, path, own, watcher, repeats), path, own, repeats)
+
+
+@dataclass(frozen=True, repr=False)
+class Prediction:
+    """Poses of a log as a fitted model predicts them, beside the measured ones.
+
+    Attributes:
+        poses: One row per predicted pose: episode, start_time, time [s], x, y [m], heading [rad].
+        horizon_s: Length of the windows [s].
+        error: Root mean square error over the windows.
+    """
+
+    poses: pd.DataFrame
+    horizon_s: float
+    error: Agreement
+
+    def __repr__(self) -> str:
+        return f"Prediction over {self.error.windows} windows of {self.horizon_s:g} s: {self.sentence}"
+
+    def _repr_html_(self) -> str:
+        return frame_html(repr(self), self.poses)
+
+    @property
+    def sentence(self) -> str:
+        """How far the predicted poses are from the measured ones."""
+        rmse = self.error
+        if not rmse.poses:
+            return "no drive has measured poses over a whole window"
+        return f"RMSE {1e3 * rmse.place:.1f} mm, {np.degrees(rmse.turn):.2f}° over {rmse.poses} poses"
+
+    def document(self) -> dict[str, Any]:
+        """What `predict --json` prints of it, without the file."""
+        rmse = self.error
+        heading = {"heading": rmse.turn, "heading_unit": "rad", "poses": rmse.poses}
+        error = {"value": rmse.place, "unit": "m", **heading}
+        return {"rows": len(self.poses), "windows": rmse.windows, "horizon_s": self.horizon_s, "error": error}
+
+
+@dataclass(frozen=True, repr=False)
+class PicturePrediction:
+    """Pictures of a log's camera as a fitted model draws them.
+
+    Attributes:
+        folder: Where they and frames.csv are.
+        frames: Their number.
+        grey_error: Mean absolute difference from the measured ones on the floor [grey levels].
+    """
+
+    folder: Path
+    frames: int
+    grey_error: float
+
+    def __repr__(self) -> str:
+        return f"PicturePrediction: {self.sentence}"
+
+    def _repr_html_(self) -> str:
+        return frame_html(self.sentence, pd.DataFrame([self.document()]))
+
+    @property
+    def sentence(self) -> str:
+        """How far the drawn pictures are from the measured ones."""
+        return f"{self.frames} frames: mean absolute difference on the floor {self.grey_error:.1f} grey levels"
+
+    def document(self) -> dict[str, Any]:
+        """What `predict --frames --json` prints."""
+        return {"frames": self.frames, "output": str(self.folder), "grey_error": self.grey_error}
+
+
+def predict(
+    model: str | Path,
+    log: Log | str | Path,
+    *,
+    horizon_s: float = 2.0,
+    frames: str | Path | None = None,
+    wanted: Wanted | None = None,
+    facts: Facts | None = None,
+    tell: Callable[[str], None] = lambda line: None,
+) -> Prediction | PicturePrediction:
+    """Predict the poses of a log, or with `frames` the pictures of its camera, by a fitted model.
+
+    In each window the model starts from the measured pose and is driven by the recorded commands.
+
+    Args:
+        model: A model.toml.
+        log: A log, its folder, or what `import_log` reads.
+        horizon_s: Length of the windows [s].
+        frames: The folder for predicted pictures and frames.csv.
+        wanted: Topics and columns to take of a bag or table.
+        facts: What only the user knows of a bag or table.
+        tell: Hears how many pictures are drawn.
+
+    Raises:
+        InputError: If the model or the log cannot be used.
+        RunError: If a picture cannot be written.
+    """
+    catalogue = Catalogue(Path.cwd())
+    if not (np.isfinite(horizon_s) and horizon_s > 0.0):
+        raise InputError(f"--horizon must be a positive number of seconds, got {horizon_s}")
+    fitted, known = read_model(Path(model), catalogue), facts or Facts()
+    keys = {figure: key for key, figure in GEOMETRY.items()}
+    stated = {keys[name]: value for name, value in (fitted.geometry or {}).items() if name in keys}
+    named = replace(known, robot=known.robot or fitted.robot, figures=known.figures or stated)
+    opened = nullcontext((log, ())) if isinstance(log, Log) else open_log(Path(log), wanted or Wanted(), named)
+    with opened as (drives, _):
+        if frames is not None:
+            return _predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted, Path(frames), tell)
+        if drives.command == "none":
+            hint = "" if drives.frames is None else ", or give --frames to predict those"
+            raise InputError(f"{drives.name}: has no commands to predict poses from; give a log of drives{hint}")
+        table = predict_poses(drives, _robot_of(fitted, drives, catalogue), fitted.theta, horizon_s)
+        return Prediction(table, horizon_s, agreement(table, drives, horizon_s))
+
+
+def _predict_pictures(
+    log: Log, robot: Robot, model: Model, folder: Path, tell: Callable[[str], None]
+) -> PicturePrediction:
+    """Every frame as a picture; frames.csv comes last, so that a list never names what is not there."""
+    numbers, errors = list[int](), list[float]()
+    for part in predict_pictures(log, robot, model.theta):
+        for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
+            write_picture(folder / (PICTURES % number), picture)
+        numbers += part.numbers.tolist()
+        errors += part.grey_errors.tolist()
+        tell(f"drawing: {len(numbers)} frames")
+    write_text(folder / "frames.csv", frames_text(log, frames_of(log), numbers))
+    return PicturePrediction(folder, len(numbers), float(np.mean(errors)))
+
+
+def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:
+    if model.robot in robot_names(catalogue.folder):
+        return robot_of(log, model.robot, catalogue)
+    robot = robot_from_geometry(model.robot, model.geometry or log.geometry, log.rate_hz)
+    return replace(robot, catalogue=catalogue)
+
+
+@dataclass(frozen=True, repr=False)
+class ExportReport:
+    """What was written for another simulator, the robot or another optimiser.
+
+    Attributes:
+        output: The file.
+        to: Its format.
+        lines: Each parameter with its place in the file, or without one; none where trials were written.
+        facts: What `export --json` says beside them.
+    """
+
+    output: Path
+    to: str
+    lines: Sequence[ExportLine]
+    facts: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        return f"ExportReport of {self.output} ({self.to})"
+
+    def _repr_html_(self) -> str:
+        return frame_html(repr(self), self.table())
+
+    def table(self) -> pd.DataFrame:
+        """One row per parameter: value, interval, unit, and its place in the file."""
+        return pd.DataFrame([_row(line) for line in self.lines] or [dict(self.facts)])
+
+    def document(self) -> dict[str, Any]:
+        """What `export --json` prints."""
+        rows = {
+            "written": [_row(line) for line in self.lines if line.place],
+            "no_place": [_row(line) for line in self.lines if not line.place],
+        }
+        return {"output": str(self.output), "to": self.to, **self.facts, **(rows if self.to in FORMATS else {})}
+
+
+def export(model: str | Path, output: str | Path, *, to: str) -> ExportReport:
+    """Write what was found as a URDF, a MuJoCo model or ROS 2 parameters, or a study's trials for other optimisers.
+
+    Args:
+        model: A model.toml, or a study's folder: its best θ.
+        output: The file to write.
+        to: "urdf", "mjcf" or "ros"; of a study also "optuna" or "skopt".
+
+    Raises:
+        InputError: If what is given cannot be exported so.
+        RunError: If the file cannot be written.
+    """
+    path, file = Path(model), Path(output)
+    if to in TRIALS:
+        return _export_trials(path, file, to)
+    instance = _of_study(path) if path.is_dir() else _of_model(path)
+    text, lines = WRITERS[to](instance), export_lines(instance, to)
+    write_text(file, text)
+    return ExportReport(file, to, lines, {"robot": instance.robot.name})
+
+
+def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
+    """Write all trials of a study; a file that is there may be a storage with other studies, so it is left alone."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: --to {to} takes the trials of a study; give the study's folder")
+    if output.exists():
+        raise InputError(f"{output}: is there already; give another name, or move it away")
+    history = read_study(folder).history()
+    write_whole(output, "", lambda draft: TRIALS[to](history, draft))
+    return ExportReport(output, to, (), {"name": history.name, "trials": len(history.trials)})
+
+
+def _row(line: ExportLine) -> dict[str, Any]:
+    interval = list(line.interval) if line.interval else None
+    return {
+        "name": line.name,
+        "value": line.value,
+        "interval": interval,
+        "unit": line.unit,
+        "place": line.place or None,
+    }
+
+
+def _of_model(path: Path) -> Instance:
+    """A model.toml; its robot and its own effects are looked for in the current folder."""
+    catalogue = Catalogue(Path.cwd())
+    model = read_model(path, catalogue)
+    if model.robot in robot_names(catalogue.folder):
+        robot = read_robot(model.robot, catalogue.folder)
+    elif model.geometry:
+        robot = robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)
+    else:
+        raise InputError(
+            f"{path}: its robot '{model.robot}' is unknown here; go to the folder that {model.robot} lies in"
+        )
+    return Instance(robot, {**robot.theta, **model.theta}, model.intervals, str(path))
+
+
+def _of_study(folder: Path) -> Instance:
+    """The best θ of a study, with its 95 % intervals."""
+    result = read_study(folder).result
+    settings, region = result.study.settings, result.knowledge
+    family = bare_family(settings, settings.proxy)
+    if not isinstance(family, LaneFollowing):
+        raise InputError(f"{folder}: is a study of another simulator; only what drives here can be exported")
+    robot = read_robot(family.robot, family.folder)
+    theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
+    return Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}")

@@ -1,0 +1,182 @@
+"""The command as it was typed.
+
+The options that say where episodes run, alike for every command that runs many.
+The options that say what to take from a bag or a table, alike for every command that reads one.
+θ as people give it: values, a model.toml, the best that a study has found, or none.
+The folder that a PATH means: an existing one, or a copy of a study that comes with the package.
+"""
+
+import argparse
+import contextlib
+import shlex
+import shutil
+import sys
+from collections.abc import Callable
+from contextlib import nullcontext
+from functools import wraps
+from pathlib import Path
+from typing import TypeVar
+
+from proxytune.cli.trusting import remember
+from proxytune.errors import InputError, ProxytuneError, StoreError
+from proxytune.files import draft_path, shipped
+from proxytune.importing import Facts, Wanted, finite, read_geometry
+from proxytune.logs import COMMANDS
+from proxytune.running import on_cluster
+from proxytune.settings import nearest
+from proxytune.study import FILE_NAME, MADE, study_around
+
+
+def typed(arguments: argparse.Namespace) -> str:
+    """What repeats the command in a shell; "" where it was not typed but called."""
+    words = [word for word in getattr(arguments, "words", ()) if word != "--json"]
+    return shlex.join(["python", "-m", "proxytune", *words]) if words else ""
+
+
+PROCESSES, DASK = "processes", "dask"
+Result = TypeVar("Result")
+
+
+def configure_cluster(parser: argparse.ArgumentParser) -> None:
+    """Add where episodes run."""
+    parser.add_argument(
+        "--backend",
+        choices=(PROCESSES, DASK),
+        default=PROCESSES,
+        help="where episodes run: processes of this machine, or the workers of a Dask cluster [processes]",
+    )
+    parser.add_argument("--address", metavar="URL", help="of the cluster's scheduler, as in tcp://127.0.0.1:8786")
+
+
+def on_its_cluster(run: Callable[[argparse.Namespace], Result]) -> Callable[[argparse.Namespace], Result]:
+    """Run a command where its options say."""
+
+    @wraps(run)
+    def placed(arguments: argparse.Namespace) -> Result:
+        if arguments.backend == DASK and not arguments.address:
+            raise InputError("--backend dask: give --address too, that of the scheduler, as in tcp://127.0.0.1:8786")
+        if arguments.address and arguments.backend != DASK:
+            raise InputError(f"--address {arguments.address}: is for --backend dask; give that too")
+        with on_cluster(arguments.address) if arguments.address else nullcontext():
+            return run(arguments)
+
+    return placed
+
+
+def configure_source(parser: argparse.ArgumentParser) -> None:
+    """Add what to take and what only the user knows."""
+    group = parser.add_argument_group("a bag, table or trajectory as LOG")
+    group.add_argument(
+        "--commands", default="", metavar="TOPIC", help="topic or file of the commands, or none [chosen]"
+    )
+    group.add_argument(
+        "--poses", default="", metavar="TOPIC", help="topic of the poses, or PARENT>CHILD of a transform"
+    )
+    group.add_argument("--pictures", default="", metavar="TOPIC", help="topic of the pictures, or none [chosen]")
+    group.add_argument("--stamps", choices=("header", "receive"), default="header", help="whose times count [header]")
+    group.add_argument(
+        "--columns",
+        default="",
+        metavar="OURS=THEIRS:UNIT,…",
+        help="of a table, as in time=stamp_ns:ns,x=pos_x:mm,heading=yaw:deg,v=cmd_lin,omega=cmd_ang",
+    )
+    group.add_argument(
+        "--kind", choices=[*COMMANDS], default="", help="kind of the commands, where the source is silent"
+    )
+    group.add_argument(
+        "--figure",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="of a robot without a folder: wheel_radius_m, baseline_m, full_speed_m_s (repeat it)",
+    )
+    group.add_argument("--map", default="", metavar="MAP", help="the map that pictures show, of list maps or a file")
+    group.add_argument(
+        "--clock-offset", default="", metavar="S", help="seconds that poses are stamped later than commands, or fit"
+    )
+
+
+def wanted_of(arguments: argparse.Namespace) -> Wanted:
+    """What to take.
+
+    Raises:
+        InputError: If the column map is none.
+    """
+    return Wanted(
+        commands=arguments.commands,
+        poses=arguments.poses,
+        frames=arguments.pictures,
+        stamps=arguments.stamps,
+        columns=_columns(arguments.columns),
+        kind=arguments.kind,
+    )
+
+
+def facts_of(arguments: argparse.Namespace) -> Facts:
+    """What only the user knows.
+
+    Raises:
+        InputError: If a figure or the offset is no number.
+    """
+    offset = arguments.clock_offset
+    if offset not in ("", "fit") and finite(offset) is None:
+        raise InputError(f"--clock-offset {offset}: give seconds, as in -0.25, or fit")
+    road = arguments.map
+    road = str(Path(road).resolve()) if road.endswith(".toml") else road
+    return Facts(arguments.robot or "", read_geometry(arguments.figure), road, offset)
+
+
+def _columns(text: str) -> dict[str, str]:
+    columns = {}
+    for part in (part.strip() for part in text.split(",") if part.strip()):
+        ours, equals, theirs = part.partition("=")
+        if not (equals and ours.strip() and theirs.strip()):
+            raise InputError(f"--columns {part}: write OURS=THEIRS or OURS=THEIRS:UNIT, as in x=pos_x:mm")
+        columns[ours.strip()] = theirs.strip()
+    return columns
+
+
+NOT_COPIED = (*MADE, "study.db*", "study.lock", "report.html", "__pycache__")
+"""What running a study adds; not copied."""
+
+
+def study_folder(path: Path) -> Path:
+    """The study's folder, given as itself or as its study.toml; one of several families has its own in it.
+
+    Where there is none and its last part names a study that comes with the package, that study is copied there.
+
+    Raises:
+        InputError: If there is no such study.
+        StoreError: If the copy cannot be written.
+    """
+    folder = path.parent if path.name == FILE_NAME else path
+    if study_around(folder, FILE_NAME) is not None:
+        return folder
+    if folder.exists():
+        if not (folder / FILE_NAME).is_file():
+            raise InputError(f"{folder}: has no {FILE_NAME}; give the folder of a study")
+        return folder
+    studies = {home.name: home for home in shipped("studies").iterdir() if (home / FILE_NAME).is_file()}
+    if folder.name not in studies:
+        hint = nearest(folder.name, studies)
+        raise InputError(f"{folder}: no such folder, and no study of that name comes with proxytune; {hint}")
+    _copy(studies[folder.name], folder)
+    with contextlib.suppress(ProxytuneError):
+        # Where it cannot be remembered, its code is still known by its contents.
+        remember(folder)
+    print(f"copied the study '{folder.name}', which comes with proxytune, to {folder}", file=sys.stderr)
+    return folder
+
+
+def _copy(source: Path, folder: Path) -> None:
+    """Copy the whole folder or nothing."""
+    draft = draft_path(folder)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copytree(source, draft, ignore=shutil.ignore_patterns(*NOT_COPIED))
+        draft.replace(folder)
+    except (OSError, shutil.Error) as problem:
+        with contextlib.suppress(OSError):
+            shutil.rmtree(draft)
+        reason = problem.strerror if isinstance(problem, OSError) and problem.strerror else "copying failed"
+        raise StoreError(f"{folder}: cannot be written ({reason}); choose another place") from None

@@ -1,0 +1,188 @@
+"""What every command returns: one JSON document, and the same for people.
+
+Ctrl-C and SIGTERM end a command alike: everything finished is kept, and its processes end too.
+What stops a command that nobody nearer to it could name.
+Standard output holds a command's answer and nothing else: what agents print goes to standard error.
+Progress of a command whose length is not known: a spinner on a terminal, elsewhere a line for whatever is done.
+Progress of a command in several steps: a bar with the time left on a terminal, elsewhere a line per step.
+"""
+
+import io
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any
+
+from rich.console import Console, RenderableType
+
+from proxytune.errors import RunError
+from proxytune.extensions import Interrupted, describe, interrupt, is_users, place_of
+from proxytune.running import Lines, progress_bar
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The result of a command.
+
+    Attributes:
+        document: What `--json` prints: plain numbers, texts, lists and dicts, None where undefined.
+        text: What a person reads on standard output; of a plain text no line is broken.
+    """
+
+    document: dict[str, Any]
+    text: RenderableType
+
+
+INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
+"""Exit statuses that shells and schedulers expect: 130 and 143."""
+
+
+class Terminated(Interrupted):
+    """SIGTERM was received; raised in the main thread."""
+
+
+@contextmanager
+def signals_as_interruptions() -> Iterator[None]:
+    """Raise Interrupted at every Ctrl-C and Terminated at the first SIGTERM.
+
+    Later ones of the latter are ignored, so that cleaning up is not interrupted; so is Ctrl-C where it is already, as
+    for a command that a script has put into the background.
+    """
+    before = {signal.SIGTERM: signal.signal(signal.SIGTERM, _terminate)}
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        before[signal.SIGINT] = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise Terminated
+
+
+FAILED = 1
+
+
+def stopped_by(problem: KeyboardInterrupt | SystemExit | MemoryError | OSError) -> tuple[str, int]:
+    """What stopped a command, in one phrase, and its exit status."""
+    if is_users(problem):
+        return ("terminated", TERMINATED) if isinstance(problem, Terminated) else ("interrupted", INTERRUPTED)
+    if isinstance(problem, MemoryError):
+        return f"memory ran out ({describe(problem)}); ask for less", FAILED
+    if isinstance(problem, OSError):
+        return f"the system refused something ({describe(problem)}){place_of(problem)}", FAILED
+    return f"code that is not proxytune's ended the command ({describe(problem)}){place_of(problem)}", FAILED
+
+
+OUT, ERR = 1, 2
+"""The descriptors, which code in C writes to, and which other processes inherit."""
+
+
+@contextmanager
+def prints_to_stderr() -> Iterator[None]:
+    """Send to standard error whatever this process, and those that it starts, write to standard output meanwhile."""
+    sys.stdout.flush()
+    kept = _redirected()
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        if kept is not None:
+            os.dup2(kept, OUT)
+            os.close(kept)
+
+
+def _redirected() -> int | None:
+    """A descriptor of what standard output was; None where one of the two is closed: then nothing is to be parted."""
+    try:
+        kept = os.dup(OUT)
+        os.dup2(ERR, OUT)
+    except OSError:
+        return None
+    return kept
+
+
+def print_answer(answer: Answer, *, as_json: bool) -> None:
+    """Print a command's answer; a closed pipe is not an error, and letters that a terminal lacks are escaped.
+
+    Raises:
+        RunError: If it cannot be written.
+    """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        if as_json:
+            print(_json_text(answer.document))
+        elif isinstance(answer.text, str):
+            print(answer.text)
+        else:
+            Console().print(answer.text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _discard_the_rest()
+    except OSError as problem:
+        _discard_the_rest()
+        raise RunError(f"standard output: cannot be written ({problem.strerror}); make room and run again") from None
+
+
+def _json_text(document: dict[str, Any]) -> str:
+    """The document; in ASCII, as JSON escapes it, where standard output cannot hold its letters."""
+    text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False)
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        return json.dumps(document, indent=2, allow_nan=False)
+    return text
+
+
+def _discard_the_rest() -> None:
+    """Drop what is still in the buffer, which would raise once more when Python ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[Callable[[str], None]]:
+    """Show what is being done; gives what hears how far it is."""
+    lines = Lines()
+    with lines.console.status(what) as status:
+
+        def tell(line: str) -> None:
+            lines.say(line)
+            status.update(line)
+
+        yield tell
+
+
+class Steps:
+    """Shows each step as it begins; use as a context."""
+
+    def __init__(self, shares: Mapping[str, float]) -> None:
+        """Begin with nothing done.
+
+        Args:
+            shares: By how a step's line begins, the share of the whole time that has usually passed by then.
+        """
+        self._shares, self._lines = shares, Lines()
+        self._bar = progress_bar(self._lines.console, speed_estimate_period=3600.0)
+        self._task = self._bar.add_task("", total=1.0)
+
+    def __enter__(self) -> "Steps":
+        self._bar.start()
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self._bar.stop()
+
+    def __call__(self, step: str) -> None:
+        """Show that a step begins; the bar never goes back."""
+        self._lines.say(step)
+        share = max((over for begin, over in self._shares.items() if step.startswith(begin)), default=0.0)
+        self._bar.update(self._task, description=step, completed=max(share, self._bar.tasks[0].completed))

@@ -1,1 +1,0 @@
-"""What commands share: their answer, progress, interruption, and the folder that a PATH means."""

@@ -1,0 +1,56 @@
+"""Every command has a function of its own, and what it returns shows itself in a notebook: a sentence and a table."""
+
+import inspect
+
+import pandas as pd
+import pytest
+
+import proxytune
+from proxytune.cli.commands import COMMANDS
+
+FUNCTIONS = {
+    "study": "run_study",
+    "sweep": "run_sweep",
+    "loop": "run_loop",
+    "import": "import_log",
+    "plot": "read_study",
+}
+"""Where a function is not called as its command."""
+FOR_FILES = {"new", "repair", "list", "completion", "record"}
+"""Commands that write files to start from or mend, or tell what there is."""
+REPORTS = [
+    name for name in proxytune.__all__ if name.endswith(("Report", "Prediction", "Measurement", "DrivenEpisode"))
+]
+
+
+@pytest.mark.parametrize("command", sorted(set(COMMANDS) - FOR_FILES))
+def test_every_command_has_a_function(command):
+    assert inspect.isfunction(getattr(proxytune, FUNCTIONS.get(command, command)))
+
+
+@pytest.mark.parametrize("name", [*REPORTS, "Assessment"])
+def test_every_report_can_show_itself_in_a_notebook(name):
+    assert inspect.isfunction(getattr(proxytune, name)._repr_html_)
+
+
+def test_a_study_shows_its_sentence_its_tables_and_its_figures(finished):
+    report = proxytune.read_study(finished)
+    page = report._repr_html_()
+    assert report.sentence[:12] in page
+    assert "<table" in page
+    assert page.count("data:image/png;base64") == len(report.figures())
+
+
+def test_scores_show_every_measure_in_a_table():
+    table = pd.DataFrame({"agent": list("abc"), "way": [1.0, 2.0, 3.0]})
+    found = proxytune.score(proxy=table, target=table, metrics="way:max")
+    assert found.table().loc["PRPV", "value"] == 0
+    assert "<table" in found._repr_html_()
+
+
+def test_a_sweep_shows_its_curves_and_holds_them_as_tables(make_study):
+    report = proxytune.run_sweep(make_study(), "trim", points=3, at="nominal")
+    assert list(report.tables()["trim"].index) == [-0.3, 0.0, 0.3]
+    page = report._repr_html_()
+    assert "<table" in page
+    assert "data:image/png;base64" in page

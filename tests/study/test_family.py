@@ -154,7 +154,7 @@ class Faulty(Wobbly):
 @pytest.mark.parametrize("member", ["versions", "earlier_identities", "identity"])
 def test_what_a_member_raises_whenever_it_is_asked_is_one_line_with_its_name_and_place(member):
     family = UserFamily(Faulty(), "sim:make")
-    expected = rf"{member} of sim:make raised .*Error: .*\(test_user_family.py, line \d+\); correct it"
+    expected = rf"{member} of sim:make raised .*Error: .*\(test_family.py, line \d+\); correct it"
     with pytest.raises(ExtensionError, match=expected):
         getattr(family, member)
 

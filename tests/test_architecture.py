@@ -60,14 +60,21 @@ SHORT = {
     "__main__",
     "arrays",  # types
     "driving/agent",  # a protocol
+    "learning/learner",  # a protocol
+    "driving/texels",  # a protocol, and which of two ways is taken
+    "lineage",  # names of code
 }
-"""Modules below 60 lines: protocols, plug-ins and types; doors (`__init__`) go without saying."""
+"""Modules below 60 lines: protocols and types; doors (`__init__`) and commands, one module each, go without saying."""
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_a_module_is_worth_opening_and_has_one_subject(path):
     lines = len(path.read_text(encoding="utf-8").splitlines())
-    short = path.name == "__init__.py" or path.relative_to(PACKAGE).with_suffix("").as_posix() in SHORT
+    short = (
+        path.name == "__init__.py"
+        or path.parent.name == "cli"
+        or path.relative_to(PACKAGE).with_suffix("").as_posix() in SHORT
+    )
     assert lines <= 600
     assert short or lines >= 60
 
@@ -78,10 +85,10 @@ def test_a_room_is_entered_by_its_door(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("proxytune."):
             parts = str(node.module).split(".")
-            assert parts[1] == here or len(parts) == 2, f"import this from proxytune.{parts[1]}: {ast.unparse(node)}"
+            assert parts[1] in (here, "cli") or len(parts) == 2, f"import this from proxytune.{parts[1]}: {ast.unparse(node)}"
 
 
-@pytest.mark.parametrize("door", sorted(PACKAGE.rglob("__init__.pyi")), ids=lambda door: door.parent.name)
+@pytest.mark.parametrize("door", sorted(PACKAGE.glob("*/__init__.pyi")), ids=lambda door: door.parent.name)
 def test_a_door_hands_out_what_others_take_and_no_name_of_a_module(door):
     names = handed_out(door)
     assert not names & {path.stem for path in door.parent.glob("*") if path.suffix in {".py", ""}}

@@ -13,8 +13,8 @@ from proxytune.environments.family import gymnasium_family
 from proxytune.settings import Section
 
 MODULES = {
-    "driving": ["effects/chain.py", "driving/task.py", "driving/road/lane.py"],
-    "environments": ["effects/chain.py", "environments/episode.py"],
+    "driving": ["effects/model.py", "driving/episode.py", "driving/lane.py"],
+    "environments": ["effects/model.py", "environments/family.py"],
 }
 ONE_OF_EACH = [(family, module) for family, modules in MODULES.items() for module in modules]
 

@@ -486,7 +486,7 @@ def test_tum_bad_commands_are_refused(file_of_tum):
         "no column found for commands (v and omega, or left and right); its columns are: time, lin"
         in complaint_of_tum(path)
     )
-    assert "no such file_of_tum of commands" in complaint_of_tum(path, commands="elsewhere.csv")
+    assert "no such file of commands" in complaint_of_tum(path, commands="elsewhere.csv")
     assert "unknown name 'speed'" in complaint_of_tum(path, columns={"speed": "lin"})
 
 

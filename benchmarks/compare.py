@@ -29,7 +29,7 @@ from proxytune.cli.terminal.study_folder import study_folder
 from proxytune.errors import InputError, StoreError
 from proxytune.report.writing import save, write_text
 from proxytune.running import Bars, working
-from proxytune.search import NAMES as STUDY_ENGINES, Engine, engine_code
+from proxytune.search import ENGINE_NAMES as STUDY_ENGINES, Engine, engine_code
 from proxytune.storage import Store, locked
 from proxytune.study import StudyRun, StudySettings, adopt, most_preflight_episodes, open_study
 

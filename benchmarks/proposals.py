@@ -26,7 +26,7 @@ from proxytune.search import Surrogate, Trial, fit_surrogate, from_unit, unit_ar
 from proxytune.search.engine import design_point
 from proxytune.search.likelihood import fit_outputs
 from proxytune.search.outcomes import composed_scores
-from proxytune.search.surrogate import AMPLITUDE, LENGTH_SCALE, NOISE, GaussianProcess, highest, most_probable
+from proxytune.search.surrogate import AMPLITUDE, LENGTH_SCALE, NOISE, GaussianProcess, maximise_gain, most_probable
 from proxytune.seeds import proposal_seed
 from proxytune.storage import Store
 from proxytune.study import StudyRun, as_stored, goal_of, open_study
@@ -72,7 +72,7 @@ def improvement(search, model=None):
     model = model or search.surrogate()
     _, incumbent = model.incumbent()
     gain = lambda points: gaussian_ei(points, model.model, y_opt=incumbent, xi=0.0)  # noqa: E731
-    return highest(gain, search.unit, search.draw)[0]
+    return maximise_gain(gain, search.unit, search.draw)[0]
 
 
 def lower_bound(search):
@@ -83,7 +83,7 @@ def lower_bound(search):
         mean, deviation = model.predict(points)
         return 1.96 * deviation - mean
 
-    return highest(gain, search.unit, search.draw)[0]
+    return maximise_gain(gain, search.unit, search.draw)[0]
 
 
 def exploit_at_the_end(search):
@@ -91,7 +91,7 @@ def exploit_at_the_end(search):
     if len(search.trials) < BUDGET - 8:
         return improvement(search)
     model = search.surrogate()
-    return highest(lambda points: -model.mean(points), search.unit, search.draw)[0]
+    return maximise_gain(lambda points: -model.mean(points), search.unit, search.draw)[0]
 
 
 def near_the_incumbent_at_the_end(search):
@@ -131,7 +131,7 @@ def knowledge_gradient(search):
         after = np.mean([(means + shifts * z).min(axis=0) for z in QUANTILES], axis=0)
         return means.min(axis=0) - after
 
-    return highest(gain, visited, search.draw)[0]
+    return maximise_gain(gain, visited, search.draw)[0]
 
 
 def _whitened(regressor, points):

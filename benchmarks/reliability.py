@@ -33,7 +33,7 @@ import launched
 import processes
 
 from proxytune.errors import ProxytuneError
-from proxytune.search import NAMES
+from proxytune.search import ENGINE_NAMES
 from proxytune.storage import Store
 from proxytune.study import Study, StudyRun, open_study, result_of
 from proxytune.study.run import as_stored
@@ -44,7 +44,7 @@ TABLES = ("facts", "trials", "episodes", "instances")
 
 def survive_kills(count: int, home: Path) -> str:
     """Kill studies of every engine, and compare what they come to."""
-    cases = list(itertools.product([engine for engine in NAMES if engine != "tpe"], "12", range(count)))
+    cases = list(itertools.product([engine for engine in ENGINE_NAMES if engine != "tpe"], "12", range(count)))
     equal, kills = 0, 0
     with launched.launching() as launcher:
         for engine, jobs, number in cases:

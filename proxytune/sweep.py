@@ -22,7 +22,7 @@ from proxytune.identity import meaning_of
 from proxytune.settings import nearest
 from proxytune.space import Interval, Parameter, Theta
 from proxytune.storage import Store, SweepRecord, is_begun
-from proxytune.study import LEARNING, Evaluation, Study, StudyRun, load_family, plan, result_of, stored_run
+from proxytune.study import LEARNING, Evaluation, Study, StudyRun, load_family, plan_episodes, result_of, stored_run
 from proxytune.usefulness import (
     ALL,
     MEASURES,
@@ -213,7 +213,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True)
-class Curve:
+class SweepCurve:
     """Usefulness along one parameter.
 
     Attributes:
@@ -293,7 +293,7 @@ def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = Non
         what = f"{sweep.parameter} {number} of {len(sweep.points)}"
         scored = run.evaluate(_theta(sweep, value), what)
         if replays is not None:
-            planned = plan(replays.settings, _theta(sweep, value), replays.settings.seed)
+            planned = plan_episodes(replays.settings, _theta(sweep, value), replays.settings.seed)
             replays.outcomes(planned, f"POD, {what}")
         came = "failed" if scored.prpv is None else f"PRPV {scored.prpv:g}"
         run.watcher.finished(f"{what}, at {value:g}: {came}")
@@ -301,14 +301,14 @@ def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = Non
         run.spent += replays.spent
 
 
-def curve_of(run: StudyRun, sweep: SweepRecord) -> Curve | None:
+def curve_of(run: StudyRun, sweep: SweepRecord) -> SweepCurve | None:
     """The curve of a sweep from what has been simulated; None if an episode is still missing."""
     points = [point for value in sweep.points if (point := _point(run, sweep, value))]
     if len(points) < len(sweep.points):
         return None
     unit = run.study.family.parameters[sweep.parameter].unit
     metrics = tuple(metric.name for metric in run.settings.metrics)
-    return Curve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
+    return SweepCurve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
 
 
 def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
@@ -320,7 +320,7 @@ def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
     return PodMean(float(found.mean()), central_interval(found[draws].mean(axis=1)), len(found))
 
 
-def all_curves(run: StudyRun) -> Sequence[Curve]:
+def all_curves(run: StudyRun) -> Sequence[SweepCurve]:
     """The curves of every sweep that has been finished, the last one last, each in the domain family of then."""
     study = run.study
     known = [(identity, sweep) for identity, sweep in run.store.sweeps() if sweep.parameter in study.family.parameters]
@@ -347,7 +347,7 @@ def _point(run: StudyRun, sweep: SweepRecord, value: float) -> SweepPoint | None
 def _pod(run: StudyRun, sweep: SweepRecord, value: float) -> dict[str, PodMean] | None:
     # Its first agent's commands are replayed, as discrepancy_study has it.
     replayed = replace(run.settings, agents=run.settings.agents[:1])
-    planned = plan(replayed, _theta(sweep, value), replayed.seed)
+    planned = plan_episodes(replayed, _theta(sweep, value), replayed.seed)
     known = run.store.outcomes(sweep.replays, _theta(sweep, value))
     if not all(episode in known for episode in planned):
         return None
@@ -359,7 +359,7 @@ UNKNOWN = Measured(None, None)
 
 
 @dataclass(frozen=True)
-class Estimate:
+class SweepEstimate:
     """A measure at one value of the parameter; None where it is undefined or has no interval."""
 
     value: float
@@ -379,7 +379,7 @@ class Series:
 
     measure: Measure
     metric: str
-    estimates: tuple[Estimate, ...]
+    estimates: tuple[SweepEstimate, ...]
 
     @property
     def key(self) -> str:
@@ -397,21 +397,21 @@ class Series:
         return not self.measure.lower_is_better
 
 
-def series_of(curve: Curve) -> tuple[Series, ...]:
+def series_of(curve: SweepCurve) -> tuple[Series, ...]:
     """Every measure of a curve; POD only where it was asked for."""
     on_scores = [one for measure in MEASURES for one in _of_measure(curve, measure)]
     pods = [_of_pod(curve, measure) for measure in PODS] if curve.has_pod else []
     return (*on_scores, *pods)
 
 
-def _of_measure(curve: Curve, measure: Measure) -> list[Series]:
+def _of_measure(curve: SweepCurve, measure: Measure) -> list[Series]:
     """One series, or one per metric."""
     found = [measure.measured(point.assessment) if point.assessment else {} for point in curve.points]
     metrics = curve.metrics if measure.per_metric else (ALL,)
     return [_series(curve, measure, metric, [one.get(metric, UNKNOWN) for one in found]) for metric in metrics]
 
 
-def _of_pod(curve: Curve, measure: Measure) -> Series:
+def _of_pod(curve: SweepCurve, measure: Measure) -> Series:
     return _series(curve, measure, ALL, [_pod_mean(point, measure) for point in curve.points])
 
 
@@ -420,9 +420,9 @@ def _pod_mean(point: SweepPoint, measure: Measure) -> Measured:
     return Measured(found.value, found.interval) if found else UNKNOWN
 
 
-def _series(curve: Curve, measure: Measure, metric: str, found: list[Measured]) -> Series:
+def _series(curve: SweepCurve, measure: Measure, metric: str, found: list[Measured]) -> Series:
     pairs = zip(curve.points, found, strict=True)
-    return Series(measure, metric, tuple(Estimate(point.value, *one) for point, one in pairs))
+    return Series(measure, metric, tuple(SweepEstimate(point.value, *one) for point, one in pairs))
 
 
 Side = Literal["worsens", "flat", "turns", "unknown", "unseen"]
@@ -494,7 +494,7 @@ def shape_of(series: Series, held: float | None) -> Shape:
     return Shape(tuple(cost.value for cost in best), sign * least + 0.0, near, held, *sides)
 
 
-def describe(series: Series, held: float | None) -> str:
+def describe_shape(series: Series, held: float | None) -> str:
     """The shape in one line."""
     shape = shape_of(series, held)
     if shape.score is None:
@@ -517,7 +517,7 @@ def _listed(chosen: Sequence[float], series: Series) -> str:
     return ", ".join(f"{value:.4g}" for value in chosen)
 
 
-def _cost(estimate: Estimate, sign: float) -> _Cost | None:
+def _cost(estimate: SweepEstimate, sign: float) -> _Cost | None:
     if estimate.score is None:
         return None
     cost = sign * estimate.score

@@ -35,7 +35,7 @@ from proxytune.study import (
     retry_failed,
     run_confirmation,
     run_preflight,
-    run_study as run_trials,
+    run_trials as run_trials,
     stored_run,
     with_spending,
 )

@@ -12,7 +12,7 @@ from proxytune.errors import InputError
 from proxytune.running import Bars
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import TARGET_OFFSET, target_seed
-from proxytune.study import measure, read_study_settings
+from proxytune.study import measure_agents, read_study_settings
 
 MOST_REPEATS = 1_000_000
 
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     if arguments.output.is_dir():
         raise InputError(f"--output {arguments.output}: is a folder; give the name of a file in it")
     with Bars(len(settings.agents) * settings.starts * arguments.repeats) as bars:
-        scores = measure(settings, arguments.model, seed, bars, arguments.repeats)
+        scores = measure_agents(settings, arguments.model, seed, bars, arguments.repeats)
     write_scores(scores, arguments.output)
     document = {
         "scores": str(arguments.output),

@@ -37,7 +37,7 @@ from proxytune.study import (
     stored_run,
     with_metrics,
 )
-from proxytune.sweep import Curve, all_curves
+from proxytune.sweep import SweepCurve, all_curves
 
 RESCORED = "rescored"
 
@@ -87,14 +87,14 @@ def run(arguments: argparse.Namespace) -> Answer:
     )
 
 
-def _pages(settings: StudySettings, curves: Sequence[Curve], folder: Path, command: str) -> Iterator[Path]:
+def _pages(settings: StudySettings, curves: Sequence[SweepCurve], folder: Path, command: str) -> Iterator[Path]:
     """Write a page of all sweeps that hold the others at the same values."""
     drawn = list({curve_name(curve): curve for curve in curves}.values())
     for alike in held_alike(drawn):
         yield write_sweep_page(settings, alike, folder, held_values(alike[0].base), command)
 
 
-def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[Curve]]:
+def _read(run: StudyRun, metrics: Sequence[Metric]) -> tuple[StudyResult | None, Sequence[SweepCurve]]:
     """The study's result, if it has any trial or no sweep either, and its curves."""
     curves = all_curves(run.of(with_metrics(run.study, metrics)) if metrics else run)
     if curves and not run.store.trials(run.study.objective.name):

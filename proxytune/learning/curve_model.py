@@ -22,7 +22,7 @@ from proxytune.errors import InputError
 
 
 @dataclass(frozen=True)
-class Curve:
+class LearningCurve:
     """A learning curve: scores in the target by number of target samples.
 
     Attributes:
@@ -82,7 +82,7 @@ ROUNDS = 2
 
 
 @dataclass(frozen=True)
-class Marks:
+class Examined:
     """Examinations, one per row.
 
     Attributes:
@@ -113,7 +113,7 @@ class Marks:
         return np.asarray(np.abs(self.place[:, None] - self.place))
 
 
-def places(counts: Floats, first: float) -> Floats:
+def doublings(counts: Floats, first: float) -> Floats:
     """Numbers of target samples as doublings: 0 for none, 1 for the first count, nearly one more for each twofold."""
     return np.asarray(np.log2(1.0 + np.asarray(counts, dtype=float) / first))
 
@@ -134,7 +134,7 @@ class CurveModel:
         unit: Their standard deviation.
     """
 
-    marks: Marks
+    marks: Examined
     values: Mapping[str, float]
     centre: float
     unit: float
@@ -164,14 +164,21 @@ class CurveModel:
         return _means(self.values, curve[:, None] == other, np.abs(place[:, None] - there))
 
 
-def fit_curve_model(marks: Marks) -> CurveModel:
+def fit_curve_model(marks: Examined) -> CurveModel:
     """Fit the process to examinations by its most probable hyperparameters: a pure function of them."""
     centre, unit = float(marks.score.mean()), float(marks.score.std()) or 1.0
     scaled = (marks.score - centre) / unit
     spread, start = np.ones(len(scaled)), np.log([median for median, _ in PRIORS.values()])
     for _ in range(1 + ROUNDS):
         given = (marks, scaled, spread)
-        found = minimize(_misfit, start, args=given, method="L-BFGS-B", bounds=_bounds(marks), options={"maxiter": 40})
+        found = minimize(
+            _negative_log_posterior,
+            start,
+            args=given,
+            method="L-BFGS-B",
+            bounds=_bounds(marks),
+            options={"maxiter": 40},
+        )
         start, values = found.x, _named(found.x)
         factor = cho_factor(_covariance(marks, values, spread), lower=True)
         weights = cho_solve(factor, scaled)
@@ -179,7 +186,7 @@ def fit_curve_model(marks: Marks) -> CurveModel:
     return CurveModel(marks, values, centre, unit, factor, weights)
 
 
-def _bounds(marks: Marks) -> list[tuple[float, float]]:
+def _bounds(marks: Examined) -> list[tuple[float, float]]:
     """How small and how large the logarithm of each hyperparameter may be."""
     # One repetition does not tell what it does to a learner from the learner's mean curve
     held = REPEATED if len(np.unique(marks.repetition)) == 1 else ()
@@ -191,7 +198,7 @@ def _named(logarithms: Floats) -> dict[str, float]:
     return dict(zip(PRIORS, np.exp(logarithms).tolist(), strict=True))
 
 
-def _misfit(logarithms: Floats, marks: Marks, scaled: Floats, spread: Floats) -> float:
+def _negative_log_posterior(logarithms: Floats, marks: Examined, scaled: Floats, spread: Floats) -> float:
     """Negative logarithm of the posterior of the hyperparameters, up to a constant."""
     factor = cho_factor(_covariance(marks, _named(logarithms), spread), lower=True)
     medians, widths = np.array(list(PRIORS.values())).T
@@ -199,7 +206,7 @@ def _misfit(logarithms: Floats, marks: Marks, scaled: Floats, spread: Floats) ->
     return float(0.5 * scaled @ cho_solve(factor, scaled) + np.sum(np.log(np.diag(factor[0]))) + prior)
 
 
-def _covariance(marks: Marks, values: Mapping[str, float], spread: Floats) -> Floats:
+def _covariance(marks: Examined, values: Mapping[str, float], spread: Floats) -> Floats:
     drift = _matern(marks.apart, values["drift"]) * marks.together
     about = drift * (values["shared"] ** 2 + values["own"] ** 2 * marks.same) + values["noise"] ** 2 * np.eye(
         len(spread)
@@ -219,12 +226,12 @@ def _matern(apart: Floats, length: float) -> Floats:
     return np.asarray((1.0 + scaled + scaled**2 / 3.0) * np.exp(-scaled))
 
 
-def _residuals(marks: Marks, values: Mapping[str, float], scaled: Floats, weights: Floats) -> Floats:
+def _residuals(marks: Examined, values: Mapping[str, float], scaled: Floats, weights: Floats) -> Floats:
     """What the mean curves leave of the scores, scaled."""
     return np.asarray(scaled - _means(values, marks.same, marks.apart) @ weights)
 
 
-def _spread(marks: Marks, residuals: Floats, curve: NDArray[np.intp], place: Floats) -> Floats:
+def _spread(marks: Examined, residuals: Floats, curve: NDArray[np.intp], place: Floats) -> Floats:
     """How much scores differ at these places, relative to all: what is left nearby, drawn towards that of all."""
     pooled = float(np.mean(residuals**2)) or 1.0
     near = np.exp(-0.5 * ((place[:, None] - marks.place) / NEAR) ** 2) * (curve[:, None] == marks.curve)
@@ -241,7 +248,7 @@ DOUBT = 2.5
 
 
 @dataclass(frozen=True)
-class Draws:
+class CurveDraws:
     """Mean curves drawn from their posterior, all proxies' together.
 
     Attributes:
@@ -260,8 +267,8 @@ class Draws:
 
 
 def draw_curves(
-    curves: Mapping[str, Curve], bounds: tuple[float, float], draws: int = POSTERIOR_DRAWS, seed: int = 0
-) -> Draws:
+    curves: Mapping[str, LearningCurve], bounds: tuple[float, float], draws: int = POSTERIOR_DRAWS, seed: int = 0
+) -> CurveDraws:
     """Draw the mean curves that the examinations allow: a pure function of these.
 
     Args:
@@ -272,7 +279,7 @@ def draw_curves(
     """
     first = float(min(curve.counts[1] for curve in curves.values()))
     last = max(curve.counts[-1] for curve in curves.values())
-    place = np.linspace(0.0, end := float(places(np.array(last), first)), 1 + round(STEPS * end))
+    place = np.linspace(0.0, end := float(doublings(np.array(last), first)), 1 + round(STEPS * end))
     model = fit_curve_model(_marks(curves, first))
     which = np.repeat(np.arange(len(curves)), len(place))
     mean, covariance = model.mean_curves(which, np.tile(place, len(curves)))
@@ -290,18 +297,18 @@ def draw_curves(
     for name, curve in curves.items():
         if not np.isfinite(curve.scores[:, 0]).any():
             scores[name][:, place < 1.0 - 1e-9] = np.nan
-    return Draws(counts_at(place, first), scores, rising, model, first)
+    return CurveDraws(counts_at(place, first), scores, rising, model, first)
 
 
-def _marks(curves: Mapping[str, Curve], first: float) -> Marks:
+def _marks(curves: Mapping[str, LearningCurve], first: float) -> Examined:
     rows = []
     for number, curve in enumerate(curves.values()):
-        at = places(np.array(curve.counts), first)
+        at = doublings(np.array(curve.counts), first)
         rows += [
             (number, repetition, at[place], curve.scores[repetition, place]) for repetition, place in curve.examined
         ]
     number, repetition, place, score = np.array(rows).T
-    return Marks(number.astype(np.intp), repetition.astype(np.intp), place, score)
+    return Examined(number.astype(np.intp), repetition.astype(np.intp), place, score)
 
 
 def _root(covariance: Floats) -> Floats:

@@ -103,7 +103,7 @@ def collect_samples(
         commands.append(samples.commands)
         found, asked, lessons = found + len(samples.commands), asked + wanted, lessons + 1
         if found < least * asked and (lessons >= TRIED or found >= count):
-            raise LearnerError(_complaint(policy, found / asked, lessons, describe(where)))
+            raise LearnerError(_complaint(policy, found / asked, lessons, describe_distribution(where)))
     return Demonstration(np.concatenate(observations)[:count], np.concatenate(commands)[:count])
 
 
@@ -131,7 +131,7 @@ def _lesson(classroom: Classroom, where: Distribution, seed: int, number: int) -
     return make_episode(where.draw(drawn.theta), agent=EXPERT, start=start, seed=drawn.episode)
 
 
-def describe(where: Distribution) -> str:
+def describe_distribution(where: Distribution) -> str:
     """p(θ) in words."""
     spans = [
         f"{name} = {low:.3g}" if low == high else f"{name} in [{low:.3g}, {high:.3g}]"
@@ -175,14 +175,14 @@ class Cache:
 
     def path(self, kind: str, facts: Mapping[str, Any]) -> Path:
         """Where the arrays of these facts are, or would be."""
-        return self.folder / f"{kind}-{digest(facts)}.npz"
+        return self.folder / f"{kind}-{facts_digest(facts)}.npz"
 
     def has(self, kind: str, facts: Mapping[str, Any]) -> bool:
         """Whether they are there."""
         return self.path(kind, facts).exists()
 
 
-def digest(facts: Mapping[str, Any]) -> str:
+def facts_digest(facts: Mapping[str, Any]) -> str:
     """A short name for facts, the same whatever their order."""
     return hashlib.sha256(_text(facts).encode()).hexdigest()[:20]
 
@@ -209,7 +209,7 @@ def _read(path: Path) -> Arrays:
         raise StoreError(f"{path}: is damaged ({problem}); delete it, and run again to make it anew") from None
 
 
-def examine(classroom: Classroom, episodes: Sequence[Episode], policy: Policy) -> list[float]:
+def examine_policy(classroom: Classroom, episodes: Sequence[Episode], policy: Policy) -> list[float]:
     """The score of a policy in each episode, all at once where the classroom can do that.
 
     Raises:

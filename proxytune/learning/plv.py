@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
-from proxytune.learning.curve_model import POSTERIOR_DRAWS, Curve, Draws, crossing, draw_curves, places
+from proxytune.learning.curve_model import POSTERIOR_DRAWS, CurveDraws, LearningCurve, crossing, doublings, draw_curves
 from proxytune.settings import Section
 
 LEVELS = (0.025, 0.975)
@@ -41,7 +41,7 @@ class Convergence:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class LearningEstimate:
     """A figure with its 95 % interval; None where it was not reached, or where the interval's end was not."""
 
     value: float | None
@@ -60,7 +60,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Teaching:
+class TeachingValue:
     """What a proxy is worth as a teacher.
 
     Attributes:
@@ -71,11 +71,11 @@ class Teaching:
         reduction: PLV as a share of η(∅).
     """
 
-    without: Estimate
-    needed: Estimate
-    plv: Estimate
-    factor: Estimate
-    reduction: Estimate
+    without: LearningEstimate
+    needed: LearningEstimate
+    plv: LearningEstimate
+    factor: LearningEstimate
+    reduction: LearningEstimate
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,8 @@ class SampleNeeds:
         needed: η by name (draws,); infinite where it is not reached up to the largest count.
     """
 
-    curves: Mapping[str, Curve]
-    draws: Draws
+    curves: Mapping[str, LearningCurve]
+    draws: CurveDraws
     when: Convergence
     gain: float | None
     needed: Mapping[str, Floats]
@@ -132,7 +132,7 @@ def general_plv(
 
 
 def sample_needs(
-    curves: Mapping[str, Curve],
+    curves: Mapping[str, LearningCurve],
     *,
     none: str,
     best_score: float,
@@ -160,7 +160,7 @@ def sample_needs(
     return SampleNeeds(curves, drawn, when, _last_gain(drawn, alone), needed)
 
 
-def _last_gain(drawn: Draws, alone: Floats) -> float | None:
+def _last_gain(drawn: CurveDraws, alone: Floats) -> float | None:
     """What the learner without a proxy gains over the last doubling of samples; None if it begins within that."""
     if 2.0 * drawn.first > drawn.counts[-1] * (1.0 + ROUNDING):
         return None
@@ -169,39 +169,41 @@ def _last_gain(drawn: Draws, alone: Floats) -> float | None:
     return float(alone[:, -1].mean() - alone[:, half].mean())
 
 
-def _bounds(curves: Mapping[str, Curve], best_score: float) -> tuple[float, float]:
+def _bounds(curves: Mapping[str, LearningCurve], best_score: float) -> tuple[float, float]:
     """Lowest and highest score there can be; a family's own scores may lie beyond those of one that drives."""
     scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
     return float(min(-best_score, scores.min())), float(max(best_score, scores.max()))
 
 
-def teaching(needs: SampleNeeds, *, none: str, proxy: str) -> Teaching:
+def teaching_value(needs: SampleNeeds, *, none: str, proxy: str) -> TeachingValue:
     """What a proxy is worth as a teacher, with 95 % intervals.
 
     Where convergence is not reached, η is known to lie beyond the largest count: ends that this leaves open are None.
     """
-    return Teaching(
+    return TeachingValue(
         without=samples_needed(needs, none),
         needed=samples_needed(needs, proxy),
-        plv=difference(needs, more=none, less=proxy),
-        factor=estimate(lambda alone, taught: alone / taught, needs, more=none, less=proxy),
-        reduction=estimate(lambda alone, taught: 1.0 - taught / alone, needs, more=none, less=proxy),
+        plv=more_needed(needs, more=none, less=proxy),
+        factor=estimate_figure(lambda alone, taught: alone / taught, needs, more=none, less=proxy),
+        reduction=estimate_figure(lambda alone, taught: 1.0 - taught / alone, needs, more=none, less=proxy),
     )
 
 
-def samples_needed(needs: SampleNeeds, name: str) -> Estimate:
+def samples_needed(needs: SampleNeeds, name: str) -> LearningEstimate:
     """How many target samples a learner needs, with its 95 % interval; None beyond the largest count."""
     needed = needs.needed[name]
     least = np.minimum(needed, needs.last)
     return _ends(least=least, middle=needed, most=needed)
 
 
-def difference(needs: SampleNeeds, *, more: str, less: str) -> Estimate:
+def more_needed(needs: SampleNeeds, *, more: str, less: str) -> LearningEstimate:
     """How many more target samples one learner needs than another, with its 95 % interval."""
-    return estimate(lambda one, other: plv(without=one, with_proxy=other), needs, more=more, less=less)
+    return estimate_figure(lambda one, other: plv(without=one, with_proxy=other), needs, more=more, less=less)
 
 
-def estimate(figure: Callable[[Floats, Floats], Floats], needs: SampleNeeds, *, more: str, less: str) -> Estimate:
+def estimate_figure(
+    figure: Callable[[Floats, Floats], Floats], needs: SampleNeeds, *, more: str, less: str
+) -> LearningEstimate:
     """A figure of what two learners need, with the ends of its 95 % interval that unreached η leave possible.
 
     Args:
@@ -220,16 +222,16 @@ def estimate(figure: Callable[[Floats, Floats], Floats], needs: SampleNeeds, *, 
     return _ends(least=least, middle=np.where(reached, known, -np.inf), most=most)
 
 
-def mean_score(needs: SampleNeeds, name: str, place: int) -> Estimate:
+def mean_score(needs: SampleNeeds, name: str, place: int) -> LearningEstimate:
     """The mean score of a learner at a place of the drawn curves; None before anything can have been learnt."""
     scores = needs.draws.scores[name][:, place]
-    return Estimate(*(_finite(float(end)) for end in (scores.mean(), *np.quantile(scores, LEVELS))))
+    return LearningEstimate(*(_finite(float(end)) for end in (scores.mean(), *np.quantile(scores, LEVELS))))
 
 
-def _ends(*, least: Floats, middle: Floats, most: Floats) -> Estimate:
+def _ends(*, least: Floats, middle: Floats, most: Floats) -> LearningEstimate:
     """The median of a figure, and its 95 % interval from the least and the most that it may be in each draw."""
     ends = (_quantile(middle, 0.5), _quantile(least, LEVELS[0]), _quantile(most, LEVELS[1]))
-    return Estimate(*(_finite(end) for end in ends))
+    return LearningEstimate(*(_finite(end) for end in ends))
 
 
 def _quantile(values: Floats, level: float) -> float:
@@ -258,11 +260,11 @@ class Examination(NamedTuple):
     samples: int
 
 
-Scores = Mapping[Examination, float]
+ExaminationScores = Mapping[Examination, float]
 
 
 @dataclass(frozen=True)
-class Spending:
+class AdaptiveDesign:
     """How examinations are spent.
 
     Attributes:
@@ -288,21 +290,21 @@ class _Cells:
     drawn: Floats
 
 
-def curves_of(counts: Sequence[int], scores: Scores) -> dict[str, Curve]:
+def curves_of(counts: Sequence[int], scores: ExaminationScores) -> dict[str, LearningCurve]:
     """Scores as learning curves, by name, each over the grid of counts and what was examined between these."""
     return {name: _curve(counts, name, scores) for name in dict.fromkeys(one.curve for one in scores)}
 
 
-def _curve(counts: Sequence[int], name: str, scores: Scores) -> Curve:
+def _curve(counts: Sequence[int], name: str, scores: ExaminationScores) -> LearningCurve:
     own = [one for one in scores if one.curve == name]
     all_counts = sorted({*counts, *(one.samples for one in own)})
     table = np.full((1 + max(one.repetition for one in own), len(all_counts)), np.nan)
     for one in own:
         table[one.repetition, all_counts.index(one.samples)] = scores[one]
-    return Curve(tuple(all_counts), table)
+    return LearningCurve(tuple(all_counts), table)
 
 
-def first_examinations(names: Sequence[str], spending: Spending) -> list[Examination]:
+def first_examinations(names: Sequence[str], spending: AdaptiveDesign) -> list[Examination]:
     """What is examined before anything is known: counts from the first to the last, in two repetitions."""
     return [
         Examination(name, repetition, count)
@@ -318,7 +320,7 @@ def _spread_counts(counts: tuple[int, ...], first: int) -> list[int]:
     return [counts[place] for place in sorted(set(places_.tolist()))]
 
 
-def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spending) -> list[Examination]:
+def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: AdaptiveDesign) -> list[Examination]:
     """Choose the examinations that are expected to take most from the variance of all proxies' PLV, one by one.
 
     What a score would tell is taken from how the drawn mean curve there goes with the drawn PLVs, as in linear
@@ -336,7 +338,7 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spendi
     cells, wanted = _cells(needs, names, spending), _finite_plv(needs, names, spending.none)
     targets = wanted.shape[1]
     joint = np.cov(np.column_stack((wanted, cells.drawn)), rowvar=False)
-    noise = needs.draws.model.noise_at(cells.number, places(cells.count.astype(float), needs.draws.first))
+    noise = needs.draws.model.noise_at(cells.number, doublings(cells.count.astype(float), needs.draws.first))
     done = {
         Examination(name, int(repetition), curve.counts[place])
         for name, curve in needs.curves.items()
@@ -357,7 +359,7 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Spendi
     return chosen
 
 
-def _cells(needs: SampleNeeds, names: Collection[str], spending: Spending) -> _Cells:
+def _cells(needs: SampleNeeds, names: Collection[str], spending: AdaptiveDesign) -> _Cells:
     """Every place of the drawn curves at which somebody may be examined."""
     counts, scores = needs.draws.counts.round().astype(int), needs.draws.scores
     open_ = {
@@ -384,7 +386,7 @@ def _finite_plv(needs: SampleNeeds, names: Sequence[str], none: str) -> Floats:
     return np.column_stack([needed[none] - needed[name] for name in proxies] or [needed[none]])
 
 
-def _next_of(cells: _Cells, cell: int, done: Collection[Examination], spending: Spending) -> Examination | None:
+def _next_of(cells: _Cells, cell: int, done: Collection[Examination], spending: AdaptiveDesign) -> Examination | None:
     """The examination here in the repetition in which this learner has been examined least; None if all are done."""
     name, count = cells.name[cell], int(cells.count[cell])
     often = Counter(one.repetition for one in done if one.curve == name)

@@ -212,7 +212,7 @@ class Knowledge:
         return information_of(self.likelihood, self.posterior.mode)
 
 
-def learn(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:
+def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:
     """Learn what finished trials say of θ; same trials in any order, same knowledge.
 
     Raises:

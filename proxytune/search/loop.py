@@ -90,7 +90,7 @@ def with_failures_as_worst(trials: Sequence[Trial]) -> list[Trial]:
     return [trial if keep else replace(trial, score=score, outcome=outcome) for trial, keep in pairs]
 
 
-Propose = Callable[[], tuple[Values, ...]]
+BatchPoints = Callable[[], tuple[Values, ...]]
 """The points of a batch, worked out when asked for: an evaluator that has them already need not ask."""
 
 
@@ -105,7 +105,7 @@ class Evaluator(Protocol):
         """Why the search goes no further, in one phrase; empty while it does."""
         ...
 
-    def evaluate(self, batch: range, propose: Propose) -> None:
+    def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Score what is left of a batch of trials, counted from 0; `propose` gives the points of all of it."""
         ...
 

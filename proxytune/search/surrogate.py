@@ -189,7 +189,9 @@ class GaussianProcess:
             RunError: If no trial has a score.
         """
         with threadpool_limits(limits=1):
-            return from_unit(space, _most_promising(_believing(space, trials), proposal_seed(seed, len(trials)))[0])
+            return from_unit(
+                space, _most_promising(_fit_with_pending(space, trials), proposal_seed(seed, len(trials)))[0]
+            )
 
 
 def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tuple[float, float]:
@@ -204,7 +206,7 @@ def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tu
     return gain, surrogate.noise_deviation
 
 
-def _believing(space: Space, trials: Sequence[Trial]) -> Surrogate:
+def _fit_with_pending(space: Space, trials: Sequence[Trial]) -> Surrogate:
     """The surrogate of the trials, a pending one taken for one that scored what is expected of it."""
     surrogate = fit_surrogate(space, trials)
     pending = [trial for trial in trials if trial.pending]
@@ -222,10 +224,10 @@ def _most_promising(surrogate: Surrogate, seed: int) -> tuple[Floats, float]:
 
     _, incumbent = surrogate.incumbent()
     visited = unit_array(surrogate.space, [trial.values for trial in surrogate.visited])
-    return highest(lambda points: gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0), visited, seed)
+    return maximise_gain(lambda points: gaussian_ei(points, surrogate.model, y_opt=incumbent, xi=0.0), visited, seed)
 
 
-def highest(gain: Callable[[Floats], Floats], visited: Floats, seed: int) -> tuple[Floats, float]:
+def maximise_gain(gain: Callable[[Floats], Floats], visited: Floats, seed: int) -> tuple[Floats, float]:
     """The unvisited point of the unit cube that promises the highest gain, and that: a Sobol cloud, then closer looks.
 
     Args:
@@ -234,19 +236,19 @@ def highest(gain: Callable[[Floats], Floats], visited: Floats, seed: int) -> tup
         seed: Seeds the clouds.
     """
     dimensions = visited.shape[1]
-    points = _new(unit_points(dimensions, CLOUD, seed), visited)
+    points = _unvisited(unit_points(dimensions, CLOUD, seed), visited)
     gains = gain(points)
     offsets = 2.0 * unit_points(dimensions, CLOUD // 16, seed + 1) - 1.0
     for width in WIDTHS:
         leaders = points[np.argsort(-gains, kind="stable")[:REFINED]]
         around = np.clip(leaders[:, None, :] + width * offsets, 0.0, 1.0).reshape(-1, dimensions)
-        points = np.concatenate([leaders, _new(around, visited)])
+        points = np.concatenate([leaders, _unvisited(around, visited)])
         gains = gain(points)
     best = int(np.argmax(gains))
     return points[best], float(gains[best])
 
 
-def _new(points: Floats, visited: Floats) -> Floats:
+def _unvisited(points: Floats, visited: Floats) -> Floats:
     """The points that are not the same as a visited one."""
     distances = np.abs(points[:, None, :] - visited[None, :, :]).max(axis=2)
     return np.asarray(points[distances.min(axis=1) > SAME / len(visited)])

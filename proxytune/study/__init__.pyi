@@ -1,19 +1,19 @@
 from .facts import adopt as adopt, note_search as note_search, open_to_look as open_to_look
 from .families import (
-    Choice as Choice,
+    BestFamilies as BestFamilies,
     ComparedFamilies as ComparedFamilies,
     Lesson as Lesson,
     TunedFamily as TunedFamily,
-    best_teacher as best_teacher,
+    best_teaching_family as best_teaching_family,
     read_lessons as read_lessons,
     save_lessons as save_lessons,
-    tuned as tuned,
+    tuned_family as tuned_family,
 )
 from .family import (
     bare_family as bare_family,
     check_bounds as check_bounds,
-    code_of as code_of,
     load_family as load_family,
+    user_code as user_code,
 )
 from .opening import (
     PRPV as PRPV,
@@ -44,7 +44,7 @@ from .run import (
     check_facts as check_facts,
     rescored as rescored,
     retry_failed as retry_failed,
-    run_study as run_study,
+    run_trials as run_trials,
     stored_run as stored_run,
     with_metrics as with_metrics,
 )
@@ -53,8 +53,8 @@ from .settings import (
     LEARNING as LEARNING,
     MADE as MADE,
     StudySettings as StudySettings,
-    as_document as as_document,
     read_study_settings as read_study_settings,
+    settings_document as settings_document,
     study_around as study_around,
 )
 from .single_episode import (
@@ -72,12 +72,12 @@ from .study_run import (
     Evaluation as Evaluation,
     Spent as Spent,
     StudyRun as StudyRun,
+    evaluate_outcomes as evaluate_outcomes,
     failure_of as failure_of,
-    measure as measure,
+    measure_agents as measure_agents,
     outputs_of as outputs_of,
-    plan as plan,
-    score as score,
+    plan_episodes as plan_episodes,
+    score_table as score_table,
     score_trials as score_trials,
-    table as table,
     with_spending as with_spending,
 )

@@ -12,7 +12,7 @@ from typing import Any, NoReturn, cast
 from proxytune.domain import DomainFamily
 from proxytune.errors import StoreError
 from proxytune.identity import version_changes, versions_of
-from proxytune.search import NAMES, Engine, engine_code, engine_of
+from proxytune.search import ENGINE_NAMES, Engine, engine_code, engine_of
 from proxytune.space import Parameter
 from proxytune.storage import Store
 from proxytune.study.opening import Study, objective_of, open_settings, read_target, with_scores
@@ -160,7 +160,7 @@ def _described(
 
 def _engine(name: str, learns_from: Any) -> Engine:
     """The shipped engine, or the place of one that is not."""
-    return engine_of(name) if name in NAMES else Engine(name, name, "", _proposes_nothing, learns_from)
+    return engine_of(name) if name in ENGINE_NAMES else Engine(name, name, "", _proposes_nothing, learns_from)
 
 
 def _proposes_nothing(*_: Any) -> NoReturn:

@@ -15,7 +15,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.errors import StoreError
 from proxytune.files import draft_of
-from proxytune.learning import Estimate
+from proxytune.learning import LearningEstimate
 from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
 from proxytune.settings import is_finite
@@ -24,7 +24,7 @@ from proxytune.storage import FAMILIES
 from proxytune.study.pruning import seconds_of
 from proxytune.study.result import StudyResult
 from proxytune.study.settings import StudySettings
-from proxytune.study.study_run import StudyRun, plan
+from proxytune.study.study_run import StudyRun, plan_episodes
 from proxytune.usefulness import Assessment, Selection, interval, select_proxy
 
 RESAMPLES = 1000
@@ -72,14 +72,14 @@ class Lesson:
 
     theta: Theta
     zero_shot: float | None = None
-    needed: Estimate | None = None
-    plv: Estimate | None = None
-    more: Estimate | None = None
+    needed: LearningEstimate | None = None
+    plv: LearningEstimate | None = None
+    more: LearningEstimate | None = None
     failure: str = ""
 
 
 @dataclass(frozen=True)
-class Choice:
+class BestFamilies:
     """Which family is best at something.
 
     Attributes:
@@ -118,29 +118,29 @@ class ComparedFamilies:
         return select_proxy(proxies=tables, target=target, metrics=self.settings.metrics)
 
     @property
-    def predicts(self) -> Choice:
+    def predicts(self) -> BestFamilies:
         """Which predicts best: the lowest PRPV in fresh episodes."""
         if self.selection is None:
-            return Choice()
+            return BestFamilies()
         best, *others = [name for name, _ in self.selection.ranking]
         worse = {one.worse for one in self.selection.differences if one.better == best and one.beyond_noise}
-        return Choice(best, tuple(name for name in others if name not in worse))
+        return BestFamilies(best, tuple(name for name in others if name not in worse))
 
     @property
-    def teaches(self) -> Choice:
+    def teaches(self) -> BestFamilies:
         """Which teaches best: the highest PLV."""
-        best = best_teacher(self.lessons)
+        best = best_teaching_family(self.lessons)
         if best is None:
-            return Choice()
+            return BestFamilies()
         others = [name for name, one in self.lessons.items() if name != best and _may_be_as_good(one)]
-        return Choice(best, tuple(others))
+        return BestFamilies(best, tuple(others))
 
     @property
-    def cheapest(self) -> Choice:
+    def cheapest(self) -> BestFamilies:
         """Whose episodes take the shortest."""
         best = min(self.families, key=lambda one: float(np.mean(one.episode_seconds))).name
         alike = [name for name, (_, low, _) in self.times_cheapest(best).items() if name != best and low <= 1.0]
-        return Choice(best, tuple(alike))
+        return BestFamilies(best, tuple(alike))
 
     def seconds_per_episode(self) -> dict[str, tuple[float, float, float]]:
         """Mean seconds of an episode of each family, and the ends of its 95 % interval."""
@@ -160,15 +160,15 @@ class ComparedFamilies:
         return [(one, _resampled_means(one.episode_seconds)) for one in self.families]
 
 
-def tuned(run: StudyRun, result: StudyResult) -> TunedFamily:
+def tuned_family(run: StudyRun, result: StudyResult) -> TunedFamily:
     """A family's study as it stands, with what its episodes cost."""
     settings = run.settings
-    planned = [one for seed in _seeds(settings) for one in plan(settings, result.best.trial.theta, seed)]
+    planned = [one for seed in _seeds(settings) for one in plan_episodes(settings, result.best.trial.theta, seed)]
     seconds = tuple(outcome.seconds for outcome in run.known(planned).values())
     return TunedFamily(settings.family_name, result, seconds_of(run, result.trials), seconds)
 
 
-def best_teacher(lessons: Mapping[str, Lesson]) -> str | None:
+def best_teaching_family(lessons: Mapping[str, Lesson]) -> str | None:
     """The family of highest PLV; None where none is known."""
     known = {name: one.plv.value for name, one in lessons.items() if one.plv and one.plv.value is not None}
     return max(known, key=known.__getitem__) if known else None
@@ -235,8 +235,8 @@ def _lesson(kept: Mapping[str, Any]) -> Lesson:
     return Lesson(theta, _or_none(kept["zero_shot"]), failure=str(kept["failure"]), **estimates)
 
 
-def _estimate(value: object, low: object, high: object) -> Estimate:
-    return Estimate(_or_none(value), _or_none(low), _or_none(high))
+def _estimate(value: object, low: object, high: object) -> LearningEstimate:
+    return LearningEstimate(_or_none(value), _or_none(low), _or_none(high))
 
 
 def _or_none(value: object) -> float | None:

@@ -247,7 +247,7 @@ def check_bounds(
         raise settings.error(key, f"must lie within [{known.low:g}, {known.high:g}], got {given}")
 
 
-def code_of(settings: StudySettings) -> str:
+def user_code(settings: StudySettings) -> str:
     """A digest of the modules in a study's folder, and of installed ones that its family and its agents come from.
 
     Modules that these import in turn are not looked at where they lie elsewhere.

@@ -21,10 +21,10 @@ from proxytune.errors import ExtensionError, InputError, ScoresError
 from proxytune.extensions import ask, load, plugins
 from proxytune.identity import version_changes
 from proxytune.scores import Metric, ScoreTable, read_scores
-from proxytune.search import GAUSSIAN_PROCESS, NAMES, Engine, engine_of, why_not_engine
+from proxytune.search import ENGINE_NAMES, GAUSSIAN_PROCESS, Engine, engine_of, why_not_engine
 from proxytune.settings import nearest
 from proxytune.space import Theta
-from proxytune.study.family import code_of, load_family
+from proxytune.study.family import load_family, user_code
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings, unnoticed
 from proxytune.usefulness import MEASURES, Measure, compare, start_of, starts_of
 
@@ -266,7 +266,7 @@ def open_settings(settings: StudySettings) -> Study:
     known, left_out = with_scores(settings)
     target, unused = read_target(known, family)
     cautions, objective = (*left_out, *unused, *unnoticed(settings.folder)), objective_of(settings)
-    truth, engine, code = _truth(settings, family), _engine(settings), code_of(settings)
+    truth, engine, code = _truth(settings, family), _engine(settings), user_code(settings)
     return Study(known, family, target, family.identity, truth, cautions, objective, engine, code)
 
 
@@ -281,7 +281,7 @@ def _engine(settings: StudySettings) -> Engine:
     except InputError as problem:
         raise settings.error("engine", str(problem)) from None
     if not engine.in_studies:
-        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, NAMES)}")
+        raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, ENGINE_NAMES)}")
     reason = why_not_engine(engine, composed=settings.objective != LEARNING)
     if reason:
         raise settings.error("engine", reason)

@@ -391,7 +391,7 @@ UNKNOWN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class NoiseVariance:
     """Chance between the mean scores of proxy and target at the same θ.
 
     Attributes:
@@ -404,22 +404,22 @@ class Noise:
     caution: str = ""
 
 
-def noise_of(run: StudyRun) -> Noise:
+def noise_of(run: StudyRun) -> NoiseVariance:
     """What is known of noise before the first trial; a function of the pre-flight and the target's table."""
     study = run.study
     driven = study.settings.starts
     measured = np.maximum(1, study.target.counts)[:, None]
     pairs = placement_pairs(run)
     if shares_starts(study) and pairs.size:
-        return Noise(_shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0 * (1.0 / driven + 1.0 / measured))
+        return NoiseVariance(_shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0 * (1.0 / driven + 1.0 / measured))
     remedy = "to know θ better, measure the target from the study's own starts and leave the pre-flight on"
     if study.target.counts.min() >= 2:
         between = _shrunk(np.moveaxis(_apart(study.target.values), 1, 0))
         caution = f"noise is estimated from the spread between the target's episodes, which is too large; {remedy}"
-        return Noise(between * (1.0 / driven + 1.0 / measured), caution)
+        return NoiseVariance(between * (1.0 / driven + 1.0 / measured), caution)
     spread = np.ptp(study.target.means, axis=0) * UNKNOWN
     caution = f"noise is unknown and assumed to be {UNKNOWN:.0%} of the spread between agents; {remedy}"
-    return Noise(np.broadcast_to(spread**2, study.target.means.shape), caution)
+    return NoiseVariance(np.broadcast_to(spread**2, study.target.means.shape), caution)
 
 
 def shares_starts(study: Study) -> bool:

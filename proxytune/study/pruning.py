@@ -22,12 +22,20 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.domain import Episode, Instance, Outcome
-from proxytune.search import Goal, Knowledge, batch_at, expected_gain, expected_improvement, fit_surrogate, learn
+from proxytune.search import Goal, Knowledge, batch_at, expected_gain, expected_improvement, fit_surrogate, learn_theta
 from proxytune.storage import TrialRecord
 from proxytune.study.opening import PRPV, Study
 from proxytune.study.preflight import noise_of
 from proxytune.study.settings import StopRules
-from proxytune.study.study_run import Spent, StudyRun, compose_of, disagreement_of, plan, score_trials, table
+from proxytune.study.study_run import (
+    Spent,
+    StudyRun,
+    compose_of,
+    disagreement_of,
+    plan_episodes,
+    score_table,
+    score_trials,
+)
 
 FEWEST = 3
 """Trials that must have been scored before one is cut off: fewer say nothing of noise."""
@@ -36,7 +44,7 @@ PRIOR_DISAGREEMENT = 1e-3
 
 
 @dataclass(frozen=True)
-class Reference:
+class PruningRule:
     """What the evaluations of a batch are held against: a function of the trials finished before it.
 
     Attributes:
@@ -52,7 +60,7 @@ class Reference:
 
 
 @dataclass(frozen=True)
-class Cut:
+class Pruned:
     """An evaluation that was cut off.
 
     Attributes:
@@ -66,7 +74,7 @@ class Cut:
     estimate: float
 
 
-def reference(run: StudyRun, done: Sequence[TrialRecord]) -> Reference | None:
+def pruning_rule(run: StudyRun, done: Sequence[TrialRecord]) -> PruningRule | None:
     """What the next trials are held against; None where none is to be cut off.
 
     That is so during the design, on which all else rests; where a tolerance is a percentage: what is a tie then depends
@@ -86,10 +94,10 @@ def reference(run: StudyRun, done: Sequence[TrialRecord]) -> Reference | None:
     disagreement = PRIOR_DISAGREEMENT + np.mean([matrix for matrix in pairs if matrix is not None], axis=0)
     rows = _telling_first(disagreement)
     limit = float(means.min()) + surrogate.noise_deviation
-    return Reference(limit, tuple(agents[row] for row in rows), disagreement[np.ix_(rows, rows)])
+    return PruningRule(limit, tuple(agents[row] for row in rows), disagreement[np.ix_(rows, rows)])
 
 
-def run_or_cut(run: StudyRun, trials: Sequence[TrialRecord], against: Reference, what: str) -> list[Cut | None]:
+def run_or_prune(run: StudyRun, trials: Sequence[TrialRecord], against: PruningRule, what: str) -> list[Pruned | None]:
     """Simulate what is missing of the trials until each is through or cut off.
 
     Episodes that other processes have begun by then are kept in the store, but no trial stands on them.
@@ -105,18 +113,18 @@ def run_or_cut(run: StudyRun, trials: Sequence[TrialRecord], against: Reference,
     def enough(instance: Instance, known: Mapping[Episode, Outcome]) -> bool:
         # The bound never falls, so the last of the agents decided tells for those before it.
         count = _decided(study, against, plan_of[instance], known)
-        return count >= 2 and _cut_at(study, against, plan_of[instance], known, count) is not None
+        return count >= 2 and _pruned_at(study, against, plan_of[instance], known, count) is not None
 
     run.outcomes(planned, what, enough)
     known = run.known(planned)
-    cuts = [_first_cut(study, against, one, known) for one in plans]
+    cuts = [_first_pruning(study, against, one, known) for one in plans]
     run.watcher.begin(what, len(planned) - len(known))
     vain = [e for cut, one in zip(cuts, plans, strict=True) if cut for e in one if e.agent not in cut.decided]
     run.spent += Spent(unused=sum(episode in known and episode not in before for episode in vain))
     return cuts
 
 
-def by_other_metrics(run: StudyRun, trial: TrialRecord) -> TrialRecord:
+def rescored_pruned(run: StudyRun, trial: TrialRecord) -> TrialRecord:
     """What a trial that was cut off comes to by the study's metrics, if others had led to its end.
 
     Its agents decided then bound PRPV now (beside a tolerance in percent only nearly); the estimate takes every other
@@ -124,7 +132,7 @@ def by_other_metrics(run: StudyRun, trial: TrialRecord) -> TrialRecord:
     """
     outcomes = run.known(run.episodes_of(trial)).values()
     worked = [outcome for outcome in outcomes if outcome.metrics is not None]
-    bound = float(disagreement_of(run.study, table(worked), trial.decided).sum())
+    bound = float(disagreement_of(run.study, score_table(worked), trial.decided).sum())
     driven, agents = len(trial.decided), len(run.settings.agents)
     return replace(trial, bound=bound, score=bound * agents * (agents - 1) / (driven * (driven - 1)))
 
@@ -135,47 +143,49 @@ def spared(run: StudyRun, trials: Sequence[TrialRecord]) -> tuple[int, float]:
     Those that other processes had begun in vain are not among them.
     """
     settings, seconds = run.settings, run.store.seconds()
-    planned = [episode for trial in trials if trial.decided for episode in plan(settings, trial.theta, settings.seed)]
+    planned = [
+        episode for trial in trials if trial.decided for episode in plan_episodes(settings, trial.theta, settings.seed)
+    ]
     known = run.known(planned)
     missing = [episode for episode in planned if episode not in known]
     return len(missing), sum(seconds.get((episode.agent, episode.start), 0.0) for episode in missing)
 
 
-def _in_order(study: Study, trial: TrialRecord, against: Reference) -> list[Episode]:
+def _in_order(study: Study, trial: TrialRecord, against: PruningRule) -> list[Episode]:
     """The episodes of a trial, agent by agent as they are driven."""
     place = {agent: number for number, agent in enumerate(against.order)}
-    planned = plan(study.settings, trial.theta, study.settings.seed)
+    planned = plan_episodes(study.settings, trial.theta, study.settings.seed)
     return sorted(planned, key=lambda episode: place[episode.agent])
 
 
-def _first_cut(
-    study: Study, against: Reference, planned: Sequence[Episode], known: Mapping[Episode, Outcome]
-) -> Cut | None:
+def _first_pruning(
+    study: Study, against: PruningRule, planned: Sequence[Episode], known: Mapping[Episode, Outcome]
+) -> Pruned | None:
     """The cut by the fewest agents; None if the trial is through."""
     last = _decided(study, against, planned, known)
-    cuts = (_cut_at(study, against, planned, known, count) for count in range(2, last + 1))
+    cuts = (_pruned_at(study, against, planned, known, count) for count in range(2, last + 1))
     return next((found for found in cuts if found is not None), None)
 
 
-def _decided(study: Study, against: Reference, planned: Sequence[Episode], known: Mapping[Episode, Outcome]) -> int:
+def _decided(study: Study, against: PruningRule, planned: Sequence[Episode], known: Mapping[Episode, Outcome]) -> int:
     """How many agents, in their order and without the last, have been driven from all starts."""
     starts, most = study.settings.starts, len(against.order) - 1
     through = (all(e in known for e in planned[row * starts : (row + 1) * starts]) for row in range(most))
     return next((row for row, done in enumerate(through) if not done), most)
 
 
-def _cut_at(
-    study: Study, against: Reference, planned: Sequence[Episode], known: Mapping[Episode, Outcome], count: int
-) -> Cut | None:
+def _pruned_at(
+    study: Study, against: PruningRule, planned: Sequence[Episode], known: Mapping[Episode, Outcome], count: int
+) -> Pruned | None:
     """Whether the first so many agents are enough to cut off."""
     names = against.order[:count]
     worked = [known[episode] for episode in planned[: count * study.settings.starts] if known[episode].metrics]
     if {outcome.episode.agent for outcome in worked} != set(names):
         # An agent that failed from every start leaves the trial without a score, not with a bad one.
         return None
-    bound = float(disagreement_of(study, table(worked), names).sum())
+    bound = float(disagreement_of(study, score_table(worked), names).sum())
     share = against.disagreement[:count, :count].sum() / against.disagreement.sum()
-    return Cut(names, bound, float(bound / share)) if bound > against.limit else None
+    return Pruned(names, bound, float(bound / share)) if bound > against.limit else None
 
 
 def _telling_first(disagreement: Floats) -> list[int]:
@@ -202,7 +212,7 @@ def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> Knowledge:
         RunError: If no trial has an outcome, or the store lacks episodes of one.
     """
     trials = [run.search_trial(trial) for trial in done]
-    return learn(run.settings.space, trials, goal_of(run), run.settings.seed)
+    return learn_theta(run.settings.space, trials, goal_of(run), run.settings.seed)
 
 
 FILE_REMEDY = "raise or remove it to continue"
@@ -227,7 +237,7 @@ def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
 def seconds_of(run: StudyRun, done: Sequence[TrialRecord]) -> float:
     """How long the episodes of finished trials have taken, all runs together, divided by the processes [s]."""
     settings = run.settings
-    seeds = {episode.seed for episode in plan(settings, {}, settings.seed)}
+    seeds = {episode.seed for episode in plan_episodes(settings, {}, settings.seed)}
     return run.store.seconds_of_trials(run.study.objective.name, len(done), seeds) / settings.jobs
 
 

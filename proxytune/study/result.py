@@ -28,7 +28,15 @@ from proxytune.study.opening import Study
 from proxytune.study.preflight import Preflight, noise_of, preflight_of
 from proxytune.study.pruning import knowledge_of, spared, stopped
 from proxytune.study.settings import StudySettings
-from proxytune.study.study_run import StudyRun, failure_of, in_common, plan, score, score_trials, table
+from proxytune.study.study_run import (
+    StudyRun,
+    evaluate_outcomes,
+    failure_of,
+    in_common,
+    plan_episodes,
+    score_table,
+    score_trials,
+)
 from proxytune.usefulness import Assessment, NoiseFloor, assess, floor_of_repeats
 
 CANDIDATES = 3
@@ -36,7 +44,7 @@ CANDIDATES = 3
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Finalist:
     """A visited θ that has been driven again.
 
     Attributes:
@@ -67,8 +75,8 @@ class Confirmation:
         episodes: How many fresh episodes each was driven in.
     """
 
-    answer: Candidate
-    candidates: tuple[Candidate, ...]
+    answer: Finalist
+    candidates: tuple[Finalist, ...]
     episodes: int
 
 
@@ -138,19 +146,19 @@ def most_confirmation_episodes(settings: StudySettings) -> int:
 def _plans(settings: StudySettings, trial: TrialRecord) -> list[list[Episode]]:
     """The episodes of each fresh repetition of a trial."""
     seeds = [fresh_seed(settings.seed, repetition) for repetition in range(1, settings.confirm + 1)]
-    return [plan(settings, trial.theta, seed) for seed in seeds]
+    return [plan_episodes(settings, trial.theta, seed) for seed in seeds]
 
 
-def _driven_again(run: StudyRun, trial: TrialRecord) -> Candidate | None:
+def _driven_again(run: StudyRun, trial: TrialRecord) -> Finalist | None:
     repetitions = []
     for planned in _plans(run.settings, trial):
         known = run.known(planned)
         if len(known) < len(planned):
             return None
         repetitions.append(list(known.values()))
-    scores = tuple(score(run.study, trial.theta, outcomes).score for outcomes in repetitions)
-    own = list(run.known(plan(run.settings, trial.theta, run.settings.seed)).values())
-    return Candidate(trial, scores, _assessed(run.study, own, repetitions))
+    scores = tuple(evaluate_outcomes(run.study, trial.theta, outcomes).score for outcomes in repetitions)
+    own = list(run.known(plan_episodes(run.settings, trial.theta, run.settings.seed)).values())
+    return Finalist(trial, scores, _assessed(run.study, own, repetitions))
 
 
 def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
@@ -167,11 +175,11 @@ def _assessed(study: Study, own: list[Outcome], runs: Sequence[Sequence[Outcome]
     if {agent for agent, _ in scored} != set(study.settings.agents):
         return None
     proxy, metrics = ScoreTable.from_episodes(in_common(scored)), study.settings.metrics
-    floor = floor_of_repeats(domain=table(own), again=proxy, metrics=metrics)
+    floor = floor_of_repeats(domain=score_table(own), again=proxy, metrics=metrics)
     return assess(proxy=proxy, target=study.target, metrics=metrics, floor=floor)
 
 
-def _answer(known: Sequence[Candidate], learnt: Knowledge) -> Candidate:
+def _answer(known: Sequence[Finalist], learnt: Knowledge) -> Finalist:
     """Each candidate has as many fresh episodes, so what fresh noise does to all of them alike favours none."""
     expected = [learnt.expected[learnt.space.values(one.trial.theta)] for one in known]
     scores = [[mean, *(s for s in one.scores if s is not None)] for mean, one in zip(expected, known, strict=True)]

@@ -10,22 +10,22 @@ from typing import Any
 
 from proxytune.errors import InputError, RunError, SettingsError, StoreError
 from proxytune.scores import Metric
-from proxytune.search import Propose, Proposer, Search, Trial
+from proxytune.search import BatchPoints, Proposer, Search, Trial
 from proxytune.settings import nearest
 from proxytune.storage import State, Store, TrialRecord
 from proxytune.study.facts import CODE, DESCRIBED, SEARCH, adopt, describe, differ
 from proxytune.study.opening import Objective, Study, changes, read_target, study_facts
 from proxytune.study.preflight import FACT as NOT_REPEATABLE, check_some_work
-from proxytune.study.pruning import Cut, by_other_metrics, reference, run_or_cut, stopped
+from proxytune.study.pruning import Pruned, pruning_rule, rescored_pruned, run_or_prune, stopped
 from proxytune.study.result import StudyResult, result_of
 from proxytune.study.settings import LEARNING
-from proxytune.study.study_run import Evaluation, StudyRun, plan
+from proxytune.study.study_run import Evaluation, StudyRun, plan_episodes
 
 OTHERS = (LEARNING, SEARCH, DESCRIBED, NOT_REPEATABLE)
 """Facts that trials do not depend on: of a search for learning value, which code proposed what, looks, and agents."""
 
 
-def run_study(run: StudyRun, proposer: Proposer) -> None:
+def run_trials(run: StudyRun, proposer: Proposer) -> None:
     """Run a study to the end of its budget, or until a rule stops it, from wherever it was left.
 
     The next batch is a function of the seed and the trials before it alone, and an episode that has been simulated is
@@ -76,24 +76,24 @@ class StudyTrials:
             raise RunError(f"all {len(self._done)} trials failed; the first: {self._done[0].failure}")
         return why
 
-    def evaluate(self, batch: range, propose: Propose) -> None:
+    def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Simulate what is left of a batch, all its trials together, and keep how they ended."""
         trials = self._open(batch, propose)
         what = _name_trials(trials, self._run.settings.budget)
-        against = reference(self._run, self._done[: batch.start])
+        against = pruning_rule(self._run, self._done[: batch.start])
         if against is None:
             outcomes = self._run.outcomes([one for trial in trials for one in self._run.episodes_of(trial)], what)
             if not self._done:
                 check_some_work(outcomes.values(), what)
-            cuts: list[Cut | None] = [None] * len(trials)
+            cuts: list[Pruned | None] = [None] * len(trials)
         else:
-            cuts = run_or_cut(self._run, trials, against, what)
+            cuts = run_or_prune(self._run, trials, against, what)
         ended = [_end(self._run, trial, cut) for trial, cut in zip(trials, cuts, strict=True)]
         self._run.save_trials(*ended)
         self._done += ended
         self._tell(ended)
 
-    def _open(self, batch: range, propose: Propose) -> list[TrialRecord]:
+    def _open(self, batch: range, propose: BatchPoints) -> list[TrialRecord]:
         """What is left of a batch: open trials in the store, or else proposed, and in the store from now on."""
         done = len(self._done)
         trials = [trial for trial in self._run.open_trials() if done < trial.number <= batch.stop]
@@ -128,7 +128,7 @@ def came_to(trial: TrialRecord, objective: Objective) -> str:
     return "failed" if trial.score is None else f"{objective.label} {objective.sign * trial.score:g}"
 
 
-def _end(run: StudyRun, trial: TrialRecord, cut: Cut | None) -> TrialRecord:
+def _end(run: StudyRun, trial: TrialRecord, cut: Pruned | None) -> TrialRecord:
     """A trial as its episodes, all or those up to the cut, leave it."""
     if cut is None:
         return record(trial.number, run.evaluation_of(trial))
@@ -235,7 +235,7 @@ def rescored(run: StudyRun, metrics: Sequence[Metric]) -> StudyResult:
 
 def _rescored(other: StudyRun, trial: TrialRecord) -> TrialRecord:
     if trial.state == "cut":
-        return by_other_metrics(other, trial)
+        return rescored_pruned(other, trial)
     return record(trial.number, other.evaluation_of(trial))
 
 
@@ -249,7 +249,7 @@ def retry_failed(run: StudyRun) -> None:
     """
     for trial in run.finished_trials():
         if trial.failed_episodes and _has_changed(run, trial):
-            run.outcomes(plan(run.settings, trial.theta, run.settings.seed), f"trial {trial.number} again")
+            run.outcomes(plan_episodes(run.settings, trial.theta, run.settings.seed), f"trial {trial.number} again")
             run.save_trials(record(trial.number, run.evaluation_of(trial)))
 
 

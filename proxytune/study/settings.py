@@ -385,7 +385,7 @@ def _space(parameters: Section) -> Space:
     return Space(tuple(Interval(name, *parameters.bounds(name)) for name in sorted(parameters.values)))
 
 
-def as_document(settings: StudySettings) -> Mapping[str, Any]:
+def settings_document(settings: StudySettings) -> Mapping[str, Any]:
     """The settings as plain texts and numbers, for reports."""
     return {
         "path": str(settings.path),

@@ -59,7 +59,7 @@ class Evaluation:
         return self.measures.get("prpv")
 
 
-def plan(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
+def plan_episodes(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
     """The episodes that score a domain instance: every agent from every start."""
     instance, seeds = instance_of(theta), [episode_seed(seed, start) for start in range(settings.starts)]
     return [Episode(instance, agent, start, own) for agent in settings.agents for start, own in enumerate(seeds)]
@@ -93,7 +93,7 @@ def longest_first(episodes: Sequence[Episode], seconds: Mapping[tuple[str, int],
     return sorted(episodes, key=lambda episode: -seconds.get((episode.agent, episode.start), float("inf")))
 
 
-def score(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation:
+def evaluate_outcomes(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation:
     """Compare the outcomes of a domain instance's episodes with the target; a pure function.
 
     Each agent is scored over its own episodes that worked. A failed episode has no score, so none is made up for it;
@@ -105,7 +105,7 @@ def score(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -> Evaluation
         if failed.episode.agent not in worked:
             reason = f"agent '{failed.episode.agent}' failed from every start, first with: {failed.failure}"
             return Evaluation(theta, None, {}, None, failures, reason)
-    proxy, objective = table(outcomes), study.objective
+    proxy, objective = score_table(outcomes), study.objective
     measures = objective.measure(proxy=proxy, target=study.target, metrics=study.settings.metrics)
     value = measures[objective.name]
     reason = "" if value is not None else f"{objective.label} is undefined here"
@@ -123,7 +123,7 @@ def disagreement_of(study: Study, proxy: ScoreTable, agents: Sequence[str]) -> F
     return np.abs(ranked[0] - ranked[1])
 
 
-def table(outcomes: Sequence[Outcome]) -> ScoreTable:
+def score_table(outcomes: Sequence[Outcome]) -> ScoreTable:
     """The scores of the episodes that worked, labelled by their start, in the metrics that all of them have."""
     worked = {(one.episode.agent, str(one.episode.start)): one.metrics for one in outcomes if one.metrics is not None}
     return ScoreTable.from_episodes(in_common(worked))
@@ -309,7 +309,7 @@ class StudyRun:
         Raises:
             EpisodeError: If an episode fails and the study is to stop then.
         """
-        self.outcomes(plan(self.settings, theta, self.settings.seed), what)
+        self.outcomes(plan_episodes(self.settings, theta, self.settings.seed), what)
         evaluation = self.evaluation(theta)
         assert evaluation is not None
         return evaluation
@@ -318,11 +318,11 @@ class StudyRun:
         """The score of a domain instance; None if an episode of it has not been simulated."""
         key = instance_of(theta)
         if key not in self._evaluations:
-            planned = plan(self.settings, theta, self.settings.seed)
+            planned = plan_episodes(self.settings, theta, self.settings.seed)
             known = self.known(planned)
             if len(known) < len(planned):
                 return None
-            self._evaluations[key] = score(self.study, theta, list(known.values()))
+            self._evaluations[key] = evaluate_outcomes(self.study, theta, list(known.values()))
         return self._evaluations[key]
 
     def evaluation_of(self, trial: TrialRecord) -> Evaluation:
@@ -338,7 +338,7 @@ class StudyRun:
 
     def episodes_of(self, trial: TrialRecord) -> list[Episode]:
         """The episodes that a trial stands on: all, or those of the agents decided before it was cut off."""
-        planned = plan(self.settings, trial.theta, self.settings.seed)
+        planned = plan_episodes(self.settings, trial.theta, self.settings.seed)
         return [episode for episode in planned if not trial.decided or episode.agent in trial.decided]
 
     def search_trial(self, trial: TrialRecord) -> Trial:
@@ -385,7 +385,7 @@ def with_spending(study: Study, *, budget: int | None = None, jobs: int | None =
     return replace(study, settings=spending)
 
 
-def measure(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
+def measure_agents(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
     """Score the study's agents over its starts in the domain that a model describes.
 
     Every metric of the family is kept that all episodes have. Rows are in the order of the study's agents and starts,
@@ -426,7 +426,7 @@ def _drive(
 
 def _labelled(settings: StudySettings, seed: int, repeats: int) -> dict[Episode, str]:
     """Every episode with its label: by agent, then start, then repeat."""
-    runs = [plan(settings, {}, fresh_seed(seed, repeat)) for repeat in range(repeats)]
+    runs = [plan_episodes(settings, {}, fresh_seed(seed, repeat)) for repeat in range(repeats)]
     return {
         episode: f"{episode.start}/{repeat}" if repeats > 1 else str(episode.start)
         for alike in zip(*runs, strict=True)

@@ -26,23 +26,32 @@ from proxytune.learning import (
     POSTERIOR_DRAWS,
     Cache,
     Convergence,
-    Curve,
     Distribution,
-    Estimate,
     Learner,
+    LearningCurve,
+    LearningEstimate,
     SampleNeeds,
-    Teaching,
     TeachingSettings,
+    TeachingValue,
     curves_of,
-    difference,
-    estimate,
+    estimate_figure,
     learner_identity,
     mean_score,
-    teaching,
+    more_needed,
+    teaching_value,
 )
 from proxytune.running import Watcher
 from proxytune.space import Theta
-from proxytune.study import Lesson, StudyRun, StudySettings, best_teacher, check_bounds, load_family, plan, score
+from proxytune.study import (
+    Lesson,
+    StudyRun,
+    StudySettings,
+    best_teaching_family,
+    check_bounds,
+    evaluate_outcomes,
+    load_family,
+    plan_episodes,
+)
 from proxytune.teaching.examining import count_examinations, examine_curves, needs_of
 from proxytune.teaching.points import TeachingSetup
 from proxytune.usefulness import (
@@ -75,10 +84,10 @@ class TeacherResult:
 
     name: str
     proxy: Distribution
-    curve: Curve
-    zero_shot: Estimate
-    worth: Teaching | None
-    cost: Estimate | None
+    curve: LearningCurve
+    zero_shot: LearningEstimate
+    worth: TeachingValue | None
+    cost: LearningEstimate | None
 
 
 @dataclass(frozen=True)
@@ -98,7 +107,7 @@ class Experiment:
     teachers: tuple[TeacherResult, ...]
 
     @property
-    def without(self) -> Curve:
+    def without(self) -> LearningCurve:
         """The learning curve without a proxy."""
         return self.needs.curves[NONE]
 
@@ -157,7 +166,7 @@ def run_experiment(settings: StudySettings, setup: TeachingSetup, watcher: Watch
     return judge_curves(settings, setup, curves_of(setup.settings.target_samples, scores))
 
 
-def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, Curve]) -> Experiment:
+def judge_curves(settings: StudySettings, setup: TeachingSetup, curves: Mapping[str, LearningCurve]) -> Experiment:
     """Judge each proxy by the learning curves: a pure function of them and of what counts as converged."""
     needs = needs_of(setup, curves)
     teachers = [_teacher(setup.settings, needs, name, proxy) for name, proxy in setup.settings.proxies.items()]
@@ -168,17 +177,17 @@ def _teacher(taught: TeachingSettings, needs: SampleNeeds, name: str, proxy: Dis
     zero_shot, curve = mean_score(needs, name, 0), needs.curves[name]
     if not needs.settled:
         return TeacherResult(name, proxy, curve, zero_shot, None, None)
-    worth = teaching(needs, none=NONE, proxy=name)
+    worth = teaching_value(needs, none=NONE, proxy=name)
     return TeacherResult(name, proxy, curve, zero_shot, worth, _cost_saved(taught, needs, name))
 
 
-def _cost_saved(taught: TeachingSettings, needs: SampleNeeds, name: str) -> Estimate:
+def _cost_saved(taught: TeachingSettings, needs: SampleNeeds, name: str) -> LearningEstimate:
     """PLV in cost (eq. 6)."""
 
     def saved(without: Floats, needed: Floats) -> Floats:
         return taught.cost_saved(without=without, needed=needed)
 
-    return estimate(saved, needs, more=NONE, less=name)
+    return estimate_figure(saved, needs, more=NONE, less=name)
 
 
 def check_proxies(settings: StudySettings, setup: TeachingSetup) -> None:
@@ -272,10 +281,10 @@ def teach_families(
         raise next(iter(failed.values()))
     needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
     lessons = {name: _lesson(needs, name, thetas[name]) for name in rooms if name not in failed}
-    best = best_teacher(lessons)
+    best = best_teaching_family(lessons)
     if best is not None:
         lessons = {
-            name: lesson if name == best else replace(lesson, more=difference(needs, more=name, less=best))
+            name: lesson if name == best else replace(lesson, more=more_needed(needs, more=name, less=best))
             for name, lesson in lessons.items()
         }
     lessons |= {name: Lesson(thetas[name], failure=str(problem)) for name, problem in failed.items()}
@@ -291,7 +300,7 @@ def _lesson(needs: SampleNeeds, name: str, theta: Theta) -> Lesson:
     zero_shot = mean_score(needs, name, 0).value or 0.0
     if not needs.settled:
         return Lesson(theta, zero_shot)
-    worth = teaching(needs, none=NONE, proxy=name)
+    worth = teaching_value(needs, none=NONE, proxy=name)
     return Lesson(theta, zero_shot, worth.needed, worth.plv)
 
 
@@ -300,7 +309,7 @@ SURE = 0.95
 
 
 @dataclass(frozen=True)
-class Agreement:
+class RankAgreement:
     """How far two rankings of the same proxies agree.
 
     Attributes:
@@ -319,7 +328,7 @@ class Agreement:
     proxies: int
 
 
-def agreement(names: Sequence[str], first: Floats, second: Floats) -> Agreement:
+def agreement(names: Sequence[str], first: Floats, second: Floats) -> RankAgreement:
     """Compare two rankings, each from draws (draws, proxies) in which more is better; ties count for neither order."""
     one, other = _orders(first), _orders(second)
     above, below = np.triu_indices(len(names), 1)
@@ -329,7 +338,7 @@ def agreement(names: Sequence[str], first: Floats, second: Floats) -> Agreement:
     ahead = np.argwhere(contrary & (_sure(other) > 0))
     low, middle, high = np.quantile(taus, (LEVELS[0], 0.5, LEVELS[1]))
     named = tuple((names[better], names[worse]) for better, worse in ahead)
-    return Agreement(float(middle), float(low), float(high), named, len(names))
+    return RankAgreement(float(middle), float(low), float(high), named, len(names))
 
 
 def _orders(values: Floats) -> Floats:
@@ -384,7 +393,7 @@ def predictivity(run: StudyRun, proxies: Mapping[str, Distribution]) -> dict[str
 def _predictivity(run: StudyRun, name: str, proxy: Distribution) -> Predictivity | None:
     study, planned = run.study, _planned(run, proxy)
     found = run.outcomes(planned, f"agents in {name}")
-    evaluation = score(study, proxy.centre, [found[episode] for episode in planned])
+    evaluation = evaluate_outcomes(study, proxy.centre, [found[episode] for episode in planned])
     if evaluation.proxy is None or evaluation.prpv is None:
         return None
     inputs = compare(proxy=evaluation.proxy, target=study.target, metrics=study.settings.metrics)
@@ -399,7 +408,7 @@ def _predictivity(run: StudyRun, name: str, proxy: Distribution) -> Predictivity
 def _planned(run: StudyRun, proxy: Distribution) -> list[Episode]:
     """Every agent from every start, θ drawn for each start where it is not fixed."""
     settings = run.settings
-    drawn = [plan(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
+    drawn = [plan_episodes(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
     return [episode for start, planned in enumerate(drawn) for episode in planned if episode.start == start]
 
 
@@ -413,8 +422,8 @@ class Observations:
         poor_predictors: Proxies that save samples though their PRPV is such as chance gives.
     """
 
-    zero_shot: Agreement | None
-    prpv: Agreement | None
+    zero_shot: RankAgreement | None
+    prpv: RankAgreement | None
     poor_predictors: tuple[str, ...]
 
 
@@ -437,7 +446,7 @@ def observe(experiment: Experiment, prpv: Mapping[str, Predictivity | None]) -> 
     )
 
 
-def _agreement(experiment: Experiment, figures: Mapping[str, Floats]) -> Agreement | None:
+def _agreement(experiment: Experiment, figures: Mapping[str, Floats]) -> RankAgreement | None:
     """How proxies rank by a figure of which more is better, its draws by name, and by PLV; None of fewer than two."""
     names = list(figures)
     if len(names) < 2:

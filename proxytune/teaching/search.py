@@ -23,21 +23,21 @@ from proxytune.errors import LearnerError, RunError
 from proxytune.learning import (
     NONE,
     Convergence,
-    Curve,
     Distribution,
-    Estimate,
+    ExaminationScores,
+    LearningCurve,
+    LearningEstimate,
     SampleNeeds,
-    Scores,
-    Teaching,
     TeachingSettings,
+    TeachingValue,
     curves_of,
-    difference,
     mean_score,
-    teaching,
+    more_needed,
+    teaching_value,
 )
 from proxytune.running import Watcher
 from proxytune.search import (
-    Propose,
+    BatchPoints,
     Proposer,
     Search,
     Surrogate,
@@ -55,7 +55,7 @@ from proxytune.storage import Store, TrialRecord
 from proxytune.study import StudySettings, nothing_to_gain, out_of_time, score_trials
 from proxytune.teaching.examining import count_examinations, examine_curves, needs_of, prepare_points
 from proxytune.teaching.experiment import Experiment, TeacherResult, judge_curves, teaching_settings
-from proxytune.teaching.points import WIDTH, Point, TeachingSetup, distribution
+from proxytune.teaching.points import WIDTH, CurvePoint, TeachingSetup, distribution
 
 BEST, SINGLE, BOX, BY_PRPV = "best p(θ)", "best single θ", "all of the box", "lowest PRPV"
 CLOUD = 4096
@@ -64,7 +64,7 @@ CLOSER = 2
 
 
 @dataclass(frozen=True)
-class Confirmation:
+class TaughtFinalists:
     """What the finalists are worth under fresh seeds.
 
     Attributes:
@@ -113,9 +113,9 @@ def _closer(taught: TeachingSettings) -> TeachingSettings:
     return replace(taught, examinations=taught.examinations and CLOSER * taught.examinations)
 
 
-def confirm(
+def teach_finalists(
     settings: StudySettings, setup: TeachingSetup, named: Mapping[str, Distribution], watcher: Watcher
-) -> Confirmation:
+) -> TaughtFinalists:
     """Teach the finalists and the learner without a proxy under fresh seeds."""
     taught = _closer(setup.settings)
     fresh = replace(setup, seed=fresh_seed(setup.seed, 1), settings=taught)
@@ -123,13 +123,13 @@ def confirm(
     able = {name: proxy for name, proxy in named.items() if name not in unable}
     fresh = replace(fresh, settings=replace(taught, proxies=able))
     scores = examine_curves(fresh, {NONE: None, **able}, settings.jobs, watcher)
-    return Confirmation(judge_curves(settings, fresh, curves_of(taught.target_samples, scores)), unable)
+    return TaughtFinalists(judge_curves(settings, fresh, curves_of(taught.target_samples, scores)), unable)
 
 
 def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:
     """Why a proxy cannot teach, empty if it can: nobody has driven in it before, and its expert may leave the road."""
     try:
-        prepare_points(setup, [Point(name, proxy, 0, 0)], jobs=1)
+        prepare_points(setup, [CurvePoint(name, proxy, 0, 0)], jobs=1)
     except LearnerError as problem:
         return str(problem)
     return ""
@@ -146,9 +146,9 @@ def _plv(one: TeacherResult) -> float:
     return -np.inf if value is None else value
 
 
-def saves_more(experiment: Experiment, name: str, other: str) -> Estimate:
+def saves_more(experiment: Experiment, name: str, other: str) -> LearningEstimate:
     """How many target samples one proxy saves more than another: what the other needs less what the one needs."""
-    return difference(experiment.needs, more=other, less=name)
+    return more_needed(experiment.needs, more=other, less=name)
 
 
 def _points(surrogate: Surrogate, seed: int) -> Floats:
@@ -170,7 +170,7 @@ def _without_width(theta: Theta) -> Theta:
 RAISE = "raise teaching.target_samples"
 
 
-class Unknown(NamedTuple):
+class PlvUnknown(NamedTuple):
     """Why PLV is not known.
 
     Attributes:
@@ -182,20 +182,20 @@ class Unknown(NamedTuple):
     remedy: str
 
 
-def why_unknown(needs: SampleNeeds) -> Unknown | None:
+def why_unknown(needs: SampleNeeds) -> PlvUnknown | None:
     """Why nothing is known of PLV, or no more than a bound; None where it is known."""
     last, tolerance = f"{needs.last:g}", f"{needs.when.tolerance:g}"
     if needs.gain is None:
         reason = f"teaching.target_samples has no number from 1 to half of {last} that would show a rise towards it"
-        return Unknown(reason, f"add numbers between 0 and {last} to teaching.target_samples")
+        return PlvUnknown(reason, f"add numbers between 0 and {last} to teaching.target_samples")
     if not needs.settled:
         reason = (
             f"without a proxy the score still rises by more than {tolerance} over the last doubling to {last} samples"
         )
-        return Unknown(reason, RAISE)
+        return PlvUnknown(reason, RAISE)
     if not np.isfinite(np.median(needs.needed[NONE])):
         reason = f"without a proxy the score does not come to {needs.when.threshold:g} within {last} samples"
-        return Unknown(reason, f"lower teaching.level, or {RAISE}")
+        return PlvUnknown(reason, f"lower teaching.level, or {RAISE}")
     return None
 
 
@@ -218,9 +218,9 @@ class PlvTrial:
     number: int
     theta: Theta
     proxy: Distribution
-    curve: Curve
-    worth: Teaching
-    zero_shot: Estimate
+    curve: LearningCurve
+    worth: TeachingValue
+    zero_shot: LearningEstimate
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ class PlvStudy:
 
     settings: StudySettings
     space: Space
-    without: Curve
+    without: LearningCurve
     when: Convergence
     trials: tuple[PlvTrial, ...]
     stopped: str
@@ -303,7 +303,7 @@ class PlvSearch:
         self.watcher.begin("learning", count_examinations(taught, tried.done))
         Search(self.space, proposer, settings.seed, taught.budget, settings.initial, settings.batch).run(tried)
         named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
-        last = confirm(settings, self.setup, named, self.watcher)
+        last = teach_finalists(settings, self.setup, named, self.watcher)
         trials, ended = tuple(tried.tried()), tried.ended()
         return PlvStudy(
             settings, self.space, needs.curves[NONE], needs.when, trials, ended, last.experiment, last.unable
@@ -332,7 +332,7 @@ class PlvSearch:
 class ProxyTrials:
     """The proxies tried, as the search loop evaluates them."""
 
-    def __init__(self, search: PlvSearch, alone: Scores) -> None:
+    def __init__(self, search: PlvSearch, alone: ExaminationScores) -> None:
         self._search, self._alone = search, alone
         self._records = [trial for trial in search.store.trials(OBJECTIVE) if trial.state != "open"]
 
@@ -358,7 +358,7 @@ class ProxyTrials:
             return ""
         return nothing_to_gain("PLV", expected_improvement(search.space, self.trials(), search.settings.seed), rules)
 
-    def evaluate(self, batch: range, propose: Propose) -> None:
+    def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Teach from what is left of a batch of proxies, all together, and keep what each was worth."""
         begun = time.perf_counter()
         points = list(zip(batch, propose(), strict=True))[len(self._records) - batch.start :]
@@ -389,7 +389,7 @@ class ProxyTrials:
         setup, proxy = search.setup, distribution(search.setup, theta)
         scores = examine_curves(setup, {name: proxy}, search.settings.jobs, search.watcher, self._alone)
         needs = needs_of(setup, curves_of(setup.settings.target_samples, scores))
-        worth = teaching(needs, none=NONE, proxy=name)
+        worth = teaching_value(needs, none=NONE, proxy=name)
         return PlvTrial(number, theta, proxy, needs.curves[name], worth, mean_score(needs, name, 0))
 
 

@@ -8,7 +8,7 @@ from proxytune.cli.main import main
 from proxytune.errors import SettingsError, StoreError
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import StudyRun, check_facts, note_search, open_study, run_study, study_facts
+from proxytune.study import StudyRun, check_facts, note_search, open_study, run_trials, study_facts
 from proxytune.study.facts import SEARCH
 from proxytune.study.opening import changes
 from proxytune.study.run import as_stored
@@ -27,7 +27,7 @@ def newer(monkeypatch):
 def resumed(folder):
     with Store.open(folder) as store:
         study_run = StudyRun(open_study(folder), store)
-        run_study(study_run, make_proposer("gp", 5))
+        run_trials(study_run, make_proposer("gp", 5))
         return study_run.spent, store.trials()
 
 

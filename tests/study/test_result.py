@@ -23,12 +23,12 @@ from proxytune.study import (
     history_of,
     most_confirmation_episodes,
     open_study,
-    plan,
+    plan_episodes,
     result as confirmation,
     result_of,
     run_confirmation,
-    run_study,
-    table,
+    run_trials,
+    score_table,
 )
 from proxytune.study.pruning import knowledge_of
 from proxytune.study.result import CANDIDATES, candidates, confirmation_of
@@ -64,7 +64,7 @@ def test_the_answer_is_told_with_its_score_on_episodes_that_the_search_has_not_s
     assert answer.optimism == answer.scores[0] - answer.trial.prpv
     with Store.read(finished) as store:
         known = store.outcomes(found.study.identity, answer.trial.theta)
-    seen = plan(found.study.settings, answer.trial.theta, found.study.settings.seed)
+    seen = plan_episodes(found.study.settings, answer.trial.theta, found.study.settings.seed)
     assert len(set(known) - set(seen)) == ONE
     assert {e.seed for e in set(known) - set(seen)}.isdisjoint(e.seed for e in seen)
 
@@ -93,7 +93,7 @@ def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_lik
 
 def plant(study, store, trial, shift):
     """Fresh episodes of this trial in which the agents rank as on the target, or the other way round."""
-    for episode in plan(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
+    for episode in plan_episodes(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
         row = study.target.agents.index(episode.agent)
         metrics = dict(zip(study.target.metrics, (shift * study.target.means[row]).tolist(), strict=True))
         store.save_outcome(study.identity, Outcome(episode, metrics, "", 0.0))
@@ -120,9 +120,9 @@ def test_the_noise_floor_is_what_the_answer_s_own_trial_scores_against_its_fresh
     answer, study = found.confirmation.answer, found.study
     with Store.read(finished) as store:
         known = store.outcomes(study.identity, answer.trial.theta).values()
-    seeds = {episode.seed for episode in plan(study.settings, answer.trial.theta, study.settings.seed)}
+    seeds = {episode.seed for episode in plan_episodes(study.settings, answer.trial.theta, study.settings.seed)}
     own, fresh = ([o for o in known if (o.episode.seed in seeds) is mine] for mine in (True, False))
-    floor = prpv(proxy=table(fresh), target=table(own), metrics=study.settings.metrics).value
+    floor = prpv(proxy=score_table(fresh), target=score_table(own), metrics=study.settings.metrics).value
     assert (found.floor.kind, found.floor.value) == ("same starts", floor)
 
 
@@ -136,7 +136,7 @@ def test_trials_do_not_depend_on_it(finished, make_study):
     for study in (longer, other):
         with Store.open(study.settings.folder) as store:
             study_run = StudyRun(study, store)
-            run_study(study_run, make_proposer("gp", 5))
+            run_trials(study_run, make_proposer("gp", 5))
             trials.append(store.trials())
     assert trials[0] == trials[1]
     assert trials[0][:7] == before
@@ -177,7 +177,7 @@ def test_it_waits_for_the_end_of_the_study_which_a_rule_may_bring(make_study, fi
     study = opened(folder, stop=StopRules(no_improvement=1e9))
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer("gp", 5))
+        run_trials(study_run, make_proposer("gp", 5))
         assert len(store.trials()) == 5
     assert confirmed(folder, stop=StopRules(no_improvement=1e9))[0].episodes >= ONE
 
@@ -202,7 +202,7 @@ def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_s
     study = opened(finished)
     with Store.open(finished) as store:
         for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
-            for episode in plan(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
+            for episode in plan_episodes(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
                 if episode.agent == "agent3":
                     store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
     _, found = confirmed(finished)
@@ -306,7 +306,7 @@ def run(folder):
     study = open_study(folder)
     with Store.open(folder) as store:
         study_run = StudyRun(study, store)
-        run_study(study_run, make_proposer("gp", study.settings.initial))
+        run_trials(study_run, make_proposer("gp", study.settings.initial))
     return result_of_result(folder)
 
 

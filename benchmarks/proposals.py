@@ -29,7 +29,7 @@ from proxytune.search.outcomes import composed_scores
 from proxytune.search.surrogate import AMPLITUDE, LENGTH_SCALE, NOISE, GaussianProcess, maximise_gain, most_probable
 from proxytune.seeds import proposal_seed
 from proxytune.storage import Store
-from proxytune.study import StudyRun, as_stored, goal_of, open_study
+from proxytune.study import StudyRun, goal_of, open_study, stored_run
 from proxytune.usefulness import bootstrap_means, compare, prpv_of_means
 
 BUDGET, INITIAL = 40, 10
@@ -230,7 +230,7 @@ def predict_held_out(folder):
     """Print how well either model predicts the trials of a finished study that it was not told of."""
     opened = open_study(folder)
     with Store.read(opened.settings.folder) as store:
-        study = as_stored(opened, store)
+        study = stored_run(opened, store).study
         trials = [StudyRun(study, store).search_trial(trial) for trial in store.trials() if trial.prpv is not None]
         goal = goal_of(StudyRun(study, store))
     space = study.settings.space

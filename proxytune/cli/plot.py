@@ -30,11 +30,10 @@ from proxytune.study import (
     StudyResult,
     StudyRun,
     StudySettings,
-    open_to_look,
+    open_read_only,
     read_study_settings,
     rescored,
     result_of,
-    stored_run,
     with_metrics,
 )
 from proxytune.sweep import SweepCurve, all_curves
@@ -66,10 +65,10 @@ def run(arguments: argparse.Namespace) -> Answer:
         return redraw_families(settings)
     settings.check_single()
     with Store.read(settings.home) as store:
-        study = open_to_look(settings, store)
-        result, curves = _read(stored_run(study, store), metrics)
+        run = open_read_only(settings, store)
+        result, curves = _read(run, metrics)
     folder = _folder(settings.home, metrics)
-    figures = draw_curves(curves, folder / "figures", study.truth)
+    figures = draw_curves(curves, folder / "figures", run.study.truth)
     shown = result.study.settings if result else settings
     pages = [str(page) for page in _pages(shown, curves, folder / "figures", typed(arguments))]
     document: dict[str, Any] = {}

@@ -14,7 +14,7 @@ from proxytune.report import curve_document, draw_curves, held_values, sweep_tex
 from proxytune.running import Bars
 from proxytune.space import Theta
 from proxytune.storage import Store, SweepRecord, locked
-from proxytune.study import Study, StudyRun, adopt, open_study
+from proxytune.study import Study, StudyRun, open_study
 from proxytune.sweep import (
     best_theta,
     check_base,
@@ -67,7 +67,6 @@ def run(arguments: argparse.Namespace) -> Answer:
     per_point = len(study.settings.agents) + (discrepancy is not None)
     points = sum(len(sweep.points) for sweep in sweeps)
     with locked(folder), Store.open(folder) as store:
-        adopt(study, store)
         with Bars(points * per_point * study.settings.starts) as bars:
             run = StudyRun(study, store, bars)
             for sweep in sweeps:

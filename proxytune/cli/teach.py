@@ -10,7 +10,7 @@ from proxytune.cli.terminal.typed import typed
 from proxytune.report import study_foot, teach_document, teach_text, write_teach_report
 from proxytune.running import Bars
 from proxytune.storage import Store, locked
-from proxytune.study import StudyRun, adopt, open_study
+from proxytune.study import StudyRun, open_study
 from proxytune.teaching import check_proxies, count_examinations, load_setup, predictivity, run_experiment
 
 
@@ -32,7 +32,6 @@ def run(arguments: argparse.Namespace) -> Answer:
     check_proxies(study.settings, setup)
     proxies = setup.settings.proxies
     with locked(folder), Store.open(folder) as store:
-        adopt(study, store)
         with Bars(count_examinations(setup.settings, len(proxies) + 1), "points of learning curves") as bars:
             experiment = run_experiment(study.settings, setup, bars)
         agents = len(study.settings.agents) * study.settings.starts

@@ -1,4 +1,9 @@
-from .facts import adopt as adopt, note_search as note_search, open_to_look as open_to_look
+from .facts import (
+    check_facts as check_facts,
+    open_read_only as open_read_only,
+    stored_run as stored_run,
+    study_facts as study_facts,
+)
 from .families import (
     BestFamilies as BestFamilies,
     ComparedFamilies as ComparedFamilies,
@@ -22,31 +27,28 @@ from .opening import (
     open_settings as open_settings,
     open_study as open_study,
     read_target as read_target,
-    study_facts as study_facts,
 )
 from .preflight import (
     Preflight as Preflight,
     most_preflight_episodes as most_preflight_episodes,
     run_preflight as run_preflight,
 )
-from .pruning import goal_of as goal_of, nothing_to_gain as nothing_to_gain, out_of_time as out_of_time
 from .result import (
     Best as Best,
-    Confirmation as Confirmation,
     StudyResult as StudyResult,
     history_of as history_of,
-    most_confirmation_episodes as most_confirmation_episodes,
+    rescored as rescored,
     result_of as result_of,
-    run_confirmation as run_confirmation,
+    with_metrics as with_metrics,
 )
 from .run import (
-    as_stored as as_stored,
-    check_facts as check_facts,
-    rescored as rescored,
-    retry_failed as retry_failed,
+    Confirmation as Confirmation,
+    goal_of as goal_of,
+    most_confirmation_episodes as most_confirmation_episodes,
+    nothing_to_gain as nothing_to_gain,
+    out_of_time as out_of_time,
+    run_stages as run_stages,
     run_trials as run_trials,
-    stored_run as stored_run,
-    with_metrics as with_metrics,
 )
 from .settings import (
     FILE_NAME as FILE_NAME,

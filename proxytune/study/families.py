@@ -21,8 +21,8 @@ from proxytune.seeds import fresh_seed
 from proxytune.settings import is_finite
 from proxytune.space import Theta
 from proxytune.storage import FAMILIES
-from proxytune.study.pruning import seconds_of
 from proxytune.study.result import StudyResult
+from proxytune.study.run import seconds_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.study_run import StudyRun, plan_episodes
 from proxytune.usefulness import Assessment, Selection, interval, select_proxy

@@ -64,12 +64,6 @@ class UserFamily:
         """The family's; other agents behind the same names make it another."""
         return self._named(self._text("identity"))
 
-    @property
-    def earlier_identities(self) -> tuple[str, ...]:
-        """The family's, if it has any."""
-        earlier = ask(f"earlier_identities of {self.name}", lambda: self._member("earlier_identities"))
-        return () if earlier is MISSING else tuple(map(self._named, earlier))
-
     def check_agent(self, name: str) -> None:
         """Refuse an agent that the family cannot run.
 

@@ -8,7 +8,7 @@ import numpy as np
 from proxytune.search import Information
 from proxytune.search.posterior import Misfit, posterior_of
 from proxytune.study import Confirmation
-from proxytune.study.result import Finalist
+from proxytune.study.run import Finalist
 
 FITS, LACKS, UNTOLD = Misfit(1.0, 1.1, 0.4), Misfit(9.0, 1.1, 0.002), Misfit(1.0, None, None)
 AGENTS = (("agent4", 0.46), ("agent0", 0.3), ("agent1", 0.2), ("agent2", 0.04))

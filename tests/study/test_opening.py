@@ -10,8 +10,9 @@ from proxytune.errors import InputError, SettingsError
 from proxytune.report.study.tables import usefulness_table
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_confirmation, run_trials, study_facts
-from proxytune.study.opening import changes
+from proxytune.study import PRPV, StudyRun, goal_of, open_study, result_of, run_trials, study_facts
+from proxytune.study.facts import changes
+from proxytune.study.run import run_confirmation
 
 OWN = """
 import numpy as np

@@ -16,7 +16,8 @@ from proxytune.scores import Metric
 from proxytune.search import make_proposer
 from proxytune.storage import Store, TrialRecord
 from proxytune.study import StudyRun, goal_of, open_study, rescored, result_of, run_trials, score_trials
-from proxytune.study.pruning import pruning_rule, spared, stopped
+from proxytune.study.pruning import pruning_rule, spared
+from proxytune.study.run import stopped
 from proxytune.study.settings import StopRules
 
 BUDGET, ALL = 14, 8 * 3

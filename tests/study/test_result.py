@@ -24,14 +24,11 @@ from proxytune.study import (
     most_confirmation_episodes,
     open_study,
     plan_episodes,
-    result as confirmation,
     result_of,
-    run_confirmation,
     run_trials,
     score_table,
 )
-from proxytune.study.pruning import knowledge_of
-from proxytune.study.result import CANDIDATES, candidates, confirmation_of
+from proxytune.study.run import MOST_FINALISTS, confirmation_of, finalists, knowledge_of, run_confirmation
 from proxytune.study.settings import StopRules
 from proxytune.usefulness import assess
 from proxytune.usefulness.pairs import prpv
@@ -81,14 +78,14 @@ def test_candidates_are_the_lowest_expected_scores_within_the_noise_with_the_lik
     with Store.read(finished) as store:
         trials = store.trials()
         known = knowledge_of(StudyRun(study, store), trials)
-    chosen = [study.settings.space.values(trial.theta) for trial in candidates(trials, known)]
+    chosen = [study.settings.space.values(trial.theta) for trial in finalists(trials, known)]
     ranked = list(known.expected)
     noise = known.fresh_scores(ranked[0]).std()
     near = [values for values in ranked if known.expected[values] - known.expected[ranked[0]] <= noise]
     assert chosen[0] == known.answer == ranked[0]
     assert set(chosen) <= {*near, known.likeliest_of(ranked)}
     assert known.likeliest_of(ranked) in chosen
-    assert len(chosen) == min(CANDIDATES, len({*near, known.likeliest_of(ranked)}))
+    assert len(chosen) == min(MOST_FINALISTS, len({*near, known.likeliest_of(ranked)}))
 
 
 def plant(study, store, trial, shift):
@@ -103,8 +100,8 @@ def test_a_favourite_that_was_lucky_gives_way_to_a_rival_that_fresh_episodes_con
     study = opened(finished)
     with Store.open(finished) as store:
         trials = store.trials()
-        chosen = sorted(trials, key=lambda trial: trial.prpv)[:CANDIDATES]
-        monkeypatch.setattr(confirmation, "candidates", lambda *_: chosen)
+        chosen = sorted(trials, key=lambda trial: trial.prpv)[:MOST_FINALISTS]
+        monkeypatch.setattr("proxytune.study.run.finalists", lambda *_: chosen)
         lucky, *rivals = chosen
         plant(study, store, lucky, -1.0)
         for rival in rivals:
@@ -160,7 +157,7 @@ def test_interrupted_anywhere_it_comes_to_the_same_answer(finished, jobs):
 def test_what_need_not_be_run_is_taken_off_the_bar(finished):
     watcher = Stopping()
     spent, found = confirmed(finished, watcher)
-    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings) == CANDIDATES * ONE
+    assert spent.episodes + watcher.off == most_confirmation_episodes(found.study.settings) == MOST_FINALISTS * ONE
 
 
 def test_every_repetition_has_episodes_and_a_score_of_its_own(finished):
@@ -201,7 +198,7 @@ def test_the_time_of_fresh_episodes_does_not_count_for_the_rule_to_stop(finished
 def test_an_agent_that_fails_in_all_fresh_episodes_leaves_the_answer_without_a_score(finished):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
+        for trial in finalists(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
             for episode in plan_episodes(study.settings, trial.theta, fresh_seed(study.settings.seed, 1)):
                 if episode.agent == "agent3":
                     store.save_outcome(study.identity, Outcome(episode, None, "it fell", 0.0))
@@ -259,7 +256,7 @@ def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_t
 ):
     study = opened(finished)
     with Store.open(finished) as store:
-        for trial in candidates(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
+        for trial in finalists(store.trials(), knowledge_of(StudyRun(study, store), store.trials())):
             plant(study, store, trial, 1.0)
         found = result_of(StudyRun(study, store))
     monkeypatch.setattr(type(found.knowledge), "holds", lambda *_: inside)

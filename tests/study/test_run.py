@@ -19,9 +19,10 @@ from proxytune.study import (
     result_of,
     run_trials,
     score_trials,
+    stored_run,
     with_metrics,
 )
-from proxytune.study.run import as_stored, came_to
+from proxytune.study.run import came_to
 from proxytune.study.settings import StopRules
 
 COARSE = (Metric.parse("distance:max:20%"), Metric.parse("survival_time:max"))
@@ -239,14 +240,14 @@ def test_changed_code_of_the_family_is_refused_but_its_old_result_can_still_be_l
     with Store.open(finished) as store:
         with pytest.raises(SettingsError, match="the domain family"):
             check_facts(StudyRun(newer, store))
-        assert as_stored(newer, store).identity == open_study(finished).identity
+        assert stored_run(newer, store).study.identity == open_study(finished).identity
         assert store.trials() == trials
 
 
 def test_looking_at_an_edited_study_is_refused(finished, make_study):
     make_study(seed="3")
     with Store.read(finished) as store, pytest.raises(SettingsError, match=r"seed \(was 1\)"):
-        as_stored(open_study(finished), store)
+        stored_run(open_study(finished), store)
 
 
 def test_budget_jobs_name_and_what_failures_do_may_change(finished, make_study):

@@ -32,7 +32,8 @@ from proxytune.study import (
     study_facts,
     with_spending,
 )
-from proxytune.study.pruning import pruning_rule, stopped
+from proxytune.study.pruning import pruning_rule
+from proxytune.study.run import stopped
 from proxytune.study.settings import StopRules
 from proxytune.study.study_run import longest_first
 from proxytune.usefulness.noise import noise_floor

@@ -21,7 +21,7 @@ from proxytune.learning import Costs, Distribution, LearningCurve, mean_score, m
 from proxytune.report.teaching import observation_lines
 from proxytune.running import Silent
 from proxytune.storage import Store
-from proxytune.study import StudyRun, adopt, open_study, read_study_settings
+from proxytune.study import StudyRun, open_study, read_study_settings
 from proxytune.teaching import (
     Experiment,
     TeacherResult,
@@ -399,7 +399,6 @@ WIDE = Distribution(MappingProxyType({"trim": (-0.3, 0.3)}))
 def found(make_study):
     study = open_study(make_taught(make_study))
     with Store.open(study.settings.folder) as store:
-        adopt(study, store)
         run = StudyRun(study, store)
         return study, predictivity(run, {"true": TRUE, "wide": WIDE}), run
 
@@ -416,7 +415,6 @@ def test_each_proxy_has_a_prpv_with_an_interval_that_holds_it_and_the_right_one_
 def test_a_proxy_that_draws_theta_draws_it_for_every_start_the_same_for_all_agents(make_study):
     study = open_study(make_taught(make_study))
     with Store.open(study.settings.folder) as store:
-        adopt(study, store)
         driven = []
         run = StudyRun(study, store)
         run.outcomes = lambda planned, what, plain=run.outcomes: driven.extend(planned) or plain(planned, what)

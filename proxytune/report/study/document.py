@@ -27,7 +27,7 @@ def study_document(result: StudyResult) -> dict[str, Any]:
         },
         "preflight": _preflight(result.preflight),
         "stopped": result.stopped or None,
-        "cut_off": {"trials": len(result.cut), "episodes": result.spared[0], "seconds": result.spared[1]},
+        "cut_off": {"trials": len(result.pruned), "episodes": result.spared[0], "seconds": result.spared[1]},
         "trials": [_trial(trial) for trial in result.trials],
         "failures": list(result.failures),
         "target": _target(result),

@@ -1,10 +1,14 @@
 """A Gaussian process over learning curves: what the examinations of all proxies and repetitions say of each mean curve.
 
-A score is the mean curve of its proxy, plus what this repetition's target samples do to every learner, plus what they
-do to this one, plus noise. The last three are larger where scores differ more, as they do where a curve rises.
+A learning curve is the scores of a learner in the target, by number of target samples x (as doublings) and repetition
+r. The score of proxy p is the mean curve f_p(x), plus what this repetition's target samples do to every learner, plus
+what they do to this one, plus noise:
 
-Learning curves: the scores of a learner in the target, by number of target samples and repetition.
-The posterior of learning curves: draws of all mean curves together, bounded, and rising where the data allow it.
+    y = f_p(x) + s(x) · (g_r(x) + h_pr(x) + ε),    f_p = level + a Gaussian process (Matérn 5/2), alike for g_r and h_pr
+
+with a spread s that is larger where scores differ more, as they do where a curve rises. `draw_curves` draws all mean
+curves together from their posterior, bounded, and rising where the data allow it; `crossing` is the number of target
+samples from which on a draw stays converged, η.
 """
 
 import itertools
@@ -51,7 +55,7 @@ class LearningCurve:
 
     @property
     def repetitions(self) -> int:
-        """How many repetitions have an examination."""
+        """The number of repetitions that have an examination."""
         return int(np.isfinite(self.scores).any(axis=1).sum())
 
 
@@ -99,17 +103,17 @@ class Examined:
 
     @cached_property
     def same(self) -> NDArray[np.bool_]:
-        """Whether two are of one curve (examinations, examinations)."""
+        """True where two are of one curve (examinations, examinations)."""
         return np.asarray(self.curve[:, None] == self.curve)
 
     @cached_property
     def together(self) -> NDArray[np.bool_]:
-        """Whether two are of one repetition."""
+        """True where two are of one repetition."""
         return np.asarray(self.repetition[:, None] == self.repetition)
 
     @cached_property
     def apart(self) -> Floats:
-        """How many doublings two are apart."""
+        """The number of doublings that two are apart."""
         return np.asarray(np.abs(self.place[:, None] - self.place))
 
 
@@ -152,11 +156,10 @@ class CurveModel:
         """Variance of one more examination's score about the mean curve, at these places."""
         values = self.values
         one = values["shared"] ** 2 + values["own"] ** 2 + values["noise"] ** 2
-        relative = _spread(self.marks, self._residuals(), curve, place) ** 2
+        scaled = (self.marks.score - self.centre) / self.unit
+        residuals = _residuals(self.marks, values, scaled, self._weights)
+        relative = _spread(self.marks, residuals, curve, place) ** 2
         return np.asarray(self.unit**2 * one * relative)
-
-    def _residuals(self) -> Floats:
-        return _residuals(self.marks, self.values, (self.marks.score - self.centre) / self.unit, self._weights)
 
     def _means_covariance(
         self, curve: NDArray[np.intp], place: Floats, other: NDArray[np.intp], there: Floats
@@ -169,6 +172,10 @@ def fit_curve_model(marks: Examined) -> CurveModel:
     centre, unit = float(marks.score.mean()), float(marks.score.std()) or 1.0
     scaled = (marks.score - centre) / unit
     spread, start = np.ones(len(scaled)), np.log([median for median, _ in PRIORS.values()])
+    # One repetition does not tell what it does to a learner from the learner's mean curve
+    held = REPEATED if len(np.unique(marks.repetition)) == 1 else ()
+    far = {name: 0.0 if name in held else FARTHEST * width for name, (_, width) in PRIORS.items()}
+    bounds = [(np.log(median) - far[name], np.log(median) + far[name]) for name, (median, _) in PRIORS.items()]
     for _ in range(1 + ROUNDS):
         given = (marks, scaled, spread)
         found = minimize(
@@ -176,7 +183,7 @@ def fit_curve_model(marks: Examined) -> CurveModel:
             start,
             args=given,
             method="L-BFGS-B",
-            bounds=_bounds(marks),
+            bounds=bounds,
             options={"maxiter": 40},
         )
         start, values = found.x, _named(found.x)
@@ -184,14 +191,6 @@ def fit_curve_model(marks: Examined) -> CurveModel:
         weights = cho_solve(factor, scaled)
         spread = _spread(marks, _residuals(marks, values, scaled, weights), marks.curve, marks.place)
     return CurveModel(marks, values, centre, unit, factor, weights)
-
-
-def _bounds(marks: Examined) -> list[tuple[float, float]]:
-    """How small and how large the logarithm of each hyperparameter may be."""
-    # One repetition does not tell what it does to a learner from the learner's mean curve
-    held = REPEATED if len(np.unique(marks.repetition)) == 1 else ()
-    far = {name: 0.0 if name in held else FARTHEST * width for name, (_, width) in PRIORS.items()}
-    return [(np.log(median) - far[name], np.log(median) + far[name]) for name, (median, _) in PRIORS.items()]
 
 
 def _named(logarithms: Floats) -> dict[str, float]:
@@ -227,12 +226,12 @@ def _matern(apart: Floats, length: float) -> Floats:
 
 
 def _residuals(marks: Examined, values: Mapping[str, float], scaled: Floats, weights: Floats) -> Floats:
-    """What the mean curves leave of the scores, scaled."""
+    """The residuals of the scores about the mean curves, scaled."""
     return np.asarray(scaled - _means(values, marks.same, marks.apart) @ weights)
 
 
 def _spread(marks: Examined, residuals: Floats, curve: NDArray[np.intp], place: Floats) -> Floats:
-    """How much scores differ at these places, relative to all: what is left nearby, drawn towards that of all."""
+    """The spread of scores at these places, relative to all: what is left nearby, drawn towards that of all."""
     pooled = float(np.mean(residuals**2)) or 1.0
     near = np.exp(-0.5 * ((place[:, None] - marks.place) / NEAR) ** 2) * (curve[:, None] == marks.curve)
     local = (POOLED * pooled + near @ residuals**2) / (POOLED + near.sum(axis=1))
@@ -284,7 +283,10 @@ def draw_curves(
     which = np.repeat(np.arange(len(curves)), len(place))
     mean, covariance = model.mean_curves(which, np.tile(place, len(curves)))
     normal = np.random.default_rng(seed).standard_normal((draws, len(mean)))
-    drawn = np.clip(mean + normal @ _root(covariance).T, *bounds).reshape(draws, len(curves), -1)
+    # A matrix whose product with its transpose is the covariance, even one that rounding has made indefinite
+    values, vectors = np.linalg.eigh(covariance)
+    root = np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+    drawn = np.clip(mean + normal @ root.T, *bounds).reshape(draws, len(curves), -1)
     rising = {
         name: _may_rise_only(mean[which == number], covariance[np.ix_(which == number, which == number)])
         for number, name in enumerate(curves)
@@ -311,14 +313,8 @@ def _marks(curves: Mapping[str, LearningCurve], first: float) -> Examined:
     return Examined(number.astype(np.intp), repetition.astype(np.intp), place, score)
 
 
-def _root(covariance: Floats) -> Floats:
-    """A matrix whose product with its transpose is a covariance, even one that rounding has made indefinite."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
 def _may_rise_only(mean: Floats, covariance: Floats) -> bool:
-    """Whether the greatest fall of the mean is within doubt."""
+    """Tell whether the greatest fall of the mean is within doubt."""
     fall = np.triu(mean[:, None] - mean)
     early, late = np.unravel_index(np.argmax(fall), fall.shape)
     variance = covariance[early, early] + covariance[late, late] - 2.0 * covariance[early, late]

@@ -1,7 +1,13 @@
 """Proxy learning value: how many target samples a proxy saves (Courchesne et al. 2021, equations 5 and 6).
 
-Where the next examinations tell most about PLV: a pure function of the scores that are known.
-What others published of proxies of the same names, to stand beside what is measured here.
+With η the target samples that a learner needs to converge, without a proxy (∅) and after the proxy S,
+
+    PLV(S) = η(∅) − η(S)                                                                                     (eq. 5)
+
+`sample_needs` gives η draw by draw from the posterior of all learning curves (curve_model.py), and `teaching_value`
+PLV, factor and reduction with their 95 % intervals. Where examinations are chosen (`AdaptiveDesign`), the next ones are
+those that are expected to take most from the variance of PLV: a pure function of the scores that are known. `Published`
+is what others found of proxies of the same names, to stand beside what is measured here.
 """
 
 from collections import Counter
@@ -24,7 +30,7 @@ Samples = TypeVar("Samples", float, Floats)
 
 @dataclass(frozen=True)
 class Convergence:
-    """When a learner counts as having converged in the target.
+    """The rule by which a learner counts as having converged in the target.
 
     Attributes:
         level: The score it has to reach: what it converges to without a proxy, unless stated otherwise.
@@ -50,18 +56,18 @@ class LearningEstimate:
 
     @property
     def above_zero(self) -> bool:
-        """Whether its whole interval lies above 0; how far above may be unknown."""
+        """True if its whole interval lies above 0; how far above may be unknown."""
         return self.low is not None and self.low > 0.0
 
     @property
     def at_most_zero(self) -> bool:
-        """Whether no part of its interval lies above 0."""
+        """True if no part of its interval lies above 0."""
         return self.high is not None and self.high <= 0.0
 
 
 @dataclass(frozen=True)
 class TeachingValue:
-    """What a proxy is worth as a teacher.
+    """The worth of a proxy as a teacher.
 
     Attributes:
         without: Target samples needed without it, η(∅).
@@ -80,7 +86,7 @@ class TeachingValue:
 
 @dataclass(frozen=True)
 class SampleNeeds:
-    """How many target samples each learner needs, draw by draw from the posterior of the learning curves.
+    """The target samples that each learner needs, draw by draw from the posterior of the learning curves.
 
     Attributes:
         curves: The scores that the examinations gave, by name.
@@ -99,7 +105,7 @@ class SampleNeeds:
 
     @property
     def settled(self) -> bool:
-        """Whether the learner without a proxy converges: over the last doubling it gains no more than the tolerance."""
+        """True if the learner without a proxy converges: over the last doubling it gains no more than the tolerance."""
         return self.gain is not None and self.gain <= self.when.tolerance
 
     @property
@@ -140,7 +146,7 @@ def sample_needs(
     level: float | None = None,
     draws: int = POSTERIOR_DRAWS,
 ) -> SampleNeeds:
-    """How many target samples each learner needs, from the posterior of all learning curves together.
+    """Infer the target samples that each learner needs, from the posterior of all learning curves together.
 
     Args:
         curves: Scores by name of the learning curve.
@@ -150,18 +156,21 @@ def sample_needs(
         level: The score that counts as converged; None for what the learner without a proxy comes to.
         draws: How many draws.
     """
-    drawn = draw_curves(curves, _bounds(curves, best_score), draws)
+    # A family's own scores may lie beyond those of one that drives.
+    scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
+    bounds = float(min(-best_score, scores.min())), float(max(best_score, scores.max()))
+    drawn = draw_curves(curves, bounds, draws)
     alone = drawn.scores[none]
     levels = alone[:, -1] if level is None else np.full(len(alone), level)
     needed = {
-        name: crossing(drawn.counts, scores, levels - tolerance, drawn.first) for name, scores in drawn.scores.items()
+        name: crossing(drawn.counts, drawn.scores[name], levels - tolerance, drawn.first) for name in drawn.scores
     }
     when = Convergence(float(levels.mean()) if level is None else level, tolerance)
     return SampleNeeds(curves, drawn, when, _last_gain(drawn, alone), needed)
 
 
 def _last_gain(drawn: CurveDraws, alone: Floats) -> float | None:
-    """What the learner without a proxy gains over the last doubling of samples; None if it begins within that."""
+    """The gain of the learner without a proxy over the last doubling of samples; None if it begins within that."""
     if 2.0 * drawn.first > drawn.counts[-1] * (1.0 + ROUNDING):
         return None
     # Where the first count is half the last one, the place drawn next to it may lie before anything is learnt
@@ -169,14 +178,8 @@ def _last_gain(drawn: CurveDraws, alone: Floats) -> float | None:
     return float(alone[:, -1].mean() - alone[:, half].mean())
 
 
-def _bounds(curves: Mapping[str, LearningCurve], best_score: float) -> tuple[float, float]:
-    """Lowest and highest score there can be; a family's own scores may lie beyond those of one that drives."""
-    scores = np.concatenate([curve.scores[np.isfinite(curve.scores)] for curve in curves.values()])
-    return float(min(-best_score, scores.min())), float(max(best_score, scores.max()))
-
-
 def teaching_value(needs: SampleNeeds, *, none: str, proxy: str) -> TeachingValue:
-    """What a proxy is worth as a teacher, with 95 % intervals.
+    """The worth of a proxy as a teacher, with 95 % intervals.
 
     Where convergence is not reached, η is known to lie beyond the largest count: ends that this leaves open are None.
     """
@@ -190,14 +193,14 @@ def teaching_value(needs: SampleNeeds, *, none: str, proxy: str) -> TeachingValu
 
 
 def samples_needed(needs: SampleNeeds, name: str) -> LearningEstimate:
-    """How many target samples a learner needs, with its 95 % interval; None beyond the largest count."""
+    """The target samples that a learner needs, with its 95 % interval; None beyond the largest count."""
     needed = needs.needed[name]
     least = np.minimum(needed, needs.last)
     return _ends(least=least, middle=needed, most=needed)
 
 
 def more_needed(needs: SampleNeeds, *, more: str, less: str) -> LearningEstimate:
-    """How many more target samples one learner needs than another, with its 95 % interval."""
+    """The target samples that one learner needs more than another, with the 95 % interval."""
     return estimate_figure(lambda one, other: plv(without=one, with_proxy=other), needs, more=more, less=less)
 
 
@@ -265,7 +268,7 @@ ExaminationScores = Mapping[Examination, float]
 
 @dataclass(frozen=True)
 class AdaptiveDesign:
-    """How examinations are spent.
+    """The adaptive design of examinations.
 
     Attributes:
         none: The name of the learner without a proxy, which knows nothing before its first target sample.
@@ -282,7 +285,7 @@ class AdaptiveDesign:
 
 @dataclass(frozen=True)
 class _Cells:
-    """Where somebody may be examined: curve by number and name, count, and drawn mean scores (draws, cells)."""
+    """Places for an examination: curve by number and name, count, and drawn mean scores (draws, cells)."""
 
     number: NDArray[np.intp]
     name: tuple[str, ...]
@@ -304,23 +307,23 @@ def _curve(counts: Sequence[int], name: str, scores: ExaminationScores) -> Learn
     return LearningCurve(tuple(all_counts), table)
 
 
-def first_examinations(names: Sequence[str], spending: AdaptiveDesign) -> list[Examination]:
-    """What is examined before anything is known: counts from the first to the last, in two repetitions."""
+def first_examinations(names: Sequence[str], design: AdaptiveDesign) -> list[Examination]:
+    """The examinations before anything is known: counts from the first to the last, in two repetitions."""
+
+    def spread(first: int) -> list[int]:
+        """Counts spread over the grid from the place of the first one to the last."""
+        places = np.linspace(first, len(design.counts) - 1, FIRST_COUNTS).round().astype(int)
+        return [design.counts[place] for place in sorted(set(places.tolist()))]
+
     return [
         Examination(name, repetition, count)
-        for repetition in range(min(FIRST_REPETITIONS, spending.repetitions))
+        for repetition in range(min(FIRST_REPETITIONS, design.repetitions))
         for name in names
-        for count in _spread_counts(spending.counts, first=int(name == spending.none))
+        for count in spread(first=int(name == design.none))
     ]
 
 
-def _spread_counts(counts: tuple[int, ...], first: int) -> list[int]:
-    """Counts spread over the grid from the place of the first one to the last."""
-    places_ = np.linspace(first, len(counts) - 1, FIRST_COUNTS).round().astype(int)
-    return [counts[place] for place in sorted(set(places_.tolist()))]
-
-
-def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: AdaptiveDesign) -> list[Examination]:
+def next_examinations(needs: SampleNeeds, names: Sequence[str], design: AdaptiveDesign) -> list[Examination]:
     """Choose the examinations that are expected to take most from the variance of all proxies' PLV, one by one.
 
     What a score would tell is taken from how the drawn mean curve there goes with the drawn PLVs, as in linear
@@ -330,12 +333,16 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Adapti
         needs: What the scores known so far say.
         names: The curves that may be examined. PLV is that of the proxies among them; without one, it is how many
             samples are needed without a proxy that is to be known.
-        spending: How examinations are spent.
+        design: How examinations are spent.
 
     Returns:
         A batch of them; fewer where every repetition of every count has been examined.
     """
-    cells, wanted = _cells(needs, names, spending), _finite_plv(needs, names, spending.none)
+    cells = _cells(needs, names, design)
+    # What is not reached is taken as some way beyond the grid.
+    needed = {name: np.minimum(samples, BEYOND * needs.last) for name, samples in needs.needed.items()}
+    alone = needed[design.none]
+    wanted = np.column_stack([alone - needed[name] for name in names if name != design.none] or [alone])
     targets = wanted.shape[1]
     joint = np.cov(np.column_stack((wanted, cells.drawn)), rowvar=False)
     noise = needs.draws.model.noise_at(cells.number, doublings(cells.count.astype(float), needs.draws.first))
@@ -345,10 +352,10 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Adapti
         for repetition, place in curve.examined
     }
     chosen: list[Examination] = []
-    while len(chosen) < spending.batch:
+    while len(chosen) < design.batch:
         tells = np.sum(joint[:targets, targets:] ** 2, axis=0) / (np.diag(joint)[targets:] + noise)
         ordered = np.argsort(-tells, kind="stable").tolist()
-        free = ((cell, _next_of(cells, cell, done, spending)) for cell in ordered)
+        free = ((cell, _next_of(cells, cell, done, design)) for cell in ordered)
         best, examination = next(((cell, one) for cell, one in free if one), (0, None))
         if examination is None:
             break
@@ -359,38 +366,31 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], spending: Adapti
     return chosen
 
 
-def _cells(needs: SampleNeeds, names: Collection[str], spending: AdaptiveDesign) -> _Cells:
+def _cells(needs: SampleNeeds, names: Collection[str], design: AdaptiveDesign) -> _Cells:
     """Every place of the drawn curves at which somebody may be examined."""
     counts, scores = needs.draws.counts.round().astype(int), needs.draws.scores
     open_ = {
         counts[place]: place
         # Of places of one count the last one: before the first count a learner without a proxy is not drawn
         for place in (*range(0, len(counts) - 1, APART), len(counts) - 1)
-        if not place or counts[place] >= spending.counts[1]
+        if not place or counts[place] >= design.counts[1]
     }
     cells = [
         (number, name, place)
         for number, name in enumerate(needs.curves)
         for count, place in open_.items()
-        if name in names and (count or name != spending.none) and np.isfinite(scores[name][0, place])
+        if name in names and (count or name != design.none) and np.isfinite(scores[name][0, place])
     ]
     drawn = np.column_stack([scores[name][:, place] for _, name, place in cells])
     at = np.array([place for _, _, place in cells])
     return _Cells(np.array([number for number, _, _ in cells]), tuple(name for _, name, _ in cells), counts[at], drawn)
 
 
-def _finite_plv(needs: SampleNeeds, names: Sequence[str], none: str) -> Floats:
-    """PLV of every proxy in every draw (draws, proxies), what is not reached taken as some way beyond the grid."""
-    needed = {name: np.minimum(samples, BEYOND * needs.last) for name, samples in needs.needed.items()}
-    proxies = [name for name in names if name != none]
-    return np.column_stack([needed[none] - needed[name] for name in proxies] or [needed[none]])
-
-
-def _next_of(cells: _Cells, cell: int, done: Collection[Examination], spending: AdaptiveDesign) -> Examination | None:
+def _next_of(cells: _Cells, cell: int, done: Collection[Examination], design: AdaptiveDesign) -> Examination | None:
     """The examination here in the repetition in which this learner has been examined least; None if all are done."""
     name, count = cells.name[cell], int(cells.count[cell])
     often = Counter(one.repetition for one in done if one.curve == name)
-    possible = (Examination(name, number, count) for number in range(spending.repetitions))
+    possible = (Examination(name, number, count) for number in range(design.repetitions))
     free = [one for one in possible if one not in done]
     return min(free, key=lambda one: (often[one.repetition], one.repetition), default=None)
 

@@ -1,4 +1,4 @@
-"""What the [teaching] table of a study.toml says, read strictly."""
+"""The settings of the [teaching] table of a study.toml, read strictly: every complaint has file, key and a remedy."""
 
 import itertools
 import math
@@ -30,7 +30,7 @@ NONE = "none"
 
 @dataclass(frozen=True)
 class TeachingSettings:
-    """How a proxy's worth as a teacher is measured.
+    """The way in which a proxy's worth as a teacher is measured.
 
     Attributes:
         target: The target's model.toml, in which the learners are fine-tuned and examined.
@@ -77,7 +77,7 @@ class TeachingSettings:
 
     @property
     def later_keys(self) -> Mapping[str, Any]:
-        """What is taught otherwise than before there were keys for it, by key."""
+        """The settings that differ from what was taught before there were keys for them, by key."""
         values = {name: getattr(self, name) for name in LATER}
         return {name: value for name, value in values.items() if value != getattr(TeachingSettings, name)}
 

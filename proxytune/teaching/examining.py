@@ -1,9 +1,8 @@
 """The examinations of a learning experiment: all of a grid, or those that tell most, batch by batch.
 
 A batch is a pure function of the scores of the batches before it, and every score is cached by all that determines it:
-an experiment that is stopped at any moment goes on where it was, to the same scores.
-
-The points of learning curves, made by several processes; one that hangs or ends with its process is named.
+an experiment that is stopped at any moment goes on where it was, to the same scores. Points of learning curves are made
+by several processes (`prepare_points`, `score_points`); one that hangs or ends with its process is named.
 """
 
 import functools
@@ -106,7 +105,7 @@ def _traces(folder: Path) -> Iterator[Path]:
 
 @dataclass(frozen=True)
 class _Loss:
-    """What becomes of a point that has ended its process."""
+    """The handling of a point that has ended its process."""
 
     timeout_s: float | None
     traced: TracedTask
@@ -138,25 +137,22 @@ def _shared(settings: TeachingSettings, points: Sequence[CurvePoint]) -> list[Cu
     Where the learner drives in the target, its samples are shared by the points of one learning curve and repetition;
     where the expert does, by all points of a repetition.
     """
+
+    def first_of_each(points: Sequence[CurvePoint]) -> list[CurvePoint]:
+        """The first point of each learning curve and repetition."""
+        first: list[tuple[CurvePoint, CurvePoint]] = []
+        for point in points:
+            kind = replace(point, count=0)
+            if kind not in [known for known, _ in first]:
+                first.append((kind, point))
+        return [point for _, point in first]
+
     if settings.target_lessons == LEARNER:
-        falling = sorted(points, key=lambda point: -point.count)
-        return _first_of_each(falling, lambda point: replace(point, count=0))
+        return first_of_each(sorted(points, key=lambda point: -point.count))
     last = settings.target_samples[-1]
     repetitions = sorted({point.repetition for point in points})
     targets = [CurvePoint("the target", None, repetition, last) for repetition in repetitions]
-    taught = [replace(point, count=0) for point in points if point.proxy is not None]
-    return targets + _first_of_each(taught, lambda point: point)
-
-
-def _first_of_each(points: Sequence[CurvePoint], kind: Callable[[CurvePoint], CurvePoint]) -> list[CurvePoint]:
-    """The first point of each kind."""
-    kinds: list[CurvePoint] = []
-    first = []
-    for point in points:
-        if kind(point) not in kinds:
-            kinds.append(kind(point))
-            first.append(point)
-    return first
+    return targets + first_of_each([replace(point, count=0) for point in points if point.proxy is not None])
 
 
 BATCH = 12
@@ -186,36 +182,33 @@ def examine_curves(
     """
     taught, scores = setup.settings, dict(known or {})
     if taught.examinations is None:
-        return {**scores, **_examine(setup, proxies, _whole_grid(taught, proxies), jobs, watcher)}
+        grid = [
+            Examination(name, repetition, count)
+            for name in proxies
+            for repetition in range(taught.seeds)
+            for count in taught.target_samples
+        ]
+        return {**scores, **_examine(setup, proxies, grid, jobs, watcher)}
     wanted = len(scores) + count_examinations(taught, len(proxies))
-    spending = AdaptiveDesign(NONE, taught.target_samples, taught.seeds, BATCH)
-    batch = first_examinations(list(proxies), spending)
+    design = AdaptiveDesign(NONE, taught.target_samples, taught.seeds, BATCH)
+    batch = first_examinations(list(proxies), design)
     while batch and len(scores) < wanted:
         scores |= _examine(setup, proxies, batch[: wanted - len(scores)], jobs, watcher)
         if len(scores) < wanted:
             needs = needs_of(setup, curves_of(taught.target_samples, scores), DRAWS)
-            batch = next_examinations(needs, list(proxies), spending)
+            batch = next_examinations(needs, list(proxies), design)
     return scores
 
 
 def count_examinations(taught: TeachingSettings, curves: int) -> int:
-    """How many examinations this many learning curves take."""
+    """The number of examinations that this many learning curves take."""
     return curves * (taught.examinations or taught.seeds * len(taught.target_samples))
 
 
 def needs_of(setup: TeachingSetup, curves: Mapping[str, LearningCurve], draws: int = POSTERIOR_DRAWS) -> SampleNeeds:
-    """How many target samples each learner needs, by what [teaching] says of convergence."""
+    """The target samples that each learner needs, by what [teaching] says of convergence."""
     taught, best = setup.settings, setup.target.best_score
     return sample_needs(curves, none=NONE, best_score=best, tolerance=taught.tolerance, level=taught.level, draws=draws)
-
-
-def _whole_grid(taught: TeachingSettings, names: Mapping[str, Distribution | None]) -> list[Examination]:
-    return [
-        Examination(name, repetition, count)
-        for name in names
-        for repetition in range(taught.seeds)
-        for count in taught.target_samples
-    ]
 
 
 def _examine(
@@ -233,11 +226,7 @@ def _examine(
     with score_points(setup, missing, jobs) as scored:
         for point, score in scored:
             watcher.episode()
-            watcher.finished(_came_to(point, score))
+            came = "nothing learnt yet" if np.isnan(score) else f"score {score:.3g}"
+            where = f"{point.name}, repetition {point.repetition + 1}, {point.count} target samples"
+            watcher.finished(f"{where}: {came}")
     return {one: setup.score(point) for one, point in points.items()}
-
-
-def _came_to(point: CurvePoint, score: float) -> str:
-    """What became of a point of a learning curve, in one line."""
-    came = "nothing learnt yet" if np.isnan(score) else f"score {score:.3g}"
-    return f"{point.name}, repetition {point.repetition + 1}, {point.count} target samples: {came}"

@@ -1,8 +1,10 @@
 """The pieces of a learning experiment, each cached by all that determines it: samples, weights, scores.
 
-Trainings, lessons and examinations run code that is not ours: what it raises is named, and what hangs is ended.
-Learning in one domain: its lessons' samples, and the weights they lead to, each cached by what determines it.
-The box that is searched for learning value: centre and width of each parameter's distribution p(θ).
+A `CurvePoint` is one point of a learning curve; `TeachingSetup` scores it. Its learner goes through one or two stages
+(`Stage`): the lessons of a proxy, if one teaches, and those of the target; each has samples and the weights they lead
+to. Trainings, lessons and examinations run code that is not ours: what it raises is named, and what hangs is ended
+(`Supervised`). `search_space` is the box that is searched for learning value: centre and width of each parameter's
+distribution p(θ).
 """
 
 import functools
@@ -37,7 +39,7 @@ from proxytune.space import Interval, Space, Theta
 from proxytune.study import StudySettings
 
 TOGETHER = " and the others beside it"
-"""How it is named what several episodes do at once: which of them fails is not known then."""
+"""Ends the name of what several episodes do at once: which of them fails is not known then."""
 
 
 @contextmanager
@@ -155,7 +157,7 @@ class Lessons:
 
     @property
     def on_policy(self) -> bool:
-        """Whether the learner drives."""
+        """True if the learner drives."""
         return self.by == LEARNER
 
     @property
@@ -191,7 +193,7 @@ class Lessons:
 
 @dataclass(frozen=True)
 class Stage:
-    """What a trainee learns in one domain, after what it has learnt in another.
+    """A stage of learning: what a trainee learns in one domain, after what it has learnt in another.
 
     Facts of what comes before enter those of what comes after as their digest: each key is short and complete.
 
@@ -248,16 +250,12 @@ class Stage:
         """The samples of a round."""
 
         def make() -> Arrays:
-            policy = self._policy(number)
+            weights = self.weights(self.lessons.begin(number)) if self.lessons.on_policy else None
+            policy = None if weights is None else policy_of(self.trainee.learner, weights)
             with watching("a lesson"):
                 return self.lessons.collect(number, policy)._asdict()
 
         return Demonstration(**self.trainee.cache.get("samples", self.round_facts(number), make))
-
-    def _policy(self, number: int) -> Policy | None:
-        """Who drives in a round; None for the expert."""
-        weights = self.weights(self.lessons.begin(number)) if self.lessons.on_policy else None
-        return None if weights is None else policy_of(self.trainee.learner, weights)
 
     def _train(self, count: int) -> Weights:
         samples = self.samples(count)
@@ -348,7 +346,7 @@ class TeachingSetup:
                 stage.collect(number)
 
     def is_cached(self, point: CurvePoint) -> bool:
-        """Whether the point's scores are in the cache."""
+        """Tell whether the point's scores are in the cache."""
         return self.cache.has("exam", self.exam_facts(point))
 
     def exam_facts(self, point: CurvePoint) -> dict[str, Any]:
@@ -362,7 +360,7 @@ class TeachingSetup:
         }
 
     def _stage(self, point: CurvePoint) -> Stage:
-        """What a point's learner learns in the target, after its proxy if it has one."""
+        """The stage in which a point's learner learns in the target, after its proxy if it has one."""
         trainee = Trainee(self.learner, self.learner_identity, point.repetition, self.cache)
         in_proxy = None if point.proxy is None else self._proxy_lessons(point.proxy, point.repetition)
         before = None if in_proxy is None else Stage(trainee, in_proxy)

@@ -1,10 +1,9 @@
-"""Bayesian optimisation of a composite score: expected improvement of PRPV composed of modelled outputs.
+"""The engines that learn from every output of a trial, not from PRPV alone: `composite` and `outcomes`.
 
-The engine `outcomes`: it learns from every output of a trial, not from PRPV alone.
-
-In turn it draws θ from what is known of it, and looks where the score composed of the outputs is expected to improve
-most. Draws find the θ that made the target and escape what a greedy search sticks to; expected improvement keeps PRPV
-the goal where the proxy cannot be like the target whatever θ is.
+`composite` is Bayesian optimisation of a composite score: the θ whose PRPV, composed of modelled outputs, is expected
+to improve most. `outcomes` does that in turn with drawing θ from what is known of it. Draws find the θ that made the
+target and escape what a greedy search sticks to; expected improvement keeps PRPV the goal where the proxy cannot be
+like the target whatever θ is.
 """
 
 from collections.abc import Callable, Sequence
@@ -62,7 +61,7 @@ def most_improving(space: Space, trials: Sequence[Trial], goal: Goal, seed: int)
 
 
 def _with_pending(model: OutputModel, trials: Sequence[Trial]) -> OutputModel:
-    """The model as if every pending trial had come out as expected, so that it is worth no second look."""
+    """The model as a kriging believer has it: pending trials take their posterior mean, and need no second look."""
     pending = [trial for trial in trials if trial.pending]
     if not pending or not model.groups:
         return model

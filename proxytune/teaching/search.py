@@ -128,7 +128,7 @@ def teach_finalists(
 
 
 def _why_unable(setup: TeachingSetup, name: str, proxy: Distribution) -> str:
-    """The reason why a proxy cannot teach, empty if it can: its expert may leave a road that nobody has driven before."""
+    """The reason why a proxy cannot teach, empty if it can: nobody has driven in it before."""
     try:
         prepare_points(setup, [CurvePoint(name, proxy, 0, 0)], jobs=1)
     except LearnerError as problem:

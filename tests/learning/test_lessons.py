@@ -35,6 +35,7 @@ from proxytune.learning import (
 )
 from proxytune.learning.lessons import cost_saved, split_samples
 from proxytune.learning.plv import plv
+from proxytune.learning.ridge import RandomFeatures
 
 
 def test_arrays_are_made_once_and_read_back_to_the_last_bit(tmp_path):

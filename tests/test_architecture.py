@@ -60,6 +60,7 @@ SHORT = {
     "__main__",
     "arrays",  # types
     "driving/agent",  # a protocol
+    "learning/learner",  # a protocol
 }
 """Modules below 60 lines: protocols, plug-ins and types; doors (`__init__`) go without saying."""
 

@@ -54,8 +54,8 @@ def plv_answer(study: PlvStudy) -> str:
     if plv.above_zero or plv.at_most_zero:
         judged = "it saves target samples" if plv.above_zero else "it saves none"
     sentences = [
-        f"After {len(study.trials)} proxies tried, {best.name} ({describe_distribution(best.proxy)}) has the highest PLV "
-        f"(proxy learning value): {count(plv, UNKNOWN)} target samples saved; {judged}.",
+        f"After {len(study.trials)} proxies tried, {best.name} ({describe_distribution(best.proxy)}) has the highest "
+        f"PLV (proxy learning value): {count(plv, UNKNOWN)} target samples saved; {judged}.",
         f"It saves more than {listed(behind)}." if behind else "",
         f"That it saves more than {listed(alike)} is not shown." if alike else "",
     ]

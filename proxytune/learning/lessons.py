@@ -25,6 +25,7 @@ from proxytune.files import draft_of
 from proxytune.identity import digest, meaning_of
 from proxytune.learning.learner import Learner
 from proxytune.learning.plv import general_plv
+from proxytune.lineage import named
 from proxytune.seeds import lesson_seeds
 from proxytune.settings import Section
 from proxytune.space import Theta
@@ -314,4 +315,4 @@ def learner_identity(learner: Learner) -> str:
     taken = {getattr(value, "__module__", None) for value in vars(module).values()}
     files = {Path(file) for name in taken if (file := getattr(sys.modules.get(str(name)), "__file__", None))}
     code = meaning_of({source, *(file for file in files if file.parent == source.parent)}, source.parent)
-    return digest(code + repr(learner))
+    return digest(named(f"learner {type(learner).__module__}", code) + repr(learner))

@@ -116,7 +116,10 @@ def read_teaching(section: Section) -> TeachingSettings | None:
         lesson_s=section.number("lesson_s", 5.0, low=0.1, high=3600.0),
         level=section.number("level") if "level" in section.values else None,
         tolerance=section.number("tolerance", 5.0, low=0.0),
-        examinations=_examinations(section),
+        # No fewer than are made before any is chosen
+        examinations=section.whole("examinations", low=FIRST_COUNTS * FIRST_REPETITIONS, high=1_000_000)
+        if "examinations" in section.values
+        else None,
         budget=section.whole("budget", 12, low=1, high=100_000),
         narrow=_flag(section, "narrow"),
         widths=_widths(section.section("width")),
@@ -142,13 +145,6 @@ def _grid(section: Section) -> tuple[int, ...]:
     if len(counts) < 2 or any(later <= earlier for earlier, later in itertools.pairwise(counts)):
         raise section.error(key, f"must rise, over two numbers at least, got {counts}")
     return tuple(counts)
-
-
-def _examinations(section: Section) -> int | None:
-    """How many examinations a curve takes; no fewer than are made before any is chosen."""
-    if "examinations" not in section.values:
-        return None
-    return section.whole("examinations", low=FIRST_COUNTS * FIRST_REPETITIONS, high=1_000_000)
 
 
 def _flag(section: Section, key: str) -> bool:

@@ -1,6 +1,7 @@
-"""The engines by name.
+"""The engines by name, and a digest of the code that the proposals of each depend on.
 
-Which code something depends on: with code of another meaning, a finished run may not be what would be run today.
+With code of another digest the next trials of a study may not be those that it would have had: that is told, unless
+proxytune/lineage.py states that the code proposes the same.
 """
 
 import ast
@@ -14,6 +15,7 @@ from pathlib import Path
 from proxytune.errors import ExtensionError, InputError
 from proxytune.extensions import load, plugins
 from proxytune.identity import meaning_of
+from proxytune.lineage import named
 from proxytune.search.engine import RANDOM, SOBOL, AfterDesign, Engine, outside_proposer
 from proxytune.search.loop import Goal, Proposer
 from proxytune.search.optuna_bridge import TREE_PARZEN
@@ -147,6 +149,6 @@ def engine_code(engine: str | Engine) -> str:
     engine = engine_of(engine) if isinstance(engine, str) else engine
     code = code_of(AfterDesign.__module__, engine.make.__module__)
     if engine.name in ENGINE_NAMES:
-        return code
+        return named(f"engine {engine.name}", code)
     source = Path(inspect.getfile(engine.make))
-    return f"{code} {meaning_of([source], source.parent)[:12]}"
+    return f"{named('design', code)} {meaning_of([source], source.parent)[:12]}"
